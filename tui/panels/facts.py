@@ -40,7 +40,9 @@ def facts_of(view: View, bus: Bus, glance: Glance) -> Iterator[tuple[str, str]]:
         found = session.units.of(drive, axis.axis) if session.scaled else None
         scale = found.scale if found is not None else None
         unit = unit_of(axis, glance.unit)
-        text = unit if scale is None else ", ".join(filter(None, (str(scale), scale.shown_travel)))
+        text = (
+            (axis.figures.unit or unit) if scale is None else ", ".join(filter(None, (str(scale), scale.shown_travel)))
+        )
         yield f"units {axis.axis}".rstrip(), text
     program, family = readout.program, drive.family
     if not family.programs_at:
@@ -89,7 +91,8 @@ def cards_rows(view: View, width: int, height: int) -> list[Row]:
             rows[height - 1 :] = [((f" {len(buses) - number} more lines; ^A shows all drives", "dim"),)]
             break
         drives = f"{len(bus.drives)} drives " if len(bus.drives) != 1 else "1 drive "
-        left: Row = ((f" {bus.name} ", "accent"), (url_without_secrets(session.openings.url_of(bus)), "text"))
+        url = "" if session.watching else url_without_secrets(session.openings.url_of(bus))
+        left: Row = ((f" {bus.name} ", "accent"), (url, "text"))
         rows.append(spread(left, [(f"✗ lost: {bus.lost} " if bus.lost is not None else drives, "dim")], width))
         for glance in glances_of(session, view.model, bus):
             if not glance.selected:
@@ -117,12 +120,13 @@ def _fact(fact: tuple[str, str], width: int, indent: str = " ") -> Row:
 
 def next_rows(view: View, width: int, height: int) -> list[Row]:
     """What to press or to type: what the state asks for, macros on keys, pages, functions, lines."""
-    offers = [*_asked_for(view), *_macros(view)]
+    mine = not view.session.watching  # a watcher's lines go nowhere
+    offers = [*_asked_for(view), *_macros(view)] if mine else []
     about = view.keys.about
     for name in (*(each for each in about if each.startswith("page-")), *(each for each in FUNCTIONS if each in about)):
         key = view.keys.shown(name) or (f"/page {name.removeprefix('page-')}" if name.startswith("page-") else "")
         offers += [(key, about[name])] if key else []
-    offers += LINES.items()
+    offers += LINES.items() if mine else ()
     shown = [(f" {key:<{KEY}} ", words) for key, words in offers[:height]]
     return [((key, "key"), (fit(words, width - len(key)), "dim")) for key, words in shown]
 
