@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from multidrop.dialects.on_demand import OnDemand
 from multidrop.dialects.program_files import ProgramFiles
+from multidrop.dialects.text import visible
 
 if TYPE_CHECKING:
     from multidrop.dialects.codec import Codec
@@ -94,3 +95,19 @@ def spoken(data: bytes, besides: str) -> str:
     names = (name for name, family in FAMILIES.items() if name != besides and family.in_frames(data))
     found = next(names, "")
     return f"frames came as {found.upper()} drives send them: dialect={found} opens such a line" if found else ""
+
+
+SHOWN = 40
+"""Most characters that are shown of what came from an unknown line."""
+
+
+def seen(data: bytes, besides: str) -> str:
+    """What came in place of a reply of the family `besides`, for a message; empty: nothing came."""
+    readable = sum(0x20 <= byte < 0x7F or byte in b"\t\r\n\x06\x15" for byte in data)
+    if not data or (frames := spoken(data, besides)):
+        return frames if data else ""
+    if 2 * readable < len(data):
+        return f"{len(data)} bytes came, {readable or 'none'} of them readable: another baud rate?"
+    text = visible(data[:SHOWN].decode("latin-1").strip())
+    repeated = "or an adapter that repeats what it sends (echo=local)"
+    return f"{len(data)} bytes came that are no reply ('{text}'): another language, {repeated}?"

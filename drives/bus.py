@@ -45,6 +45,9 @@ class Bus:
         self.run = self._conversations.run
         self.witnesses = self._conversations.witnesses
         """The functions called at the end of every conversation."""
+        self.keeper = keeper
+        self.silent = ""
+        """Why no drive is listed: the failure of the search for them; empty: none has failed."""
         self.roster = Roster(self._conversations, assumed, keeper)
         self.at = self.roster.at
         self.telemetry = Telemetry(self.roster)
@@ -111,6 +114,21 @@ class Bus:
         self.link.reserved = Reserved(f"{self.name} is raw: typed text goes to the port; /raw off finds its drives")
         self.link.publish(Changed(self.now()))
 
+    # A line on which no drive has replied
+
+    def unanswered(self, why: str) -> None:
+        """Go on with the line, although no drive has replied."""
+        self.silent = why
+        self.link.resumed()
+        self._stopping.unasked()
+        self.telemetry.resume()
+        self.link.publish(Changed(self.now()))
+
+    def set_baud(self, baud: int) -> None:
+        """Count with another baud rate, to which the port was set."""
+        self.line.baud = self.keeper.baud = baud
+        self.line.byte_time = 10.0 / baud if baud else 0.0
+
     # The return of a lost port
 
     def resume(self, transport: Transport) -> Halt | None:
@@ -138,6 +156,7 @@ class Bus:
         if ends := [each.over for each in self._conversations.under_way]:
             await asyncio.wait(ends)
         self.roster.found_again(await self.roster.search_again(hints))
+        self.silent = ""
         await self.roster.search_over()
         self.link.resumed()
         self.link.reserved = None

@@ -275,6 +275,14 @@ class Link:
 
     # The end
 
+    async def detach(self, why: TransportLost) -> None:
+        """Close the port for a while, as a loss that nobody is told of; `resume` gives the link another transport."""
+        self._held = self._held or why
+        self._lose(why)
+        self.advance()
+        self.publish(Changed(self.now()))
+        await self.transport.close()
+
     def _broke(self, error: TransportLost) -> None:
         if self.lost:
             return

@@ -14,6 +14,9 @@ GLOBAL = ("*", "^")
 class Keeper:
     """Keeps nothing, as for a port that needs no record; `shell.connect.port_state` keeps one. No method raises."""
 
+    baud = 0
+    """The baud rate of the port; 0 where it has none."""
+
     async def owes(self, state: DriveState) -> None:
         """Write down what is to be restored in this drive (`state.restore`), if anything; done on return."""
 

@@ -16,7 +16,7 @@ from dataclasses import replace
 from typing import Any
 
 from multidrop.dialects import DriveError, DriveState, Family, Hints, NoAnswer, StopPiece
-from multidrop.dialects.families import FAMILIES, family_of, spoken
+from multidrop.dialects.families import FAMILIES, family_of, seen
 from multidrop.dialects.values import Value
 from multidrop.drives.conversations import Conversations
 from multidrop.drives.drive import Drive, still
@@ -267,8 +267,8 @@ class Roster:
             try:
                 return await self.conversations.run(family.identify(hints), unknown, searching=True)
             except NoAnswer as error:
-                if other := spoken(bytes(heard), family.name):
-                    raise NoAnswer(f"{error}; {other}") from None
+                if came := seen(bytes(heard), family.name):
+                    raise NoAnswer(f"{error}; {came}") from None
                 if hints.drives or hints.party or not self.link.unheard or protection(self.link, family) is None:
                     raise
                 await asyncio.sleep(SLOW)

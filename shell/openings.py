@@ -6,21 +6,24 @@ import asyncio
 import contextlib
 from collections.abc import Callable, Coroutine, Iterator, Sequence
 from dataclasses import replace
+from functools import partial
 from itertools import count
 from typing import Any, TypeVar
 
-from multidrop.dialects import Diagnostic, DriveError
+from multidrop.dialects import Diagnostic, DriveError, NoAnswer
 from multidrop.drives.bus import Bus
 from multidrop.drives.drive import Drive
+from multidrop.drives.inbox import LocalEcho
 from multidrop.drives.stopping import Halt
-from multidrop.shell.connect.opening import Opened, Opener, port_name
+from multidrop.shell.connect.opening import BAUDED, Naming, Opened, Opener, first, open_buses, port_name
+from multidrop.shell.connect.reconnect import Newcomer
 from multidrop.shell.connect.urls import Connection, parse
 from multidrop.shell.line_syntax import EVERYONE, split_target
 from multidrop.shell.raw import RawLine
 from multidrop.shell.secrets import url_without_secrets
 from multidrop.shell.state import crash_marks
 from multidrop.shell.workspace import BeingOpened, Workspace
-from multidrop.transports import TransportLost
+from multidrop.transports import NotOpen, TransportLost
 
 
 def model(drive: Drive) -> str:
@@ -89,11 +92,20 @@ class Openings:
                     raise
                 failed(number, problem)
         on_failure = failed and (lambda which, failure: failed(numbers[which], failure))
-        await side_by_side([self._run(*each, self._raw) for each in prepared], self._select_first, on_failure)
+        keep = failed is not None and self._tabbed
+        await side_by_side([self._run(*each, self._raw, keep) for each in prepared], self._select_first, on_failure)
+        if not self._workspace.selected_bus and self._workspace.buses:
+            self._workspace.select("", next(iter(self._workspace.buses)))
+
+    @property
+    def _tabbed(self) -> bool:
+        """The front end has tabs: a line that could not be opened, or on which no drive replies, keeps its own."""
+        return self._workspace.front.screen is not None
 
     def _select_first(self, opened: list[Bus]) -> None:
         """Select the first of these buses that is still open where no bus is selected."""
-        first = next((bus.name for bus in opened if bus.name in self._workspace.buses), "")
+        there = [bus.name for bus in opened if bus.name in self._workspace.buses and bus.lost is None]
+        first = next(iter(there), "")
         if first and not self._workspace.selected_bus:
             self._workspace.select("", first)
         else:
@@ -140,7 +152,44 @@ class Openings:
             self._workspace.identified(bus)
         self._workspace.notify(described(bus), bus=bus.name)
 
-    async def _run(self, opening: _Opening, connection: Connection, raw: bool = False) -> list[Bus]:
+    async def search(self, bus: Bus) -> None:
+        """Search the port of a line on which no drive has replied, and go on with the line as drives reply there.
+
+        It begins with the baud rate and the language of the line, and asks before it tries others. Raises NothingFound,
+        Diagnostic where a person does not agree or nothing can be searched, and the failures of a port.
+        """
+        from multidrop.shell.finding.scanning import Scanning, alike, url_of
+        from multidrop.shell.state.store import note
+
+        workspace, record, connection = self._workspace, self._workspace.of(bus), self._workspace.of(bus).connection
+        assert connection is not None, bus.name
+
+        async def beside(where: Connection, naming: Naming) -> list[Opened]:
+            return await self._opener(where, lambda base: naming(f"{base}-search"))  # two buses never share a name
+
+        searching = Scanning(workspace, beside, connection, lambda found: workspace.output(found.words()))
+        await workspace.reconnections.remove(bus.name)
+        await bus.link.detach(TransportLost(f"{bus.name} is being searched for drives"))
+        try:
+            await searching.run([], False)
+        finally:
+            if bus.name in workspace.buses:
+                if found := alike(searching.found):
+                    url, before = url_of(found), connection
+                    connection = replace(parse(url), name=before.name, labels=before.labels)
+                    bus.set_baud(connection.baud or 0)
+                    bus.line.inbox.echo = LocalEcho() if connection.local_echo else None
+                    record.connection = connection
+                    await asyncio.to_thread(note, workspace.settings.state, url)
+                    text = f"{bus.name}: it is opened as {url}; /keep {bus.name} saves that"
+                    workspace.notify(text, bus=bus.name)
+                record.opened = replace(record.opened, hints=connection.hints, reopen=first(connection))
+                bus.silent = ""
+                _Newcomers(workspace).add(record.opened, connection)
+                workspace.reconnections.lost(bus)
+
+    async def _run(self, opening: _Opening, connection: Connection, raw: bool = False, keep: bool = False) -> list[Bus]:
+        """Open one URL. `keep`: a port that cannot be opened keeps a bus, which is tried again."""
         if waiting := self._workspace.reconnections.waiting_for(port_name(connection)):
             hint = f"it comes back by itself; /close {waiting} gives it up"
             raise Diagnostic(
@@ -151,7 +200,12 @@ class Openings:
             shown = connection.name or url_without_secrets(connection.text)
             with opening.listed(connection.name or connection.text), self._workspace.under_way(f"opening {shown}"):
                 async with in_turn:
-                    found = await self._opener(connection, opening.named)
+                    try:
+                        found = await self._opener(connection, opening.named)
+                    except TransportLost as failure:
+                        if not keep or connection.scheme == SIMULATED:
+                            raise
+                        found = await open_buses(connection, opening.named, self._workspace.settings.state, failure)
             addresses = {label: address for address, label in connection.labels.items()}
             hinted = []
             for each in found:  # an address without a bus belongs to the first URL; a label counts as its address
@@ -159,7 +213,7 @@ class Openings:
                 tried = tuple(dict.fromkeys(addresses.get(to, to) for to in own if to and to not in EVERYONE))
                 hints = replace(each.hints, lazy=self._lazy and not raw, tried=tried)
                 hinted.append(replace(each, hints=hints))
-            return await opening.identify(hinted, connection, raw)
+            return await opening.identify(hinted, connection, raw, self._tabbed)
         finally:
             self._reserved -= opening.names
 
@@ -212,14 +266,21 @@ class _Opening:
         finally:
             self._workspace.opening.remove(entry)
 
-    async def identify(self, found: Sequence[Opened], connection: Connection, raw: bool) -> list[Bus]:
-        """Adopt the buses and find their drives, but not where they are to be `raw`; a failure closes them all."""
-        workspace = self._workspace
+    async def identify(
+        self, found: Sequence[Opened], connection: Connection, raw: bool, keep: bool = False
+    ) -> list[Bus]:
+        """Adopt the buses and find their drives, but not where they are to be `raw`; a failure closes them all.
+
+        `keep`: a bus stays where no drive replies.
+        """
+        workspace, newcomers = self._workspace, _Newcomers(self._workspace)
         async with contextlib.AsyncExitStack() as failing:
             for each in found:
                 failing.push_async_callback(workspace.forget, each.bus)
             for each in found:
                 in_cell = self.bases.get(each.bus.name, each.bus.name)
+                if isinstance(each.bus.link.transport, NotOpen):  # it is lost as soon as it is adopted
+                    newcomers.add(each, connection)
                 record = workspace.adopt(replace(each, warnings=()) if raw else each, self.place, connection, in_cell)
                 if connection.scheme != SIMULATED:
                     doubts = workspace.settings.in_doubt
@@ -234,7 +295,17 @@ class _Opening:
                 workspace.notify(text, bus=bus.name)
             for each in found:
                 port = workspace.of(each.bus).port = port_name(connection)
-                await self._find(each, connection, raw)
+                if each.bus.lost is not None and isinstance(each.bus.link.transport, NotOpen):
+                    continue
+                try:
+                    await self._find(each, connection, raw)
+                except NoAnswer as failure:
+                    if not keep:
+                        raise
+                    newcomers.add(each, connection)
+                    if newcomers.silent(each, connection, failure):
+                        workspace.reconnections.lost(each.bus)
+                    continue
                 workspace.reconnections.add(each.bus, each.hints, each.reopen, port)
             for bus, halt in late:  # again by name, as some drives need it, and confirmed; but none started since
                 standing = [drive for drive in bus.all_drives if not halt.started_since(drive)]
@@ -253,6 +324,24 @@ class _Opening:
                 workspace.notify(f"{bus.name}: {CUT.format(opened.hints.cut)}", warning=True)
             return
         await bus.identify(opened.hints)
+        await _Newcomers(workspace).found(opened, connection)
+
+
+class _Newcomers:
+    """Buses whose drives were never found in this session: the first success of the search, and each failure."""
+
+    def __init__(self, workspace: Workspace) -> None:
+        self._workspace = workspace
+
+    def add(self, opened: Opened, connection: Connection) -> None:
+        """Try a bus again whenever it is lost, and find its drives then for the first time."""
+        newcomer = Newcomer(partial(self.found, opened, connection), partial(self.silent, opened, connection))
+        port = port_name(connection)
+        self._workspace.reconnections.add(opened.bus, opened.hints, opened.reopen, port, newcomer)
+
+    async def found(self, opened: Opened, connection: Connection) -> None:
+        """Say what was found, and name it."""
+        workspace, bus = self._workspace, opened.bus
         label(bus, connection)
         workspace.identified(bus)
         workspace.notify(described(bus), bus=bus.name)
@@ -260,6 +349,36 @@ class _Opening:
             await each(bus)
         for text in crash_marks.left(workspace.settings.state, workspace.of(bus).port):
             workspace.notify(f"{bus.name}: {text}", bus=bus.name, warning=True)
+
+    def silent(self, opened: Opened, connection: Connection, failure: DriveError) -> bool:
+        """Say once that no drive replies, what came, and the ways on; return whether the line is asked again by itself.
+
+        It is where drives are known to reply as they are asked, or where no baud rate can be wrong. To other drives
+        each question may be an error.
+        """
+        workspace, bus, hints = self._workspace, opened.bus, opened.hints
+        known = bool(connection.scheme not in BAUDED or hints.drives or hints.remembered)
+        again = known and workspace.reconnections.tries(bus.name)
+        said, reason = bus.silent, str(failure)
+        bus.unanswered(reason)
+        if said != reason:
+            heard = "nothing was received" if bus.link.unheard else ""
+            texts = filter(None, (reason, heard, "it is asked again every 5 s" if again else ""))
+            workspace.notify(f"{bus.name}: {'; '.join(texts)}", bus=bus.name, warning=True)
+            workspace.notify(f"{bus.name}: {self._way_on(connection)}/raw on shows all that comes", bus=bus.name)
+        workspace.changed()
+        return again
+
+    def _way_on(self, connection: Connection) -> str:
+        """The offer of a search, with its time; empty where none is possible."""
+        from multidrop.shell.finding.scanning import Scanning
+
+        try:
+            searching = Scanning(self._workspace, open_buses, connection, lambda found: None)
+            about = searching.about(searching.stages(()))
+        except Diagnostic:
+            return ""
+        return f"search ({about})? Enter alone begins it, and it asks before other baud rates and languages; "
 
 
 def label(bus: Bus, connection: Connection) -> None:

@@ -193,8 +193,13 @@ class Session(Workspace):
                 raise
 
     def enter_alone(self) -> str:
-        """The line that Enter alone stands for: in raw mode the end of a line, which wakes many a device."""
-        raw = self.raw.get(self.selected_bus)
+        """The line that Enter alone stands for: in raw mode the end of a line, which wakes many a device.
+
+        On a line where no drive has replied, it is the search for drives.
+        """
+        raw, bus = self.raw.get(self.selected_bus), self.buses.get(self.selected_bus)
+        if raw is None and bus is not None and bus.silent:
+            return "/scan"
         return f"/bytes {raw.end.hex(' ').upper()}" if raw is not None and raw.end else ""
 
     def start(self, line: str | TypedLine, by: By = By.OPERATOR, since: int | None = None) -> asyncio.Task[bool]:

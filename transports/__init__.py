@@ -159,6 +159,25 @@ class Transport(ABC):
         """Close the pipe without a call of `lost`. A second close has no effect."""
 
 
+class NotOpen(Transport):
+    """The place of a pipe that could not be opened; it breaks as it is started."""
+
+    def __init__(self, name: str, failure: TransportLost) -> None:
+        self.name, self._failure = name, failure
+
+    def start(self, received: Received, lost: Lost) -> None:
+        lost(self._failure)
+
+    def write(self, data: bytes) -> bool:
+        return False
+
+    def discard(self, whole: bool = False) -> int:
+        return 0
+
+    async def close(self) -> None:
+        """Close nothing."""
+
+
 if sys.platform != "win32":
 
     def output_queue(descriptor: int) -> int:

@@ -93,18 +93,14 @@ class Assist:
         """
         from multidrop.shell.connect.opening import open_buses
         from multidrop.shell.connect.urls import parse
-        from multidrop.shell.finding.scanning import FoundDrive, Scanning, url_of
+        from multidrop.shell.finding.scanning import Scanning, alike, url_of
 
         opener = partial(open_buses, state=self._settings.state)
         connection = parse(url, self._settings.connections)
         scanning = Scanning(self._session, opener, connection, lambda drive: found(drive.words()))
         await scanning.run([], False)
 
-        def form(drive: FoundDrive) -> tuple[object, ...]:
-            return drive.connection.baud, drive.state.codec.family, bool(drive.state.address)
-
-        alike = [each for each in scanning.found if form(each) == form(scanning.found[0])]
-        return url_of(alike) if alike else url
+        return url_of(alike(scanning.found)) if scanning.found else url
 
     def verbs(self) -> Sequence[tuple[str, str, str]]:
         from multidrop.shell.operations.table import VERBS

@@ -52,7 +52,9 @@ class Presenter:
             Tab(
                 number,
                 bus.name,
-                bus_state(self.model.buses.get(bus.name), list(bus.drives), bus.lost is not None),
+                State.SILENT
+                if bus.silent and bus.lost is None
+                else bus_state(self.model.buses.get(bus.name), list(bus.drives), bus.lost is not None),
                 bus.name == self.session.selected_bus,
                 bus_old(self.model.buses.get(bus.name), list(bus.drives), now),
                 trouble_mark(self.model.buses.get(bus.name), list(bus.drives), bus.lost is not None),

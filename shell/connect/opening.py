@@ -17,10 +17,10 @@ from multidrop.dialects.families import DEFAULT, FAMILIES
 from multidrop.drives.bus import Bus
 from multidrop.drives.line import DEFAULT_TIMEOUT
 from multidrop.shell import configuration
-from multidrop.shell.connect.reconnect import LoginAgain, Reopen, SerialAgain, host_again, simulated, usb_again
+from multidrop.shell.connect.reconnect import Absent, LoginAgain, Reopen, SerialAgain, host_again, simulated, usb_again
 from multidrop.shell.connect.urls import Connection
 from multidrop.shell.state.port_state import PortState
-from multidrop.transports import Unreachable
+from multidrop.transports import NotOpen, TransportLost, Unreachable
 from multidrop.transports.ssh import FarPort
 
 if TYPE_CHECKING:
@@ -56,17 +56,22 @@ BAUDED = ("serial", "rfc2217", "ssh")
 Opener = Callable[[Connection, Naming], Awaitable[list[Opened]]]
 
 
-async def open_buses(connection: Connection, naming: Naming, state: Path | None = None) -> list[Opened]:
+async def open_buses(
+    connection: Connection, naming: Naming, state: Path | None = None, failure: TransportLost | None = None
+) -> list[Opened]:
     """Open a connection. Raises Unreachable where nothing listens, Diagnostic for an unknown family.
 
-    `state`: the folder that keeps what an interrupted session leaves on a port; None: nothing is kept.
+    `state`: the folder that keeps what an interrupted session leaves on a port; None: nothing is kept. `failure`: the
+    port could not be opened; its bus is lost from the beginning, and is tried again.
     """
     family = _family(connection)
     if connection.scheme == "sim":
         return await _simulated(connection, naming)
     if family.prepare is not None:
         await asyncio.to_thread(family.prepare)  # a stop of another bus must not wait for it
-    transport, reopen = await _connected(connection)
+    transport, reopen = (
+        await _connected(connection) if failure is None else (NotOpen(connection.short, failure), first(connection))
+    )
     limits = transport.limits
     hints, name = connection.hints, naming(connection.short)
     if state is None or not family.repairs:
@@ -201,15 +206,39 @@ async def _connected(connection: Connection) -> tuple[Transport, Reopen | None]:
     """Open a transport; return with it the way to open it again after a loss, if there is one."""
     clock = asyncio.get_running_loop().time
     begun = clock()
-    transport, took = await _transport(connection), clock() - begun
+    transport = await _transport(connection)
+    return transport, _again(connection, clock() - begun)
+
+
+def _again(connection: Connection, took: float) -> Reopen | None:
+    """The way to open a port again, whose first opening `took` so long, s; None: there is none."""
     if connection.scheme == "ssh":
-        return transport, LoginAgain(lambda within, baud: _transport(connection, within=within, baud=baud), took)
+        return LoginAgain(lambda within, baud: _transport(connection, within=within, baud=baud), took)
     if connection.scheme == "usb":
-        return transport, usb_again(partial(_transport, connection))
+        return usb_again(partial(_transport, connection))
     if connection.scheme != "serial":
-        return transport, host_again(lambda within: _transport(connection, within=within), took)
+        return host_again(lambda within: _transport(connection, within=within), took)
     again = SerialAgain(connection.target, partial(_transport, connection))
-    return transport, again if again.possible else None
+    return again if again.possible else None
+
+
+def first(connection: Connection) -> Reopen:
+    """The way to open a port that was never open in this session, or is set in another way; then to open it again."""
+    again: Reopen | None = _again(connection, 0.0) if connection.scheme == "ssh" else None
+    opened = False
+
+    async def open_(old: Transport) -> Transport:
+        nonlocal again, opened
+        await old.close()
+        if again is not None:
+            return await again(old)
+        if opened:
+            raise Absent(f"{old.name} cannot be found again")
+        transport, again = await _connected(connection)
+        opened = True
+        return transport
+
+    return open_
 
 
 async def _cell(connection: Connection) -> Sequence[SimBus]:

@@ -15,7 +15,7 @@ import contextlib
 import os
 import sys
 from collections.abc import Awaitable, Callable, Collection
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from multidrop.dialects import DriveError, Hints, Stopped
 from multidrop.drives.drive import confirmed_motion
@@ -169,24 +169,45 @@ def next_pause(pause: float, failure: TransportLost) -> float:
     return min(2 * pause, GLANCE if isinstance(failure, Absent) else LONGEST)
 
 
+SILENT = 5.0
+"""The pause before a line is asked again on which no drive has replied yet, s."""
+
+
+class Newcomer(NamedTuple):
+    """A bus whose drives were never found in this session."""
+
+    found: Callable[[], Awaitable[None]]
+    """Awaited once they are."""
+    silent: Callable[[DriveError], bool]
+    """Called where none replies; whether they are asked again by themselves."""
+
+
+class Way(NamedTuple):
+    """How a lost bus comes back."""
+
+    hints: Hints
+    reopen: Reopen
+    port: str
+    newcomer: Newcomer | None = None
+
+
 class Reconnections:
     """The buses of a session that are tried again when they are lost."""
 
     def __init__(self, say: Say, wanted: bool) -> None:
         self._say = say
-        self._wanted = wanted
-        self._ways: dict[str, tuple[Hints, Reopen, str]] = {}
-        """The hints, the way to open it again, and the port of each bus."""
+        self.wanted = wanted
+        self._ways: dict[str, Way] = {}
         self._tasks: dict[str, asyncio.Task[None]] = {}
 
     @property
     def trying(self) -> Collection[str]:
         return self._tasks.keys()
 
-    def add(self, bus: Bus, hints: Hints, reopen: Reopen | None, port: str) -> None:
+    def add(self, bus: Bus, hints: Hints, reopen: Reopen | None, port: str, newcomer: Newcomer | None = None) -> None:
         """Try this bus again whenever it is lost, where that is wanted and possible."""
-        if self._wanted and reopen is not None:
-            self._ways[bus.name] = hints, reopen, port
+        if self.wanted and reopen is not None:
+            self._ways[bus.name] = Way(hints, reopen, port, newcomer)
 
     def rename(self, before: str, now: str) -> None:
         """Know a bus by its new name. It must not be lost."""
@@ -199,23 +220,24 @@ class Reconnections:
 
     def waiting_for(self, port: str) -> str:
         """The name of the bus that is being tried again on a port; empty if there is none."""
-        return next((name for name, way in self._ways.items() if port and way[2] == port and name in self._tasks), "")
+        return next((name for name, way in self._ways.items() if port and way.port == port and name in self._tasks), "")
 
     def lost(self, bus: Bus) -> bool:
         """Begin to try a lost bus; whether it is tried."""
         if not self.tries(bus.name):
             return False
-        hints, reopen, _ = self._ways[bus.name]
         if earlier := self._tasks.get(bus.name):  # which is back, and reads what moves
             earlier.cancel()
-        self._tasks[bus.name] = asyncio.get_running_loop().create_task(self._try(bus, hints, reopen))
+        self._tasks[bus.name] = asyncio.get_running_loop().create_task(self._try(bus, self._ways[bus.name]))
         return True
 
-    async def _try(self, bus: Bus, hints: Hints, reopen: Reopen) -> None:
+    async def _try(self, bus: Bus, way: Way) -> None:
         trouble: list[str] = []
         try:
             with isolated(f"the return of {bus.name}", trouble):
-                await _Return(bus, hints, reopen, self._say).run()
+                await _Return(bus, way, self._say).run()
+                if bus.drives and self._ways.get(bus.name) is way:
+                    self._ways[bus.name] = way._replace(newcomer=None)
         finally:
             if self._tasks.get(bus.name) is asyncio.current_task():
                 del self._tasks[bus.name]
@@ -236,8 +258,8 @@ class Reconnections:
 class _Return:
     """The attempts for one loss of one bus."""
 
-    def __init__(self, bus: Bus, hints: Hints, reopen: Reopen, say: Say) -> None:
-        self._bus, self._hints, self._reopen = bus, hints, reopen
+    def __init__(self, bus: Bus, way: Way, say: Say) -> None:
+        self._bus, self._way = bus, way
         self._publish = say
         self._since = bus.now()
         self._unsure = [drive for drive in bus.all_drives if may_move(drive)]
@@ -251,7 +273,7 @@ class _Return:
 
     async def run(self) -> None:
         """Try until the bus is back, and say what its drives do."""
-        bus = self._bus
+        bus, newcomer = self._bus, self._way.newcomer
         if self._unsure:
             seen = ", ".join(f"{each.shown} {last_seen(each, self._since)}" for each in self._unsure)
             self._say(f"{bus.name}: cannot be stopped from here until the line is back: {seen}{E_STOP}")
@@ -263,14 +285,21 @@ class _Return:
             except Stopped:
                 pause = min(2 * pause, GLANCE)
             except DriveError as failure:  # after a search of some seconds
-                self._failed(str(failure))
                 pause = FIRST
+                if newcomer is None:
+                    self._failed(str(failure))
+                elif newcomer.silent(failure):
+                    pause = SILENT
+                else:
+                    return
             except TransportLost as failure:
                 if not isinstance(failure, Absent):
                     self._failed(str(failure))
                 pause = next_pause(pause, failure)
             else:
                 pause = 0.0
+        if newcomer is not None and bus.drives:
+            return await newcomer.found()
         self._say(f"{bus.name} is back after {bus.now() - self._since:.1f} s")
         for drive in self._unsure:
             if drive.address in bus.drives and not drive.programming and not self._stopped:
@@ -280,12 +309,12 @@ class _Return:
         bus = self._bus
         if bus.link.lost is not None:
             cut = bus.link.cut
-            halt = bus.resume(await self._reopen(bus.link.transport))
+            halt = bus.resume(await self._way.reopen(bus.link.transport))
             if halt is not None and not self._stopped:
                 self._stopped = ", ".join(drive.shown for drive in halt.affected) or "every drive"
                 why = f"'{cut}' was cut off by the loss" if cut else "the loss kept it from the drives"
                 self._say(f"{bus.name}: the stop of {self._stopped} was sent first ({why})")
-        await bus.find_again(self._hints)
+        await bus.find_again(self._way.hints)
 
     def _failed(self, reason: str) -> None:
         """Publish a reason once, when it is met a second time in a row: a port may take a moment to be ready."""

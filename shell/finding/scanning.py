@@ -114,6 +114,15 @@ def url_of(found: Sequence[FoundDrive]) -> str:
     return head + (f"?{'&'.join(keys)}" if keys else "") + (f"#{bus}" if bus else "")
 
 
+def alike(found: Sequence[FoundDrive]) -> list[FoundDrive]:
+    """The drives that one URL opens with the first one found."""
+
+    def form(drive: FoundDrive) -> tuple[object, ...]:
+        return drive.connection.baud, drive.state.codec.family, bool(drive.state.address)
+
+    return [each for each in found if form(each) == form(found[0])]
+
+
 def port_of(connection: Connection, bus: str) -> str:
     """The port for a person and a program, without keys."""
     if connection.scheme == "serial":
@@ -199,11 +208,8 @@ class Scanning:
         first, *others = self.stages(bauds)
         reach = self._reach()
 
-        def about(stages: Iterable[Stage]) -> str:
-            return f"about {round(sum(each.scan.seconds(reach, each.baud) for each in stages))} s"
-
         if first.scan.hazard:
-            asks = f"the search with {listed([first])} asks {first.scan.asked(reach)}, {about([first])}"
+            asks = f"the search with {listed([first])} asks {first.scan.asked(reach)}, {self.about([first])}"
             await self._workspace.questions.confirm(f"{asks}; {first.scan.hazard}", self.port)
         async with self.stopping_all():
             await self.search([first], False)
@@ -211,7 +217,7 @@ class Scanning:
                 others = []
             if others and (everything or not self.found):
                 so_far = f"{len(self.found)} found" if self.found else "no drive replies"
-                on = f"the search goes on with {listed(others)} ({about(others)})"
+                on = f"the search goes on with {listed(others)} ({self.about(others)})"
                 try:
                     what = f"{so_far} with {listed([first])}; {on}; {HAZARD}"
                     await self._workspace.questions.confirm(what, self.port, SO_FAR)
@@ -223,6 +229,10 @@ class Scanning:
         if not self.found:
             advice = "; multidrop rescue PORT frees a drive that is stuck" if first.scan.clear is not None else ""
             raise self.nothing([first, *others], advice)
+
+    def about(self, stages: Iterable[Stage]) -> str:
+        """The time that a search takes, where no drive replies."""
+        return f"about {round(sum(each.scan.seconds(self._reach(), each.baud) for each in stages))} s"
 
     def stages(self, bauds: Sequence[int]) -> list[Stage]:
         """The stages in their order: the given language and baud rate first."""

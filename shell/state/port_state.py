@@ -108,7 +108,7 @@ class PortState(Keeper):
         self.owed: tuple[Owed, ...] = ()
         self.remarks: list[str] = []
         self.notify: Callable[[str], None] = self.remarks.append
-        self._port, self._baud = port, baud
+        self._port, self.baud = port, baud
         self._store, self._name = Store(folder / "ports"), _file_name(folder, port)
         self._line = -1
         self._shared = False
@@ -150,7 +150,7 @@ class PortState(Keeper):
     def remember(self, drives: Mapping[str, Remembered | None]) -> None:
         """Remember drives by address; None forgets one. Another session that has the port open remembers its own."""
         if self._line >= 0:
-            self.memory.update(drives, self._baud)
+            self.memory.update(drives, self.baud)
 
     def begun(self, line: str) -> None:
         """Record a line that may move something, as it begins to leave."""

@@ -6,10 +6,11 @@ import asyncio
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
-from multidrop.dialects import Diagnostic, Inexpressible
+from multidrop.dialects import Diagnostic, Inexpressible, NoAnswer
 from multidrop.dialects.text import whole
 from multidrop.dialects.units import Takes
 from multidrop.shell import configuration
+from multidrop.shell.events import By
 from multidrop.shell.finding import scanning
 from multidrop.shell.line_syntax import split_target
 from multidrop.shell.openings import model
@@ -30,7 +31,10 @@ FORMS = {form.value[0]: form for form in Form}
 
 async def open_(call: Call) -> None:
     url, *name = call.words()
-    await call.session.open(url, name[0] if name else None)
+    for bus in await call.session.open(url, name[0] if name else None):
+        if bus.silent and call.by is not By.OPERATOR:
+            await call.session.forget(bus)
+            raise NoAnswer(bus.silent)
 
 
 async def close(call: Call) -> None:
@@ -73,6 +77,8 @@ async def drives(call: Call) -> None:
 async def scan(call: Call) -> None:
     workspace = call.session
     bus = workspace.bus(call.word())
+    if bus.silent and workspace.reconnections.wanted:
+        return await workspace.openings.search(bus)
     found = await scanning.extend(workspace, bus)
     for address in found:
         workspace.output(f"{bus.name}: {address} {model(bus.drives[address])}")
@@ -177,7 +183,7 @@ async def _set_baud(call: Call, text: str) -> None:
     if baud is None:
         raise call.wrong(f"no baud rate {text}")
     await _set(line, f"the baud rate {baud}", lambda: line.control().set_baud(baud))
-    line.bus.line.baud, line.bus.line.byte_time = baud, 10.0 / baud
+    line.bus.set_baud(baud)
     call.session.notify(f"{line.bus.name}: {baud} baud")
 
 

@@ -43,7 +43,7 @@ class FakeBus:
     """A bus with drives that take every line."""
 
     lost = away = loss = last_stop = None
-    stops, closed = 0, False
+    stops, closed, silent = 0, False, ""
 
     def __init__(self, name, addresses):
         self.name = name

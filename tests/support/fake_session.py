@@ -103,6 +103,7 @@ class FakeBus:
     name: str
     drives: dict[str, FakeDrive]
     lost: Exception | None = None
+    silent: str = ""
     telemetry: FakeTelemetry = field(default_factory=FakeTelemetry)
 
 
