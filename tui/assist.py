@@ -21,6 +21,8 @@ if TYPE_CHECKING:
 
 ANY_LETTER = "P"
 """A text to complete and to explain, which imports what that needs."""
+EDIT = "edit"
+"""The place of an offer that leads to the editor."""
 LATELY = 5
 """Number of URLs opened lately that are offered."""
 
@@ -67,6 +69,11 @@ class Assist:
 
     def saved(self) -> Sequence[StartEntry]:
         return [StartEntry("saved", each.name, each.name, each.url) for each in self._settings.connections.values()]
+
+    def wrong(self) -> Sequence[StartEntry]:
+        """The first error of the configuration; opening it edits the file at its line."""
+        found = self._settings.problems[:1]
+        return [StartEntry("wrong", each.where, EDIT, f"{each.message}; Enter edits the line") for each in found]
 
     async def ports(self) -> Sequence[StartEntry]:
         """Serial ports of this machine: who holds each, or which drives replied there last. The search may be slow."""

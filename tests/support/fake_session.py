@@ -356,6 +356,9 @@ class FakeAssist(Assist):
     def saved(self) -> Sequence[StartEntry]:
         return [StartEntry("saved", "press", "press", "serial:/dev/ttyUSB0?drives=a,b,c")]
 
+    def wrong(self) -> Sequence[StartEntry]:
+        return ()
+
     async def ports(self) -> Sequence[StartEntry]:
         return self.found_ports
 

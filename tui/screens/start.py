@@ -28,7 +28,10 @@ from multidrop.tui.widgets.bars import Banner
 DEMO = StartEntry("demo", "the demo cell", "sim:", "simulated drives, no hardware needed")
 TOUR = StartEntry("demo", "the tour", "tour", "two minutes through it, on the demo cell")
 KINDS = (
+    ("wrong", "Wrong in the configuration"),
     ("typed", "Typed"),
+    ("found", "Found by the search"),
+    ("failed", "Could not be opened"),
     ("saved", "Saved connections"),
     ("lately", "Opened lately"),
     ("port", "Serial ports"),
@@ -55,6 +58,8 @@ class Start(Over[None]):
         self.only, self._trouble = only, trouble
         self._found: Sequence[StartEntry] | None = None
         """The ports; None while they are looked for."""
+        self._tried: dict[str, StartEntry] = {}
+        """What could not be opened, and what a search has found, by URL."""
         self._places: list[StartEntry | None] = []
         self._opening = self._done = False
 
@@ -89,7 +94,8 @@ class Start(Over[None]):
 
     def _listed(self, typed: str) -> list[StartEntry]:
         """The offers that contain the typed words, and the typed text itself as a URL."""
-        all_ = [*self._assist.saved(), *self._assist.lately(), *(self._found or ()), DEMO, TOUR]
+        known = [*self._assist.saved(), *self._assist.lately(), *(self._found or ()), DEMO, TOUR]
+        all_ = [*self._assist.wrong(), *self._tried.values(), *(each for each in known if each.url not in self._tried)]
         words = typed.casefold().split()
         fitting = [each for each in all_ if all(word in " ".join(each).casefold() for word in words)]
         is_url = bool(typed) and (any(sign in typed for sign in ":/?") or not fitting)
@@ -113,9 +119,9 @@ class Start(Over[None]):
                 self._add(place, Text(text, no_wrap=True, overflow="ellipsis"))
             if not of_kind:
                 self._add(None, Text("  looking …" if self._found is None else "  none found", "italic"))
-        first = next(n for n, place in enumerate(self._places) if place)
+        wanted = [n for n, place in enumerate(self._places) if place and (typed or place.kind != "demo")]
         stays = before in self._places and before is not None and not typed
-        options.highlighted = self._places.index(before) if stays else first
+        options.highlighted = self._places.index(before) if stays else next(iter(wanted), None)
 
     def _add(self, place: StartEntry | None, text: Text) -> None:
         self._places.append(place)
@@ -148,6 +154,8 @@ class Start(Over[None]):
     def _entered(self, url: str) -> None:
         if (place := self._highlighted) is not None:
             self._open(place.url)
+        else:
+            self.show("nothing is chosen: ↑↓ choose, or type a URL")
 
     def action_raw(self) -> None:
         """Open what is highlighted in raw mode: nothing is sent before a person does."""
@@ -165,6 +173,8 @@ class Start(Over[None]):
             self._end()
         if trouble:
             self.show(f"✗ {trouble}", bad=True)
+            self._tried[url] = StartEntry("failed", url, url, f"✗ {trouble}")
+            self._fill()
             return
         self._done = True
         self.on_screen_resume()
@@ -176,7 +186,8 @@ class Start(Over[None]):
             self.run_worker(self._scan(place.url), group="scan")
 
     async def _scan(self, url: str) -> None:
-        words: list[str] = []
+        words, field = list[str](), self.query_one(Field)
+        before = field.value
 
         def found(text: str) -> None:
             words.append(text)
@@ -189,10 +200,14 @@ class Start(Over[None]):
             return
         finally:
             self._end(keys=False)
-        field = self.query_one(Field)
-        field.value = url
-        field.cursor_position = len(url)
-        self.show(f"found {len(words)}; Enter opens what is in the line")
+        self._tried[url] = StartEntry("found", url, url, "; ".join(words))
+        if field.value == before:
+            field.value = url
+            field.cursor_position = len(url)
+            self.show(f"found {len(words)}; Enter opens what is in the line")
+        else:  # typed while it was searched: that stays
+            self._fill()
+            self.show(f"found {len(words)}: {url} is in the list")
 
     def stopped(self) -> None:
         """End a search after a stop."""
