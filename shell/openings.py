@@ -23,7 +23,7 @@ from multidrop.shell.raw import RawLine
 from multidrop.shell.secrets import url_without_secrets
 from multidrop.shell.state import crash_marks
 from multidrop.shell.workspace import BeingOpened, Workspace
-from multidrop.transports import NotOpen, TransportLost
+from multidrop.transports import TransportLost
 
 
 def model(drive: Drive) -> str:
@@ -92,7 +92,7 @@ class Openings:
                     raise
                 failed(number, problem)
         on_failure = failed and (lambda which, failure: failed(numbers[which], failure))
-        keep = failed is not None and self._tabbed
+        keep = failed is not None and self._tabbed and not self._raw
         await side_by_side([self._run(*each, self._raw, keep) for each in prepared], self._select_first, on_failure)
         if not self._workspace.selected_bus and self._workspace.buses:
             self._workspace.select("", next(iter(self._workspace.buses)))
@@ -279,7 +279,7 @@ class _Opening:
                 failing.push_async_callback(workspace.forget, each.bus)
             for each in found:
                 in_cell = self.bases.get(each.bus.name, each.bus.name)
-                if isinstance(each.bus.link.transport, NotOpen):  # it is lost as soon as it is adopted
+                if each.absent:
                     newcomers.add(each, connection)
                 record = workspace.adopt(replace(each, warnings=()) if raw else each, self.place, connection, in_cell)
                 if connection.scheme != SIMULATED:
@@ -295,7 +295,7 @@ class _Opening:
                 workspace.notify(text, bus=bus.name)
             for each in found:
                 port = workspace.of(each.bus).port = port_name(connection)
-                if each.bus.lost is not None and isinstance(each.bus.link.transport, NotOpen):
+                if each.absent:
                     continue
                 try:
                     await self._find(each, connection, raw)

@@ -285,5 +285,10 @@ class Actions:
         parts.model.changed = True
         parts.frames.wake()
 
+    async def action_edit_wrong(self) -> None:
+        """Show the configuration in the editor, at the first line that is wrong. Raises Diagnostic."""
+        self._parts.texts.open_at(self._parts.session.settings.problems[0].where)
+        await self.action_page("program")
+
     async def action_open(self) -> None:
         await self._parts.opener.ask()

@@ -12,6 +12,7 @@ the frame before; meanwhile events only gather.
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import os
 from collections.abc import Sequence
 from functools import partial
@@ -28,6 +29,7 @@ from textual.geometry import Size
 from textual.message import Message
 from textual.screen import Screen
 
+from multidrop.dialects import Diagnostic
 from multidrop.drives.events import Unsolicited
 from multidrop.shell.configuration import DEFAULT_LOOK, Look
 from multidrop.shell.events import Failed, OnBus, Printed, SessionEvent, StateChanged
@@ -244,6 +246,10 @@ class MultidropApp(App[int]):
         self.selection.follow()
         for trouble in self._troubles:
             self._warn(trouble)
+        for problem in self.session.settings.problems[:1]:
+            with contextlib.suppress(Diagnostic):
+                self.texts.open_at(problem.where)
+                self._warn(f"{self.keymap.shown('page-program')} edits {problem.where}")
         if self.urls:
             self.frames.first()
             self.call_after_refresh(self._begin)  # the first frame is shown before anything is opened

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import ClassVar, NamedTuple
 
 from rich.segment import Segment
@@ -17,6 +18,7 @@ from textual.widgets import TextArea
 from multidrop.dialects import Diagnostic
 from multidrop.dialects.program_files import Entry, Part, Problem
 from multidrop.macros import parse_macro
+from multidrop.shell import configuration
 from multidrop.shell.programs.edited_file import STAND_INS, edited
 from multidrop.shell.programs.program_text import ProgramGrammar
 
@@ -44,9 +46,7 @@ class MacroGrammar:
             macro = parse_macro(text, self._file)
             tuple(macro.parameters)
         except Diagnostic as problem:
-            found = _LINE.search(problem.where)
-            line, column = (int(found[1]), int(found[2] or 1)) if found else (1, 1)
-            return [Problem(line, column, problem.message, problem.hint)]
+            return [_problem(problem)]
         return ()
 
     def entries(self, text: str) -> Sequence[Entry]:
@@ -54,11 +54,30 @@ class MacroGrammar:
         return ()
 
 
+class ConfigurationGrammar(MacroGrammar):
+    """The configuration file: all its errors at once."""
+
+    title = "configuration"
+
+    def check(self, text: str, product: str) -> Sequence[Problem]:
+        """Every problem of a text, in order."""
+        return [_problem(each) for each in configuration.parse(text, self._file, lenient=True).problems]
+
+
+def _problem(found: Diagnostic) -> Problem:
+    """An error as an editor marks it, at the place that it names."""
+    place = _LINE.search(found.where)
+    line, column = (int(place[1]), int(place[2] or 1)) if place else (1, 1)
+    return Problem(line, column, found.message, found.hint)
+
+
 Grammar = MacroGrammar | ProgramGrammar
 """The language of a file as an editor uses it."""
 
 
 def grammar_of(file: str) -> Grammar:
+    if Path(file) == configuration.config_file().absolute():
+        return ConfigurationGrammar(file)
     return MacroGrammar(file) if file.lower().endswith(".toml") else ProgramGrammar(file)
 
 

@@ -51,6 +51,13 @@ class Texts:
         self.current = self._open[place]
         return self.current
 
+    def open_at(self, where: str) -> OpenText:
+        """Show a file at a line, as an error names its place: `FILE:LINE`, or `FILE` alone. Raises Diagnostic."""
+        path, _, line = where.rpartition(":")
+        text = self.open(path if path and line.isdecimal() else where)
+        text.cursor = (int(line) - 1 if path and line.isdecimal() else 0, 0)
+        return text
+
     def draft(self, text: OpenText) -> Copy | None:
         """A copy of an earlier session that differs from the file; None without one."""
         if self._drafts is None or text.changed or text.kept is not None:

@@ -47,6 +47,8 @@ class Opened:
     """The promises that its transport cannot keep."""
     reopen: Reopen | None = None
     """Opens its port again after a loss; None: it cannot be found again."""
+    absent: bool = False
+    """Its port could not be opened yet; the bus is lost as soon as it is adopted."""
     units: Mapping[str, Scale] = field(default_factory=lambda: MappingProxyType({}))
     """The scales that a simulated cell states for its drives, by address, or `ADDRESS.AXIS`."""
 
@@ -75,7 +77,15 @@ async def open_buses(
     limits = transport.limits
     hints, name = connection.hints, naming(connection.short)
     if state is None or not family.repairs:
-        return [Opened(_bus(name, transport, connection, hints.family), hints, limits=limits, reopen=reopen)]
+        return [
+            Opened(
+                _bus(name, transport, connection, hints.family),
+                hints,
+                limits=limits,
+                reopen=reopen,
+                absent=failure is not None,
+            )
+        ]
     kept = PortState(state, port_name(connection), _baud(connection))
     bus = _bus(name, transport, connection, hints.family, kept)
     kept.notify = partial(bus.notify, warning=True)
@@ -85,7 +95,7 @@ async def open_buses(
     found = replace(
         hints, cut=cut, owed=kept.owed, remembered=kept.memory.drives, first_mark=time.time_ns() // 10_000_000 % MARKS
     )
-    return [Opened(bus, found, warnings=warnings, limits=limits, reopen=reopen)]
+    return [Opened(bus, found, warnings=warnings, limits=limits, reopen=reopen, absent=failure is not None)]
 
 
 MARKS = 90

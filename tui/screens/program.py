@@ -23,7 +23,7 @@ from multidrop.dialects.program_files import Entry, Problem
 from multidrop.shell.programs.checking import ending_of
 from multidrop.shell.programs.edited_file import ChangedMeanwhile
 from multidrop.shell.programs.program_text import ProgramGrammar
-from multidrop.tui.editor import Editor, Grammar, grammar_of
+from multidrop.tui.editor import ConfigurationGrammar, Editor, Grammar, grammar_of
 from multidrop.tui.key_table import bound
 from multidrop.tui.panels.program import SIGNS, index_of, spot_of, state_words
 from multidrop.tui.panels.table import column_rows, panel, side_width
@@ -317,7 +317,8 @@ class ProgramPage(Page):
             self.notify(str(problem), timeout=6)
             return False
         self.host.texts.drop_draft(text)
-        self.host.show_line(f"saved {text.name}", ".")
+        later = "; multidrop reads it when it is started next" if isinstance(self.grammar, ConfigurationGrammar) else ""
+        self.host.show_line(f"saved {text.name}{later}", ".")
         self.host.model.changed = True  # it may be a macro
         return True
 

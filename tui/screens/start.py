@@ -19,7 +19,7 @@ from textual.widgets.option_list import Option
 from multidrop.dialects.text import visible
 from multidrop.shell.events import FAILURES
 from multidrop.shell.session import Session
-from multidrop.tui.assist import Assist, StartEntry
+from multidrop.tui.assist import EDIT, Assist, StartEntry
 from multidrop.tui.key_table import bound, hint
 from multidrop.tui.screens.dialogs import Field, Options, Over
 from multidrop.tui.terminal.keyboard import Keyboard
@@ -98,7 +98,7 @@ class Start(Over[None]):
         all_ = [*self._assist.wrong(), *self._tried.values(), *(each for each in known if each.url not in self._tried)]
         words = typed.casefold().split()
         fitting = [each for each in all_ if all(word in " ".join(each).casefold() for word in words)]
-        is_url = bool(typed) and (any(sign in typed for sign in ":/?") or not fitting)
+        is_url = bool(typed) and typed not in self._tried and (any(sign in typed for sign in ":/?") or not fitting)
         own = [StartEntry("typed", typed, typed, "open this")]
         return [*own, *fitting] if is_url else fitting
 
@@ -163,7 +163,9 @@ class Start(Over[None]):
             self._open(place.url, raw=True)
 
     def _open(self, url: str, raw: bool = False) -> None:
-        if self._begin(f"opening {url} …"):
+        if url == EDIT:
+            self.app.call_later(self.run_action, "act.edit_wrong")
+        elif self._begin(f"opening {url} …"):
             self.run_worker(self._try(url, raw))
 
     async def _try(self, url: str, raw: bool) -> None:
