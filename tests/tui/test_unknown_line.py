@@ -19,6 +19,7 @@ from multidrop.tui.screens.dialogs import GoOn
 from multidrop.tui.screens.program import ProgramPage
 from multidrop.tui.screens.start import Start
 from tests.support.cell_session import bus, party
+from tests.support.fake_session import readable
 from tests.support.posix import pty, tty
 from tests.support.real_screen import real_screen, until
 from tests.support.tuned_ports import TunedPipe
@@ -51,6 +52,7 @@ async def test_open_see_why_not_search_and_talk_are_three_keys(tmp_path: Path, m
             began = session.now()
             await pilot.press("enter")
             await until(pilot, lambda: isinstance(app.screen, GoOn))
+            readable(pilot)
             await pilot.press("y")
             await until(pilot, lambda: session.selected is not None)
             assert session.now() - began < 30
