@@ -176,7 +176,7 @@ class Openings:
             if bus.name in workspace.buses:
                 if found := alike(searching.found):
                     url, before = url_of(found), connection
-                    connection = replace(parse(url), name=before.name, labels=before.labels)
+                    connection = replace(parse(url), name=before.name, labels=before.labels, timeout=before.timeout)
                     bus.set_baud(connection.baud or 0)
                     bus.line.inbox.echo = LocalEcho() if connection.local_echo else None
                     record.connection = connection

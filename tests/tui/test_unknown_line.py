@@ -9,6 +9,7 @@ import pytest
 from multidrop.dialects import Diagnostic
 from multidrop.shell.configuration import Settings
 from multidrop.shell.connect import opening
+from multidrop.shell.finding import scanning
 from multidrop.shell.session import Session
 from multidrop.simulator.cells import read
 from multidrop.simulator.floor import Floor
@@ -18,8 +19,8 @@ from multidrop.tui.assist import Assist
 from multidrop.tui.screens.dialogs import GoOn
 from multidrop.tui.screens.program import ProgramPage
 from multidrop.tui.screens.start import Start
-from tests.support.cell_session import bus, party
-from tests.support.fake_session import readable
+from tests.support.cell_session import bus, drive
+from tests.support.fake_session import readable, settle
 from tests.support.posix import pty, tty
 from tests.support.real_screen import real_screen, until
 from tests.support.tuned_ports import TunedPipe
@@ -31,33 +32,34 @@ def told(app: Any) -> str:
     return "\n".join(record.text for page in app.main.pages.values() for record in page.records)
 
 
-@pytest.mark.virtual
 async def test_open_see_why_not_search_and_talk_are_three_keys(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    floor = RunningFloor(Floor(read(bus("b", party("a"), baud=4800), "cell.toml")))
+    floor = RunningFloor(Floor(read(bus("b", drive("LMDCM"), baud=4800), "cell.toml")))
 
     async def transport(connection: Any, *_: Any, **given: Any) -> Any:
         return TunedPipe(floor, "b", connection.baud or given.get("baud") or 9600, False)
 
     monkeypatch.setattr(opening, "_transport", transport)
+    monkeypatch.setattr(scanning, "WINDOW", 0.002)
     settings = Settings(folder=tmp_path / "config", state=tmp_path / "state")
     session = Session(settings, reconnect=True)
     app: Any = MultidropApp(session, [], Assist(session, settings))
     try:
         async with app.run_test(size=(80, 24)) as pilot:
             await until(pilot, lambda: isinstance(app.screen, Start))
-            await pilot.press(*"/dev/ttyUSB9", "enter")
+            await pilot.press(*"/dev/ttyUSB9?baud=115200", "enter")
             await until(pilot, lambda: "Enter alone begins it" in told(app))
-            assert app.screen is app.main and "? silent" in app.main.lines("top").plain
-            assert "search (about 49 s)?" in told(app) and "no drive replies" in told(app)
+            await until(pilot, lambda: app.screen is app.main and "? silent" in app.main.lines("top").plain)
+            assert "search (about " in told(app) and "no drive replies" in told(app)
             began = session.now()
             await pilot.press("enter")
-            await until(pilot, lambda: isinstance(app.screen, GoOn))
+            await until(pilot, lambda: isinstance(app.screen, GoOn) and app.screen.focused is not None)
+            await settle(pilot)
             readable(pilot)
             await pilot.press("y")
             await until(pilot, lambda: session.selected is not None)
             assert session.now() - began < 30
-            await pilot.press(*"PR VM", "enter")
-            await until(pilot, lambda: "\n512000" in told(app))
+            await pilot.press(*'PR "talks"', "enter")
+            await until(pilot, lambda: "\ntalks" in told(app))
             assert [*session.buses] == ["ttyUSB9"]
     finally:
         await session.close()
