@@ -77,7 +77,8 @@ async def test_a_line_of_garbage_on_a_terminal_says_so_in_its_tab_and_the_stop_g
             os.write(master, b"\xff\xfe\x80" * 100)
             await until(pilot, lambda: "Enter alone begins it" in told(app))
             assert "300 bytes came, none of them readable: another baud rate?" in told(app)
-            assert app.session.enter_alone() == "/scan" and "? silent" in app.main.lines("top").plain
+            assert app.session.enter_alone() == "/scan"
+            await until(pilot, lambda: "? silent" in app.main.lines("top").plain)
             os.read(master, 65536)
             await pilot.press("ctrl+x")
             assert b"\x1b" in os.read(master, 65536)
@@ -118,7 +119,7 @@ async def test_a_wrong_configuration_is_edited_at_its_line_with_one_key(
             await until(pilot, lambda: isinstance(app.screen, ProgramPage))
             assert app.screen.editor.cursor_location == (4, 0)
             await until(pilot, lambda: len(app.screen.findings.problems) == 2)
-            await pilot.press("ctrl+l")
+            await pilot.press("ctrl+f")
             assert app.screen.editor.cursor_location == (5, 0)
     finally:
         await session.close()

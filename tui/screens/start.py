@@ -141,7 +141,7 @@ class Start(Over[None]):
 
     def action_edit(self) -> None:
         """Put the URL of what is highlighted into the line; of a port with its baud rate."""
-        if (place := self._highlighted) is not None and place is not TOUR:
+        if (place := self._highlighted) is not None and place.url not in (TOUR.url, EDIT):
             field = self.query_one(Field)
             field.value = f"{place.url}?baud=9600" if place.kind == "port" else place.url
             field.cursor_position = len(field.value)
@@ -159,7 +159,7 @@ class Start(Over[None]):
 
     def action_raw(self) -> None:
         """Open what is highlighted in raw mode: nothing is sent before a person does."""
-        if (place := self._highlighted) is not None and place is not TOUR:
+        if (place := self._highlighted) is not None and place.url not in (TOUR.url, EDIT):
             self._open(place.url, raw=True)
 
     def _open(self, url: str, raw: bool = False) -> None:
@@ -184,7 +184,11 @@ class Start(Over[None]):
     def action_scan(self) -> None:
         """Search the highlighted port for drives, whatever their baud rate and language."""
         place = self._highlighted
-        if place is not None and place is not TOUR and self._begin(f"searching {place.url} …", keys=False):
+        if (
+            place is not None
+            and place.url not in (TOUR.url, EDIT)
+            and self._begin(f"searching {place.url} …", keys=False)
+        ):
             self.run_worker(self._scan(place.url), group="scan")
 
     async def _scan(self, url: str) -> None:
