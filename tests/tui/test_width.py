@@ -185,3 +185,12 @@ def test_a_program_that_is_not_known_gives_its_room_away() -> None:
     session = demo_session()
     assert not panel("program").shows(view(session))
     assert panel("program").shows(view(session, ProgramRead(session.time, "press", "a", ((1, "H"),))))
+
+
+async def test_the_page_of_all_drives_shows_the_chosen_one_in_the_room_that_the_list_leaves() -> None:
+    async with on_screen(width=120, height=40) as (pilot, app, session):
+        samples = [Sample(session.time - 2 + n / 10, "", n * 1000, 1000 + n) for n in range(20)]
+        await emit(pilot, *(OnBus("eth", each) for each in samples))
+        await press(pilot, "ctrl+a", *"eth")
+        below = app.screen.lines("chosen").plain  # type: ignore[attr-defined]
+        assert "LMDCE" in below and "velocity eth steps/s" in below and "not read: /list" in below

@@ -75,7 +75,7 @@ def selected_rows(view: View, width: int, height: int) -> list[Row]:
     """The panel of the selected drive, and below it what the drive is."""
     rows, chosen = drive_rows(view, width, height), view.chosen
     if chosen is not None and len(rows) < height:
-        bus = view.session.buses[view.session.selected_bus]
+        bus = view.session.buses[view.only[0].bus if view.only else view.session.selected_bus]
         facts = (*facts_of(view, bus, chosen), ("version", chosen.version))
         rows += [_fact(fact, width) for fact in facts if fact[1]]
     return rows[:height]
@@ -104,7 +104,7 @@ def card_rows(view: View, bus: Bus, glance: Glance, width: int) -> list[Row]:
     """Name, product and firmware of a drive, then its facts in as many columns as there is room for."""
     about = " ".join(filter(None, (glance.product, firmware_of(glance))))
     *facts, (_, has) = facts_of(view, bus, glance)
-    columns = max(1, width // COLUMN)
+    columns = max(n for n in (1, 2, 4) if n == 1 or width >= n * COLUMN)
     each = width // columns
     head: Row = ((fit(f"   {name_of(glance)}", 3 + WORD), "strong"), (f" {about} ", "text"))
     rows: list[Row] = [spread(head, [(f"{has} ", "dim")], width)]

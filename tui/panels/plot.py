@@ -7,7 +7,7 @@ the same columns, so what happens at one time is in one column.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from itertools import count, zip_longest
+from itertools import count
 from typing import NamedTuple
 
 from multidrop.dialects.values import Conditions
@@ -20,7 +20,7 @@ from multidrop.tui.panels.view import View
 from multidrop.tui.polling import moved_lately, plotted
 from multidrop.tui.readout import Readout
 from multidrop.tui.text import age, digits, fit, short
-from multidrop.tui.widgets.lines import SERIES, Row, Span, width_of
+from multidrop.tui.widgets.lines import SERIES, Row, Span, beside, width_of
 
 PLOTTED = ("velocity", "position")
 """The quantities of every drive."""
@@ -385,8 +385,7 @@ def panel_rows(view: View, width: int, height: int) -> list[Row]:
         speeds = [each for each in found if each.word == PLOTTED[0]]
         left = _charts(view, speeds, half - 1, height)
         right = _charts(view, [each for each in found if each not in speeds], width - half, height)
-        both = zip_longest(left, right, fillvalue=())
-        return [(*one, (" " * (half - width_of(one)), "text"), *other) for one, other in both]
+        return beside(left, right, half)
     return plot_rows(view, width, height)
 
 

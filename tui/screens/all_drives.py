@@ -4,20 +4,25 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Awaitable, Sequence
+from dataclasses import replace
 from string import ascii_letters, digits
 from typing import ClassVar, NamedTuple
 
 from textual.binding import Binding, BindingType
 
 from multidrop.dialects.text import visible
+from multidrop.shell.roles import Series
 from multidrop.tui.key_table import bound
 from multidrop.tui.panels.drive import SIGN, alarm_words, program_words, trouble_of
 from multidrop.tui.panels.drives import STATE, short_words, spark
+from multidrop.tui.panels.facts import selected_rows
+from multidrop.tui.panels.plot import plot_rows
+from multidrop.tui.panels.table import panel, title_row
 from multidrop.tui.panels.view import NOT_REFERENCED, Glance, View, glances_of
 from multidrop.tui.readout import State
 from multidrop.tui.screens.page import AskingPage, Host
 from multidrop.tui.text import fit
-from multidrop.tui.widgets.lines import Row, Span, in_view, spread, width_of
+from multidrop.tui.widgets.lines import Row, Span, beside, in_view, spread, width_of
 
 URGENCY = (
     *(State.LOST, State.SILENT, State.MOVING, State.DWELL, State.STORING, State.UNKNOWN),
@@ -31,6 +36,10 @@ SPARK, FEW = 16, 5
 """Cells of the positions of the last seconds; the few on a screen that is not roomy."""
 ROOMY, NARROW = 100, 80
 """Widths from which the last seconds are wide, and below which trouble has their place and that of the velocity."""
+WIDE, LEAST = 110, 16
+"""Least width of the page, and least rows below the list, with the chosen drive there."""
+HEAD, FEWEST = 6, 8
+"""The rows of the page that are neither, and the least rows of the list."""
 
 
 class Place(NamedTuple):
@@ -144,7 +153,7 @@ class AllDrives(AskingPage):
         *(Binding(each, f"filter('{each}')", show=False) for each in ascii_letters + digits),
     ]
     WANTS = frozenset({"motion", "conditions"})
-    PARTS = {"heading": None, "filter": None, "columns": None, "drives": "1fr"}
+    PARTS = {"heading": None, "filter": None, "columns": None, "drives": "1fr", "chosen": 0}
     FIELD = "filter"
 
     def __init__(self, host: Host) -> None:
@@ -160,11 +169,27 @@ class AllDrives(AskingPage):
         if self._chosen is None:
             self.action_step(0)  # it stays the chosen one when another gets worse
         rows, width = self.lines("drives"), self.size.width
+        below = self.lines("chosen")
+        drives = sum(len(bus.drives) for bus in view.session.buses.values())
+        room = self.size.height - HEAD - max(FEWEST, drives)
+        room = room if width >= WIDE and room >= LEAST else 0
+        if below.styles.height is None or below.styles.height.value != room:
+            below.styles.height = room
+        below.put(self._chosen_rows(view, at, width, room) if room and self._places else [])
         shown = in_view(self._places, at, rows.size.height)
         rows.put([drive_row(place, view.now, width, n == at) for n, place in shown] or [_NOTHING])
         heading: Row = ((" ALL DRIVES   ", "strong"), (summary(self._places), "text"))
         self.lines("heading").put([spread(heading, [("worst first ", "dim")], width)])
         self.lines("columns").put([columns_row(width)])
+
+    def _chosen_rows(self, view: View, at: int, width: int, height: int) -> list[Row]:
+        """The panel of the chosen drive beside its curves."""
+        place, half = self._places[at], width // 2
+        glance = replace(place.glance, selected=True)
+        one = replace(view, glances=(glance,), only=(Series(place.bus, glance.address),))
+        titles = [title_row(panel(name), one, wide, "─") for name, wide in (("drive", half), ("plot", width - half))]
+        curves = plot_rows(one, width - half, height - 1)
+        return [(*titles[0], *titles[1]), *beside(selected_rows(one, half - 1, height - 1), curves, half)]
 
     def _at(self) -> int:
         """The place of the chosen drive in the list; the first one if it is not there."""

@@ -20,6 +20,7 @@ from multidrop.shell.params import file as files
 from multidrop.shell.params.page import Edit, edit, found_in, meanings_of, parsed, rows
 from multidrop.shell.params.page import Row as Setting
 from multidrop.tui.key_table import bound
+from multidrop.tui.panels.table import column_rows, panel
 from multidrop.tui.panels.view import Glance, View, name_of
 from multidrop.tui.screens.page import AskingPage, Begun, Host
 from multidrop.tui.text import age, fit
@@ -189,7 +190,7 @@ class ParametersPage(AskingPage):
         if self.said[0] == READING and self._table.found is not self._settings():
             self.say("", "dim")
         self._table.make(self._settings(), drive)
-        lines.put(self._table.rows(width, max(0, lines.size.height), self._in_units) or self._nothing())
+        lines.put(self._table.rows(width, max(0, lines.size.height), self._in_units) or self._nothing(view))
         self.lines("heading").put([self._table.heading(view, self._glance, width)])
         self.lines("columns").put([self._table.columns(width)])
         self.lines("meaning").put([((f" {fit(self._table.about(drive), width - 2)}", "dim"),)])
@@ -199,11 +200,13 @@ class ParametersPage(AskingPage):
     def _settings(self) -> Readings | None:
         return self._glance.readout.settings if self._glance is not None else None
 
-    def _nothing(self) -> list[Row]:
+    def _nothing(self, view: View) -> list[Row]:
         if self._glance is None:
             return [((" ^O chooses a drive", "dim"),)]
         if self._settings() is None:
-            return [((" not read yet: r reads every setting; nothing is changed by it", "strong"),)]
+            room = self.lines("table").size
+            known = column_rows([[panel("drive")], [panel("cards")]], view, room.width, max(0, room.height - 2), False)
+            return [((" not read yet: r reads every setting; nothing is changed by it", "strong"),), (), *known]
         return [((" nothing differs" if self._table.only_differing else " no setting has that", "dim"),)]
 
     # Keys

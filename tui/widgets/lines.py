@@ -7,6 +7,7 @@ defined in the style sheet. An unchanged row costs nothing on the wire.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import zip_longest
 from typing import TypeVar
 
 from rich.cells import cell_len
@@ -40,6 +41,12 @@ def spread(left: Sequence[Span], right: Sequence[Span], width: int) -> Row:
     if gap < 1:
         return tuple(left)
     return (*left, (" " * gap, "text"), *right)
+
+
+def beside(left: Sequence[Row], right: Sequence[Row], width: int) -> list[Row]:
+    """Rows beside others; `width`: that of the left ones."""
+    pairs = zip_longest(left, right, fillvalue=())
+    return [(*one, (" " * (width - width_of(one)), "text"), *other) for one, other in pairs]
 
 
 def in_view(items: Sequence[T], at: int, height: int) -> list[tuple[int, T]]:
