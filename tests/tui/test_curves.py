@@ -1,6 +1,7 @@
 """Curves as text: what is kept of samples, what is drawn of them, and how little is drawn again."""
 
 import math
+from itertools import pairwise
 
 import pytest
 from hypothesis import given
@@ -73,7 +74,7 @@ def test_a_value_beyond_the_scale_is_not_drawn_at_its_edge() -> None:
 
 @given(st.lists(st.tuples(times, values), max_size=60).map(sorted), st.integers(1, 80), st.integers(1, 20))
 def test_a_drawing_has_its_size_whatever_is_drawn(points: list[tuple[float, float]], columns: int, rows: int) -> None:
-    scale = nice_scale(min((v for _, v in points), default=0), max((v for _, v in points), default=0))
+    scale = nice_scale(min((v for _, v in points), default=0), max((v for _, v in points), default=0), rows)
     for ink in INKS.values():
         found = drawn(trace(*points), 20, columns, rows, scale, ink)
         assert [len(row) for row in found] == [columns] * rows
@@ -84,7 +85,7 @@ def test_what_is_drawn_bit_by_bit_is_what_is_drawn_at_once(
     points: list[tuple[float, float]], columns: int, data: st.DataObject
 ) -> None:
     """The kept picture is true, however samples and frames fall."""
-    scale = nice_scale(min(v for _, v in points), max(v for _, v in points))
+    scale = nice_scale(min(v for _, v in points), max(v for _, v in points), 4)
     found, raster, dot = Trace(), Raster(), 20 / columns / 2
     kept = Columns(found, dot, 0)
     for at, value in points:
@@ -132,36 +133,52 @@ def test_the_cursor_hides_no_curve() -> None:
 # Scales
 
 
-@given(values, values)
-def test_a_scale_holds_its_values_and_is_not_much_wider(one: float, other: float) -> None:
+@given(values, values, st.integers(1, 60))
+def test_a_scale_holds_its_values_and_is_not_much_wider(one: float, other: float, rows: int) -> None:
     low, high = sorted((one, other))
-    scale = nice_scale(low, high, least=10)
+    scale = nice_scale(low, high, rows, least=10)
     slack = 1e-6 * max(1.0, abs(low), abs(high))
     assert scale.low <= low + slack and scale.high >= high - slack
-    assert scale.high - scale.low <= 2.5 * max(high - low, 10) + slack
+    assert scale.high - scale.low <= (2.0 if rows > 7 else 10) * max(high - low, 10) + slack
 
 
-@given(values, st.floats(1, 1e9), st.integers(2, 30))
-def test_both_ends_have_a_tick_and_no_two_crowd_a_row(low: float, span: float, rows: int) -> None:
-    marks = ticks(nice_scale(low, low + span), rows)
-    assert {0, rows - 1} <= set(marks) <= set(range(rows))
-    assert len(marks) <= max(2, (rows + 1) // 2)
+@given(values, st.floats(1, 1e9), st.integers(4, 60))
+def test_ticks_are_round_the_same_rows_apart_and_not_many(low: float, span: float, rows: int) -> None:
+    scale = nice_scale(low, low + span, rows)
+    marks = ticks(scale, rows)
+    places = sorted(marks)
+    assert 2 <= len(marks) <= 11 and len({later - row for row, later in pairwise(places)}) == 1
+    assert set(marks) <= set(range(rows))
+    mantissa = float(f"{scale.step:.9e}".partition("e")[0])
+    assert mantissa in (1, 2, 5) and all(
+        value / scale.step == pytest.approx(round(value / scale.step)) for value in marks.values()
+    )
+
+
+@given(st.sampled_from(SPANS), st.integers(18, 240))
+def test_ticks_of_time_are_the_same_cells_apart(span: float, columns: int) -> None:
+    look = Look()
+    look.shorter(SPANS.index(look.span) - SPANS.index(span))
+    window = look.window(1000.0, columns, 2)
+    cells = window.step / window.cell
+    assert cells == pytest.approx(round(cells)) and span <= window.span * (1 + 1e-9) and window.span <= span * 1.1
+    assert window.step == span or float(f"{window.step / (60 if window.step >= 60 else 1):e}"[0]) in (1, 2, 5)
 
 
 def test_the_ends_of_a_scale_are_the_first_and_the_last_row() -> None:
-    scale = nice_scale(0, 600)
-    assert (row_of(600, scale, 9), row_of(0, scale, 9)) == (0, 8)
+    scale = nice_scale(0, 600, 9)
+    assert (row_of(scale.high, scale, 9), row_of(0, scale, 9)) == (0, 8)
 
 
 def test_a_scale_grows_at_once_and_shrinks_only_when_much_too_wide() -> None:
-    scale = steady(None, 0, 900, 1)
-    assert steady(scale, 0, 600, 1) == scale
-    assert steady(scale, 0, 2000, 1).high >= 2000
-    assert steady(scale, 0, 100, 1).high <= 200
+    scale = steady(None, 0, 900, 9, 1)
+    assert steady(scale, 0, 600, 9, 1) == scale
+    assert steady(scale, 0, 2000, 9, 1).high >= 2000
+    assert steady(scale, 0, 100, 9, 1).high <= 200
 
 
 def test_a_magnified_scale_is_a_round_part_around_a_value() -> None:
-    found = magnified(Scale(0, 1000, 200), 4, 500)
+    found = magnified(Scale(0, 1000, 200), 11, 4, 500)
     assert found.low <= 400 and found.high >= 600 and found.high - found.low <= 500
 
 

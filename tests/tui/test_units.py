@@ -142,7 +142,7 @@ def test_a_plot_has_axes_and_values_in_units_and_the_travel_as_its_range() -> No
     rows = plain(*plot_rows(view(session, *a_move(session)), 100, 30))
     assert "velocity a gantry mm/s" in rows and "position a gantry mm" in rows
     labels = [row.split("┤")[0].strip() for row in rows.split("position a gantry mm")[1].splitlines() if "┤" in row]
-    assert labels[0] in ("900", "1000") and labels[-1] in ("-100", "-200")
+    assert float(labels[0]) + float(labels[0]) - float(labels[1]) > 900 and float(labels[-1]) < 0
     assert "468.01758 mm" in rows and "58.59375 mm/s" in rows and "k ┤" not in rows
 
 

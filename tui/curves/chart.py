@@ -18,6 +18,8 @@ class Window(NamedTuple):
     columns: int
     wide: int
     """Dots in a cell."""
+    step: float = 1.0
+    """Seconds between two ticks, a whole number of cells."""
 
     @property
     def last(self) -> int:
@@ -55,7 +57,7 @@ class Chart:
     def __init__(self) -> None:
         self._columns: dict[Quantity, Columns] = {}
         self._scale: Scale | None = None
-        self._wide = 1
+        self._wide, self._rows = 1, 0
         self._rasters: dict[tuple[int, ...], Raster] = {}
 
     def take(self, traces: Traces, quantities: Sequence[Quantity], window: Window) -> dict[Quantity, Extent]:
@@ -75,14 +77,15 @@ class Chart:
                 found[quantity] = Extent(*extent)
         return found
 
-    def scale(self, extents: Sequence[Extent], least: float, zero: bool, zoom: int, centre: float) -> Scale:
-        """The scale of these extents, at least `least` wide; `zero`: with 0 in it."""
+    def scale(self, extents: Sequence[Extent], least: float, zero: bool, zoom: int, centre: float, rows: int) -> Scale:
+        """The scale of these extents in this number of rows, at least `least` wide; `zero`: with 0 in it."""
         low = min([each.low for each in extents] + [0.0] * zero)
         high = max([each.high for each in extents] + [0.0] * zero)
         if zero and low == 0:
             high = max(high, least)
-        self._scale = steady(self._scale, low, high, least)
-        return magnified(self._scale, zoom, min(max(centre, low), high))
+        self._scale = steady(self._scale if rows == self._rows else None, low, high, rows, least)
+        self._rows = rows
+        return magnified(self._scale, rows, zoom, min(max(centre, low), high))
 
     def draw(
         self, shown: Sequence[tuple[Quantity, int, Scale]], window: Window, rows: int, scale: Scale, ink: Ink
@@ -106,8 +109,12 @@ class Chart:
         return cell[-1].last if cell else None
 
 
+STEPS = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 60.0, 120.0, 300.0)
+"""Seconds between two ticks of time."""
+APART = 11
+"""Least cells between two ticks of time."""
 SPANS = (2.0, 5.0, 10.0, 20.0, 60.0, 120.0, 300.0, 600.0)
-"""Seconds that a plot shows."""
+"""Seconds that a plot shows, or up to a tenth more, so that a tick falls on a cell."""
 USUAL = SPANS.index(20.0)
 LARGEST = 64
 """The greatest zoom of values."""
@@ -140,8 +147,13 @@ class Look:
 
     def window(self, now: float, columns: int, wide: int) -> Window:
         end = now if self.paused_at is None else self.paused_at
-        last = floor(end / (self.span / columns))
-        return Window(self.span, last - columns + 1, columns, wide)
+        step, cell = self.cells(columns)
+        return Window(cell * columns, floor(end / cell) - columns + 1, columns, wide, step)
+
+    def cells(self, columns: int) -> tuple[float, float]:
+        """The seconds between two ticks of time, and those of a cell."""
+        step = next((each for each in STEPS if each * columns >= self.span * APART), self.span)
+        return step, step / floor(columns * step / self.span + 1e-9)
 
     def pause(self, now: float) -> None:
         """Stop the picture, or let it go on."""
@@ -168,7 +180,7 @@ class Look:
 
     def move_cursor(self, columns: int, now: float, width: int) -> None:
         """Move the cursor by columns of a picture of this width; that pauses, and shifts the picture at its edge."""
-        cell = self.span / width
+        cell = self.cells(width)[1]
         if self.paused_at is None:
             self.paused_at = now
         before = self.paused_at if self.cursor is None else self.cursor

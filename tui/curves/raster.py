@@ -88,18 +88,13 @@ INKS = {ink.name: ink for ink in (BRAILLE, BLOCK, ASCII)}
 """By the value of `tui.widgets.theme.Signs`."""
 
 
-def nice_step(span: float, ticks: int) -> float:
-    """The step (1, 2 or 5 times a power of ten) that gives at most `ticks` steps over a span."""
-    raw = span / max(ticks, 1)
-    power = 10.0 ** math.floor(math.log10(raw))
-    for factor in (1.0, 2.0, 5.0, 10.0):
-        if factor * power >= raw * (1 - 1e-9):
-            return factor * power
-    raise AssertionError
+MOST_TICKS = 8
+"""Ticks that an axis has at most, about."""
+TENS = (1.0, 10.0, 100.0, 1000.0)
 
 
 class Scale(NamedTuple):
-    """The span of an axis; both ends are multiples of `step`."""
+    """The span of an axis. `step` is that of its ticks, 1, 2 or 5 times a power of ten; 0 is one of them."""
 
     low: float
     high: float
@@ -110,38 +105,45 @@ class Scale(NamedTuple):
         return round((self.high - value) / (self.high - self.low) * (dots - 1))
 
 
-def nice_scale(low: float, high: float, least: float = 1.0) -> Scale:
-    """A scale around the values that ends on round numbers, so that it seldom changes; at least `least` wide."""
+def nice_scale(low: float, high: float, rows: int, least: float = 1.0) -> Scale:
+    """The narrowest scale around the values, at least `least` wide, whose ticks are the same whole rows apart."""
     if high - low < least:
         middle = (low + high) / 2
         low, high = min(low, middle - least / 2), max(high, middle + least / 2)
-    step = nice_step(high - low, 6)
-    return Scale(math.floor(low / step + 1e-9) * step, math.ceil(high / step - 1e-9) * step, step)
+    rows = max(rows, 3)
+    apart = range(max(1 + (rows > 6), -(-rows // MOST_TICKS)), max(1, (rows + 1) // 3) + 1)
+    power = 10.0 ** math.floor(math.log10((high - low) / rows))
+    units = sorted(
+        (step * ten * power / each, step * ten * power) for step in (1, 2, 5) for ten in TENS for each in apart
+    )
+    for unit, step in units:
+        bottom, top = math.floor(low / unit + 1e-9), math.ceil(high / unit - 1e-9)
+        if (spare := rows - 1 - (top - bottom)) >= 0:
+            bottom -= min(spare // 2, bottom) if bottom >= 0 else spare // 2 if top > 0 else spare
+            return Scale(bottom * unit, (bottom + rows - 1) * unit, step)
+    raise AssertionError
 
 
-def steady(before: Scale | None, low: float, high: float, least: float) -> Scale:
+def steady(before: Scale | None, low: float, high: float, rows: int, least: float) -> Scale:
     """The scale before while it fits: it grows at once, and shrinks when the values fill less than a third of it."""
-    fitting = nice_scale(low, high, least)
+    fitting = nice_scale(low, high, rows, least)
     if before is None or low < before.low or high > before.high:
         return fitting
     return fitting if fitting.high - fitting.low < (before.high - before.low) / 2.5 else before
 
 
-def magnified(scale: Scale, factor: int, centre: float) -> Scale:
-    """A part of a scale around a value, `factor` times as large; its ends are round."""
+def magnified(scale: Scale, rows: int, factor: int, centre: float) -> Scale:
+    """A part of a scale around a value, `factor` times as large; its ticks are round."""
     if factor <= 1:
         return scale
     half = (scale.high - scale.low) / factor / 2
-    return nice_scale(centre - half, centre + half, 2 * half)
+    return nice_scale(centre - half, centre + half, rows, 2 * half)
 
 
 def ticks(scale: Scale, rows: int) -> dict[int, float]:
-    """Row (0 is the top) and value of each tick: both ends, and as many even steps between as fit."""
-    steps = max(1, round((scale.high - scale.low) / scale.step))
-    room = max(1, min(4, (rows - 1) // 2))
-    stride = next(each for each in range(1, steps + 1) if steps % each == 0 and steps // each <= room)
-    found = [scale.low + scale.step * n for n in range(0, steps + 1, stride)]
-    return {row_of(value, scale, rows): value for value in found}
+    """Row (0 is the top) and value of each tick."""
+    first, last = math.ceil(scale.low / scale.step - 1e-6), math.floor(scale.high / scale.step + 1e-6)
+    return {row_of(n * scale.step, scale, rows): n * scale.step for n in range(first, last + 1)}
 
 
 def row_of(value: float, scale: Scale, rows: int) -> int:

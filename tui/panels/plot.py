@@ -7,182 +7,24 @@ the same columns, so what happens at one time is in one column.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from itertools import count
+from math import floor
 from typing import NamedTuple
 
-from multidrop.dialects.values import Conditions
-from multidrop.shell.roles import DIFFERENCE, Series
 from multidrop.tui.curves.chart import Chart, Extent, Look, Window
-from multidrop.tui.curves.raster import CURSOR, EMPTY, TWINS, Ink, Scale, row_of, ticks, with_cursor
-from multidrop.tui.curves.samples import PREDICTED, Quantity
-from multidrop.tui.figures import NATIVE, Conversion, Figures
+from multidrop.tui.curves.raster import CURSOR, EMPTY, TWINS, Scale, ticks, with_cursor
+from multidrop.tui.panels.plotted import PLOTTED, Group, Line, groups, role_of
 from multidrop.tui.panels.view import View
-from multidrop.tui.polling import moved_lately, plotted
-from multidrop.tui.readout import Readout
-from multidrop.tui.text import age, digits, fit, short
+from multidrop.tui.text import age, fit, short
 from multidrop.tui.widgets.lines import SERIES, Row, Span, beside, width_of
-
-PLOTTED = ("velocity", "position")
-"""The quantities of every drive."""
-_MEASURED = {predicted: measured for measured, predicted in PREDICTED.items()}
-
-
-class Line(NamedTuple):
-    """A quantity that is plotted: its drive's name, its unit, and the number of its colour and dashes."""
-
-    name: str
-    quantity: Quantity
-    unit: str
-    number: int
-    twin: bool = False
-    """A prediction of the drive's twin."""
-    figures: Figures = NATIVE
-    """The form in which its values are shown."""
-
-    @property
-    def stroke(self) -> int:
-        return self.number + TWINS * self.twin
-
-    @property
-    def of_drive(self) -> Line:
-        if not self.twin:
-            return self
-        return self._replace(twin=False, quantity=self.quantity._replace(word=_MEASURED[self.quantity.word]))
-
-    @property
-    def conversion(self) -> Conversion:
-        """What is plotted in the unit that is shown."""
-        word, figures = self.of_drive.quantity.word, self.figures
-        if word == DIFFERENCE:
-            return Conversion(figures.places.gain)
-        return {"velocity": figures.speeds, "position": figures.places}.get(word, Conversion())
-
-    def text(self, plotted: float) -> str:
-        """A plotted value; in units with its unit, else a whole number has no decimals."""
-        figures, value = self.figures, self.conversion.value(plotted)
-        if figures.unit and self.unit:
-            return f"{round(value, figures.decimals) + 0.0:.{figures.decimals}f} {self.unit}"
-        return digits(int(value)) if value == int(value) else f"{value:.3f}"
-
-    def extent(self, plotted: Extent) -> Extent:
-        """A plotted extent in the unit that is shown."""
-        return Extent(*sorted(map(self.conversion.value, plotted)))
-
-    @property
-    def shown(self) -> str:
-        """`a gantry`, or `a gantry twin`."""
-        return f"{self.name} twin" if self.twin else self.name
-
-    @property
-    def short(self) -> str:
-        """The same without the name that a person gave."""
-        where, axis = self.name.partition(" ")[0], self.quantity.axis
-        return " ".join(filter(None, (where, axis if axis != where else "", "twin" if self.twin else "")))
-
-
-class Group(NamedTuple):
-    """The lines that share a chart."""
-
-    word: str
-    key: str
-    """The drive, where each has charts of its own."""
-    lines: tuple[Line, ...]
-
-    @property
-    def title(self) -> str:
-        """Its quantity, and the drive if there is only one."""
-        names = {line.name for line in self.lines}
-        return f"{self.word} {names.pop()}" if len(names) == 1 else self.word
-
-
-def shown_series(view: View) -> Sequence[Series]:
-    """What is plotted: what was named; else the selected drive, and each one that moved in the time that is shown."""
-    named = view.only or plotted(view.session)
-    if view.only or view.session.plotted:
-        return named
-    look = view.model.look
-    since = (view.now if look.paused_at is None else look.paused_at) - look.span
-    return list(dict.fromkeys([*named, *moved_lately(view.session, view.model, since)]))
-
-
-def plot_shows(view: View) -> bool:
-    """True while there is a curve: something was named, or moved in the time that is shown, or the plot is paused."""
-    look = view.model.look
-    moved = moved_lately(view.session, view.model, view.now - look.span)
-    return bool(view.session.plotted or moved) or look.paused_at is not None
-
-
-def _numbers(view: View, drawn: Sequence[Series]) -> dict[tuple[str, str, str], int]:
-    """The number of the colour of each axis: it stays while the axis is plotted, whatever else moves."""
-    axes = [(*each[:2], axis) for each in drawn for axis in _axes(view, each)]
-    held = view.model.look.numbers
-    for gone in held.keys() - set(axes):
-        del held[gone]
-    for each in axes:
-        held.setdefault(each, next(number for number in count() if number not in held.values()))
-    return held
-
-
-def _axes(view: View, series: Series) -> list[str]:
-    return (view.model.traces.axes(*series[:2]) if series.of_motion else []) or [""]
-
-
-def groups(view: View) -> list[Group]:
-    """The plotted lines by chart: velocities, positions, then values by their words. A twin's follow their drive's."""
-    found: dict[tuple[str, str], list[Line]] = {}
-    drawn = shown_series(view)
-    numbers = _numbers(view, drawn)
-    several = len({each.bus for each in drawn}) > 1
-    for each_drawn in drawn:
-        bus, address, word = each_drawn
-        for axis in _axes(view, each_drawn):
-            number = numbers[bus, address, axis] % len(SERIES)
-            drive = view.session.buses[bus].drives[address]
-            where = ":".join(filter(None, (bus if several or not address else "", address)))
-            name = " ".join(filter(None, (where, drive.label, axis)))
-            for each in [word] if word else PLOTTED:
-                unit, figures = _unit(view, bus, address, axis, each) if word in ("", DIFFERENCE) else ("", NATIVE)
-                key = " ".join(filter(None, (name if view.model.look.apart else "", unit if figures.unit else "")))
-                lines = found.setdefault((each, key), [])
-                lines.append(Line(name, Quantity(bus, address, axis, each), unit, number, figures=figures))
-                if not word and _recent(view, predicted := Quantity(bus, address, axis, PREDICTED[each])):
-                    lines.append(Line(name, predicted, unit, number, twin=True, figures=figures))
-    order = sorted(found, key=lambda key: list(PLOTTED).index(key[0]) if key[0] in PLOTTED else 9)
-    if view.model.look.apart:
-        order = sorted(order, key=lambda key: min(line.number for line in found[key]))
-    return [Group(*key, tuple(found[key])) for key in order if key[0] not in view.model.look.hidden]
-
-
-def _recent(view: View, predicted: Quantity) -> bool:
-    """True if a twin has predicted in the time that is shown, also one that has ended since."""
-    look, trace = view.model.look, view.model.traces.get(predicted)
-    end = view.now if look.paused_at is None else look.paused_at
-    return trace is not None and trace.at[-1] >= end - look.span
-
-
-def _unit(view: View, bus: str, address: str, axis: str, quantity: str) -> tuple[str, Figures]:
-    """`mm`, `steps`, or what the drive counts; of a velocity, that a second or a unit of its own; with the figures."""
-    found = next((each for each in view.model.bus(bus).readout(address).axes if each.axis == axis), Readout())
-    figures, own = found.figures, found.conditions or Conditions()
-    if quantity == "velocity":
-        return (f"{figures.speed_unit}{figures.sign}" if figures.speed_unit else own.speed_unit), figures
-    return (f"{figures.unit}{figures.sign}" if figures.unit else own.unit), figures
-
-
-def role_of(number: int) -> str:
-    return SERIES[number]
-
 
 AXIS = 10
 """Width of the axis of values in cells: label, space, tick."""
 LEAST = {"velocity": 100.0, "position": 10.0}
 """The least width of a scale."""
-NAMES = 64
-"""Width of a plot from which the names of its lines stand at their ends."""
+WIDE, HEADS = 64, 3
+"""Width of a plot from which a legend may have several rows, and the most of them."""
 _ROLES = {EMPTY: "text", CURSOR: "strong", **{n: SERIES[n % TWINS] for n in range(2 * TWINS)}}
 """The role of a cell by its owner."""
-STEPS = (0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 30.0, 60.0, 120.0, 300.0)
-"""Seconds between two times below a chart."""
 
 
 class Shown(NamedTuple):
@@ -196,27 +38,18 @@ class Shown(NamedTuple):
 
 def columns_of(width: int) -> int:
     """The columns of cells of a chart in a plot of this width."""
-    return width - AXIS - gutter(width)
+    return max(1, width - AXIS)
 
 
-def gutter(width: int) -> int:
-    """Room right of the charts, for names and values at the ends of lines."""
-    return min(30, max(20, width // 4)) if width >= NAMES else 0
-
-
-def chart_rows(view: View, shown: Shown, window: Window, width: int, height: int) -> list[Row]:
+def chart_rows(view: View, shown: Shown, window: Window, height: int) -> list[Row]:
     """The rows of a chart, from top to bottom."""
     if height < 1:
         return []
     look = view.model.look
-    scale = _scale(view, shown)
+    scale = _scale(view, shown, height)
     lines = [(line.quantity, line.stroke, _own_scale(line, scale)) for line in shown.moving]
     drawn = shown.chart.draw(lines, window, height, scale, look.ink)
     marks = ticks(scale, height)
-    zero = row_of(0.0, scale, height) if scale.low <= 0 <= scale.high else -1
-    if zero >= 0:
-        marks.setdefault(zero, 0.0)
-    ends = _line_ends(view, shown, scale, height, gutter(width))
     cursor = None if look.cursor is None else int(look.cursor // window.dot) // window.wide - window.first
     in_units = any(line.figures.unit for line in shown.moving)
     rows: list[Row] = []
@@ -224,19 +57,18 @@ def chart_rows(view: View, shown: Shown, window: Window, width: int, height: int
         if cursor is not None:
             runs = with_cursor(runs, cursor, "│")
         label = short(marks[y], scale.step, prefixes=not in_units) if y in marks else ""
-        tick = "┼" if y == zero else "┤" if y in marks else "│"
+        tick = "│" if y not in marks else "┤" if marks[y] else "┼"
         rows.append(
             (
                 (f"{label:>{AXIS - 2}} ", "dim"),
                 (tick, "rule"),
                 *[(text, _ROLES[owner]) for text, owner in runs],
-                *ends.get(y, ()),
             )
         )
     return rows
 
 
-def _scale(view: View, shown: Shown) -> Scale:
+def _scale(view: View, shown: Shown, rows: int) -> Scale:
     """The scale of what moves; magnified around the cursor, or around the newest value."""
     look, word = view.model.look, shown.group.word
     first = next(iter(shown.moving))
@@ -248,7 +80,7 @@ def _scale(view: View, shown: Shown) -> Scale:
         extents += [line.extent(Extent(*line.figures.travel)) for line in shown.moving if line.figures.travel]
     middle, convert = newest if centre is None else centre, first.conversion
     least = LEAST.get(word, 1.0) * abs(convert.gain)
-    return shown.chart.scale(extents, least, word == "velocity", look.zoom, convert.value(middle))
+    return shown.chart.scale(extents, least, word == "velocity", look.zoom, convert.value(middle), rows)
 
 
 def _own_scale(line: Line, scale: Scale) -> Scale:
@@ -257,53 +89,34 @@ def _own_scale(line: Line, scale: Scale) -> Scale:
     return Scale((scale.low - zero) / gain, (scale.high - zero) / gain, scale.step)
 
 
-def _line_ends(view: View, shown: Shown, scale: Scale, rows: int, room: int) -> dict[int, tuple[Span, ...]]:
-    """The names of lines with their last values, or those at the cursor, beside the rows where the lines end."""
-    look = view.model.look
-    found: list[tuple[tuple[int, float], Line, Span]] = []
-    for line in shown.moving if room else ():
-        trace = view.model.traces.get(line.quantity)
-        at = look.cursor if look.cursor is not None else look.paused_at
-        last = trace.values[-1] if trace is not None and trace.values else None
-        value = last if at is None else shown.chart.value_at(line.quantity, at)
-        height = line.conversion.value(value or 0.0)
-        row = rows // 2 if value is None else row_of(min(max(height, scale.low), scale.high), scale, rows)
-        missed = trace.overdue(view.now) if trace is not None and at is None else 0.0
-        text = "–" if value is None else line.text(value)
-        shown_value = (f"{text} ({age(missed)})", "dim") if missed else (text, "strong")
-        found.append(((row, -height), line, shown_value))
-    found.sort(key=lambda each: each[0])
-    ends: dict[int, tuple[Span, ...]] = {}
-    for place, ((row, _), line, value_span) in enumerate(found[:rows]):
-        free = min(max(row, max(ends, default=-1) + 1), rows - len(found[:rows]) + place)
-        sample = look.ink.sample(line.stroke)
-        left = room - len(value_span[0]) - len(sample) - 3
-        name = line.shown if len(line.shown) <= left else fit(line.short, left).rstrip()
-        ends[free] = ((f" {sample} {name} ", role_of(line.number)), value_span)
-    return ends
-
-
 def time_row(view: View, window: Window) -> Row:
-    """The times below the charts: seconds before now, or the time of day while paused."""
+    """The times below the charts, in even steps: seconds before now; of a picture that stands, the time of day."""
     look = view.model.look
-    least = window.span / max(1, window.columns // 12)
-    step = next((each for each in STEPS if each >= least), window.span)
-    cells = [" "] * (AXIS + window.columns)
-    for n in range(round(window.span / step), -1, -1):
-        text = _time_words(view, look, n * step, minutes=window.span > 120)
-        end = AXIS + round(window.columns * (1 - n * step / window.span))
-        begin = min(max(AXIS, end - len(text) // 2), len(cells) - len(text))
-        if not "".join(cells[max(0, begin - 1) : begin + len(text) + 1]).strip():
-            cells[begin : begin + len(text)] = text
+    end = view.now if look.paused_at is None else look.paused_at
+    base = end
+    if look.paused_at is not None:
+        wall = view.session.wall(end)
+        base -= (wall.hour * 3600 + wall.minute * 60 + wall.second + wall.microsecond / 1e6) % window.step
+    cells, every = [" "] * (AXIS + window.columns), round(window.step / window.cell)
+    place = floor(base / window.cell + 1e-6) - window.first
+    for n in range(-(place // every), (window.columns - 1 - place) // every + 1):
+        text, begin = _time_words(view, base, n, window.step), AXIS + place + n * every
+        if begin + len(text) < len(cells):
+            cells[begin : begin + len(text) + 1] = f"╵{text}"
+        elif not "".join(cells[begin - len(text) - 1 : begin + 1]).strip():
+            cells[begin - len(text) : begin + 1] = f"{text}╵"
+        else:
+            cells[begin] = "╵"
     return (("".join(cells), "dim"),)
 
 
-def _time_words(view: View, look: Look, ago: float, *, minutes: bool) -> str:
-    if look.paused_at is not None:
-        return f"{view.session.wall(look.paused_at - ago):%H:%M:%S}"
-    if ago == 0:
+def _time_words(view: View, base: float, n: int, step: float) -> str:
+    if view.model.look.paused_at is not None:
+        text = f"{view.session.wall(base + n * step + 1e-6):%H:%M:%S.%f}"
+        return text[:-7] if step >= 1 else text[:-5]
+    if n == 0:
         return "now"
-    return f"-{ago / 60:.3g} min" if minutes else f"-{ago:.3g} s"
+    return f"{n * step / 60:.3g} min" if step >= 60 else f"{n * step:.3g} s"
 
 
 def cursor_row(view: View, width: int) -> Row:
@@ -345,19 +158,48 @@ def plot_title(view: View) -> Row:
     return ((" plot ", "strong"), (f"{_span_words(look)} {rate_words(view)} {hidden}{zoomed}", "dim"))
 
 
-def _legend(ink: Ink, lines: Sequence[Line], alone: bool, room: int) -> list[Span]:
-    """Pieces of the lines with their names, short ones where there is little room; `drive` and `twin` of one drive."""
-    own = [line for line in lines if not line.twin]
-    twins = [line for line in lines if line.twin]
-    names = ["drive"] if alone else [line.name for line in own]
-    if not alone and sum(map(len, names)) + 4 * len(names) > room:
-        names = [line.short for line in own]
-    row = [(f"{ink.sample(line.stroke)} {name} ", role_of(line.number)) for line, name in zip(own, names, strict=True)]
-    if twins:
-        samples = " ".join(dict.fromkeys(ink.sample(line.stroke) for line in twins))
-        role = role_of(twins[0].number) if len(own) == 1 else "dim"
-        row.append((f"{samples} {'twin' if len(twins) == 1 else 'twins'} ", role))
-    return row
+def _head(view: View, shown: Shown, width: int) -> list[Row]:
+    """The title of a chart, its unit, and its legend: each curve by name, with its last value or that at the cursor.
+
+    The names that people gave, then the values, are left out where there is no room for them.
+    """
+    group, look = shown.group, view.model.look
+    unit = group.lines[0].unit
+    title: list[Span] = [(f" {group.title} ", "strong"), (f"{unit} " if unit else "", "dim")]
+    alone = len({line.name for line in group.lines}) == 1
+    samples = [(look.ink.sample(line.stroke), line) for line in (group.lines if alone else shown.moving)]
+    for valued, names in ((True, "shown"), (True, "short"), (False, "shown"), (False, "short")):
+        rows, row = [], list(title)
+        for sample, line in samples:
+            name = ("twin" if line.twin else "drive" if len(samples) > 1 else "") if alone else getattr(line, names)
+            piece: list[Span] = [(f"{sample} {name} ", role_of(line.number))] if len(samples) > 1 or not alone else []
+            piece += [_value_span(view, shown, line)] if valued else []
+            if width_of(row) + width_of(piece) > width:
+                rows.append(tuple(row))
+                row = [("  ", "text")]
+            row += piece
+        rows.append(tuple(row))
+        if len(rows) <= (HEADS if width >= WIDE else 1) and width_of(rows[-1]) <= width:
+            return rows
+    left = list(rows[0])
+    while width_of(left) > width and len(left) > 1:
+        left.pop()
+    return [tuple(left), *rows[1:]][: HEADS if width >= WIDE else 1]
+
+
+def _value_span(view: View, shown: Shown, line: Line) -> Span:
+    """The last value of a line, or that at the cursor, as wide as any in its picture: so nothing jumps."""
+    look, trace = view.model.look, view.model.traces.get(line.quantity)
+    at = look.cursor if look.cursor is not None else look.paused_at
+    if at is not None:
+        value = shown.chart.value_at(line.quantity, at)
+    else:
+        value = trace.values[-1] if trace is not None and trace.values else None
+    extent = shown.moving.get(line, Extent(value or 0.0, value or 0.0))
+    text = "–" if value is None else line.text(value)
+    text = f"{text:>{max(len(line.text(each)) for each in extent)}} "
+    missed = trace.overdue(view.now) if trace is not None and at is None else 0.0
+    return (f"{text}({age(missed)}) ", "dim") if missed else (text, "strong")
 
 
 def _span_words(look: Look) -> str:
@@ -476,24 +318,19 @@ def _stacked(view: View, shown: Sequence[Shown], window: Window, width: int, hei
     left_out: list[str] = []
     while len(kept) > 1 and _least(kept) + bool(left_out) > height:
         left_out.append(kept.pop().group.title)
-    charts = sum(1 for each in kept if each.moving)
-    room = height - charts - sum(len(each.words) for each in kept) - bool(left_out)
+    heads = [_head(view, each, width) for each in kept if each.moving]
+    if sum(map(len, heads)) + (LOW + 1) * len(heads) > height:
+        heads = [head[:1] for head in heads]
+    charts = len(heads)
+    room = height - sum(map(len, heads)) - sum(len(each.words) for each in kept) - bool(left_out)
     timed = bool(charts) and room - 1 >= (LOW + 1) * charts
     rows: list[Row] = []
     shares = _shares([each for each in kept if each.moving], room - timed)
     for each in kept:
         rows += each.words
         if each.moving:
-            unit = each.group.lines[0].unit
-            title: list[Span] = [(f" {each.group.title} ", "strong"), (f"{unit} " if unit else "", "dim")]
-            if len(each.group.lines) > 1 and not gutter(width):  # else the names end the lines
-                alone = len({line.name for line in each.group.lines}) == 1
-                lines = each.group.lines if alone else tuple(each.moving)
-                title += _legend(view.model.look.ink, lines, alone, width - width_of(title))
-            while width_of(title) > width and len(title) > 1:
-                title.pop()
-            rows.append(tuple(title))
-            rows += chart_rows(view, each, window, width, shares.pop(0))
+            rows += heads.pop(0)
+            rows += chart_rows(view, each, window, shares.pop(0))
     if timed:
         rows.append(time_row(view, window))
     if left_out:

@@ -14,7 +14,8 @@ from typing import NamedTuple
 from multidrop.tui.panels.drive import drive_title
 from multidrop.tui.panels.drives import drives_rows
 from multidrop.tui.panels.facts import cards_rows, next_rows, selected_rows
-from multidrop.tui.panels.plot import panel_rows, plot_shows, plot_title
+from multidrop.tui.panels.plot import panel_rows, plot_title
+from multidrop.tui.panels.plotted import plot_shows
 from multidrop.tui.panels.program import program_rows, program_shows, program_title
 from multidrop.tui.panels.traffic import traffic_rows, traffic_title
 from multidrop.tui.panels.view import View

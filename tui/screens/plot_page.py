@@ -9,7 +9,8 @@ from textual.binding import BindingType
 from multidrop.shell.roles import DIFFERENCE
 from multidrop.tui.curves.chart import Look
 from multidrop.tui.key_table import bound
-from multidrop.tui.panels.plot import PLOTTED, columns_of, cursor_row, plot_rows, plot_title
+from multidrop.tui.panels.plot import columns_of, cursor_row, plot_rows, plot_title
+from multidrop.tui.panels.plotted import PLOTTED
 from multidrop.tui.panels.view import View
 from multidrop.tui.polling import plotted
 from multidrop.tui.screens.page import Host, Page
