@@ -27,6 +27,7 @@ from multidrop.drives.inbox import Debris, Leftovers
 from multidrop.drives.line import Finished, Line, Write
 from multidrop.drives.port_journal import GLOBAL, Departure, Keeper
 from multidrop.transports import Transport, TransportLost
+from multidrop.transports.pipe import running_loop
 
 OnAnswer = Callable[[Transaction | TransportLost], None]
 """Called with the end of a request that was queued, in the turn of the event loop in which it ends."""
@@ -75,7 +76,7 @@ class Link:
         self.leftovers = Leftovers()
         self._orderly = False
         """The port was still open when it was shut."""
-        self._loop = asyncio.get_running_loop()
+        self._loop = running_loop()
         self.now = self._loop.time
         self._waiting: dict[int, OnAnswer] = {}
         self._advancing = self._further = False

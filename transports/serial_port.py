@@ -29,6 +29,8 @@ if sys.platform != "win32":
 
     _REFUSALS: tuple[type[Exception], ...] = (ValueError, OverflowError, termios.error)
 else:
+    from multidrop.transports.serial_ports import mark
+
     _REFUSALS = (ValueError, OverflowError)
 
 T = TypeVar("T")
@@ -151,7 +153,11 @@ class SerialDevice:
 
     def __init__(self, port: str, baud: int) -> None:
         self.name = com_name(present(port) or port)
+        if sys.platform == "win32" and (other := holder(self.name)):  # Wine opens a port twice
+            raise Unreachable(f"{self.name} is in use by {other}; close it there")
         self._port = serial.Serial(self.name, baud, timeout=_PATIENCE, write_timeout=_STUCK, exclusive=True)
+        if sys.platform == "win32":
+            self._mark = mark(self.name)
         self.control = SerialControl(self._port)
 
     def read(self) -> bytes | None:
@@ -192,6 +198,8 @@ class SerialDevice:
     def close(self) -> None:
         with contextlib.suppress(OSError):
             self._port.close()
+        if sys.platform == "win32":
+            self._mark.close()
 
 
 if sys.platform != "win32":

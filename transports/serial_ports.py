@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import mmap
 import os
 import re
 import sys
@@ -96,6 +97,18 @@ def usb_names(ports: Iterable[UsbPort]) -> dict[str, str]:
     return {device: name for device, name in names.items() if ports_of[name] == 1}
 
 
+if sys.platform == "win32":
+
+    def _shared(port: str) -> mmap.mmap:
+        return mmap.mmap(-1, 4, tagname=f"multidrop {com_name(port)}")
+
+    def mark(port: str) -> mmap.mmap:
+        """Mark a port as this process's, until the mark is closed or the process ends."""
+        shared = _shared(port)
+        shared[:] = os.getpid().to_bytes(4, "little")
+        return shared
+
+
 def natural(name: str) -> list[tuple[int, str]]:
     """A sort key that puts COM9 before COM10."""
     return [(int(part), "") if part.isdigit() else (-1, part) for part in re.split(r"([0-9]+)", name)]
@@ -128,10 +141,13 @@ def holder(device: str, root: Path = Path("/")) -> str:
     """The program that has a port open, as `name (pid n)`; empty if none is known.
 
     Looked at: the locks of the kernel, lock files, and on Linux the open files of every process that may be read. It
-    takes a few milliseconds. `root` is the folder of `proc` and `var`.
+    takes a few milliseconds. `root` is the folder of `proc` and `var`. Windows tells of none, so there it is the mark
+    of another multidrop.
     """
     if sys.platform == "win32":
-        return ""
+        with _shared(device) as shared:
+            pid = int.from_bytes(shared[:], "little")
+        return "" if not pid else "this program itself" if pid == os.getpid() else f"multidrop (pid {pid})"
     else:
         return lock_owner(device) or _with_lock_file(device, root) or _with_open_file(device, root)
 

@@ -28,6 +28,7 @@ UDP_WAITING = 1024
 """Bytes of datagrams that wait to go out when a further one is dropped."""
 MOST_LATE = 64
 """Delayed replies over Modbus/TCP from which on no more requests are read."""
+NO_TERMINALS = "Windows has no pseudo-terminals"
 ESTABLISHED = 1
 """Linux's state of a connection that neither side has ended."""
 
@@ -51,12 +52,15 @@ async def serve_bus(floor: RunningFloor, bus: BusSpec, stack: AsyncExitStack) ->
             reason = error.strerror or str(error)
             raise Diagnostic(f"cannot serve {endpoint.text} ({reason})", where) from None
         served += [Served(bus.name, each) for each in ([url] if isinstance(url, str) else url)]
+    if sys.platform == "win32" and bus.serve and not served:
+        raise Diagnostic(NO_TERMINALS, f'bus "{bus.name}"', 'serve = ["tcp://127.0.0.1:0"]')
     return served
 
 
-async def _serve_pty(floor: RunningFloor, bus: str, endpoint: Endpoint, stack: AsyncExitStack) -> str:
+async def _serve_pty(floor: RunningFloor, bus: str, endpoint: Endpoint, stack: AsyncExitStack) -> str | list[str]:
     if sys.platform == "win32":
-        raise Diagnostic("Windows has no pseudo-terminals", f'bus "{bus}"', "serve tcp://")
+        floor.notify(f'bus "{bus}": {endpoint.text} is not served: {NO_TERMINALS}; its other endpoints are')
+        return []
     else:
         from multidrop.simulator.serving.pty import PtyServer
 

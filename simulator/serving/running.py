@@ -20,6 +20,7 @@ from multidrop.simulator.cell.spec import BusSpec
 from multidrop.simulator.family import Connection, Shadow
 from multidrop.simulator.floor import Floor
 from multidrop.simulator.wire import BITS_A_BYTE, Wire
+from multidrop.transports.pipe import running_loop
 
 HOLD = 4096
 """Bytes of one client that wait in the queue."""
@@ -101,7 +102,7 @@ class RunningFloor:
         self.floor = floor
         self.notify: Callable[[str], None] = lambda text: None
         """Takes a notice about clients, for a person."""
-        self.loop = asyncio.get_running_loop()
+        self.loop = running_loop()
         self._speed = speed
         self._origin = self.loop.time()
         self._now = 0.0
