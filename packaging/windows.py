@@ -30,6 +30,8 @@ PYTHON = HOME / "python"
 """The folder of python.exe."""
 PREFIX = HOME / "prefix"
 """What Wine takes for drive C:."""
+PORTS = {name: HOME / "ports" / name for name in ("COM5", "COM6")}
+"""The COM ports that there are, each a link to a pseudo-terminal, which the test that uses it makes."""
 PASSED = ROOT / "tests" / "windows" / "passed"
 """How many tests pass: a run in which fewer do has failed."""
 SHARE = 0.85
@@ -81,6 +83,17 @@ MATH, OUR_MATH = b"api-ms-win-crt-math-l1-1-0.dll", b"wine-lacks-crt-math-l1-1-0
 """Wine's C library has no complex numbers, which numpy takes from it: its name in the libraries becomes ours."""
 COMPLEX = r"c(a?(?:cos|sin|tan)h?|exp|log|pow|proj|onj|sqrt|abs|arg|real|imag)([fl]?)"
 
+COMMANDS = (
+    ("wineboot", "-i"),
+    ("wine", "reg", "add", r"HKCU\Software\Wine", "/v", "Version", "/d", "win10", "/f"),
+    *(
+        ("wine", "reg", "add", r"HKLM\Software\Wine\Ports", "/v", name, "/d", str(link), "/f")
+        for name, link in PORTS.items()
+    ),
+    ("wineserver", "-k"),  # it looks for ports as it starts
+)
+"""What makes the prefix."""
+
 
 def main(arguments: list[str]) -> int:
     """Build what is not there; run the tests, or a command."""
@@ -90,7 +103,7 @@ def main(arguments: list[str]) -> int:
     _once(
         "packages", "\n".join((CARRIER, *pins, repr((CHANGED, CHANGED_TO, RANDOM, COMPLEX)))), lambda: _packages(pins)
     )
-    _once("prefix", "windows 10", _prefix)
+    _once("prefix", repr(COMMANDS), _prefix)
     if arguments[:1] == ["--python"]:
         return _shown(["wine", PYTHON / "python.exe", *arguments[1:]], wine_environment())[0]
     return _tests(arguments)
@@ -98,8 +111,7 @@ def main(arguments: list[str]) -> int:
 
 def _prefix() -> None:
     shutil.rmtree(PREFIX, ignore_errors=True)
-    version = ["reg", "add", r"HKCU\Software\Wine", "/v", "Version", "/d", "win10", "/f"]
-    for command in (["wineboot", "-i"], ["wine", *version]):
+    for command in COMMANDS:
         done = subprocess.run(command, env=wine_environment(), capture_output=True, text=True)
         if done.returncode:
             sys.exit(f"make windows: {' '.join(command)} failed: {done.stderr}")

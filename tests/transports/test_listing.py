@@ -13,12 +13,17 @@ from hypothesis import strategies as st
 from multidrop.transports.serial_ports import PortInfo, list_ports, natural, stable_name
 
 
+def listed(device: str, description: str | None) -> SimpleNamespace:
+    """A port without USB."""
+    return SimpleNamespace(device=device, description=description, vid=None, pid=None, serial_number=None)
+
+
 def machine(monkeypatch: pytest.MonkeyPatch, root: Path, names: Sequence[str]) -> list[str]:
     (root / "dev").mkdir()
     devices = [root / "dev" / name for name in names]
     for device in devices:
         device.touch()
-    found = [SimpleNamespace(device=str(each), description=f"adapter {each.name}") for each in devices]
+    found = [listed(str(each), f"adapter {each.name}") for each in devices]
     monkeypatch.setattr("serial.tools.list_ports.comports", lambda: found)
     return [str(device) for device in devices]
 
@@ -52,7 +57,7 @@ def test_ports_without_hardware_are_left_out(monkeypatch: pytest.MonkeyPatch, tm
 
 
 def test_a_port_that_says_nothing_of_itself_has_no_description(monkeypatch: pytest.MonkeyPatch) -> None:
-    found = [SimpleNamespace(device="COM3", description="n/a"), SimpleNamespace(device="COM4", description=None)]
+    found = [listed("COM3", "n/a"), listed("COM4", None)]
     monkeypatch.setattr("serial.tools.list_ports.comports", lambda: found)
     assert list_ports() == [PortInfo("COM3"), PortInfo("COM4")]
 
@@ -67,6 +72,7 @@ def test_natural_order_is_that_of_the_numbers(numbers: list[int], prefix: str) -
     assert sorted(names, key=natural) == [f"{prefix}{number}" for number in sorted(numbers)]
 
 
+@pytest.mark.fork
 def test_on_macos_a_ports_own_name_has_the_adapters_serial_number(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("sys.platform", "darwin")
     assert stable_name("/dev/cu.usbserial-A5069RR4") == "/dev/cu.usbserial-A5069RR4"
