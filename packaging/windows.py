@@ -90,7 +90,7 @@ COMMANDS = (
         ("wine", "reg", "add", r"HKLM\Software\Wine\Ports", "/v", name, "/d", str(link), "/f")
         for name, link in PORTS.items()
     ),
-    ("wineserver", "-k"),  # it looks for ports as it starts
+    ("wineserver", "-w"),  # the next one looks for ports as it starts
 )
 """What makes the prefix."""
 

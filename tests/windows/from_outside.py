@@ -1,7 +1,8 @@
 """A working day of multidrop for Windows under Wine, seen from this side, by `make windows` (pytest does not find it).
 
 A COM port of Wine is a pseudo-terminal here: a served cell is the drives at it, and its end is a pulled plug. The judge
-asks the cell on a second wire, with pauses: its questions and their answers are on the line, too. `make windows` builds what runs here (`packaging/windows.py`).
+asks the cell on a second wire, with pauses: its questions and their answers are on the line, too. `make windows` builds
+what runs here (`packaging/windows.py`).
 """
 
 from __future__ import annotations
