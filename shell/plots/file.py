@@ -146,7 +146,14 @@ def take_lock(path: Path) -> int:
         lock = os.open(path, os.O_RDWR | os.O_CREAT, 0o666)
     except OSError as error:
         raise Diagnostic(f"cannot write {path} ({error.strerror})") from None
-    if sys.platform != "win32":
+    if sys.platform == "win32":  # an open file is not replaced there: one beside it, which goes with its process
+        os.close(lock)
+        flags = os.O_RDWR | os.O_CREAT | os.O_EXCL | os.O_TEMPORARY
+        try:
+            lock = os.open(path.with_name(f".{path.name}.lock"), flags)
+        except (FileExistsError, PermissionError):
+            raise Diagnostic(f"another plot writes {path}", hint="use another file") from None
+    else:
         try:
             fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:

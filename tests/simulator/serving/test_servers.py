@@ -13,11 +13,12 @@ import sys
 from collections.abc import AsyncIterator, Awaitable, Callable
 from contextlib import AsyncExitStack
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
 from multidrop.dialects import Diagnostic
-from multidrop.simulator.cells import load
+from multidrop.simulator.cells import load, read
 from multidrop.simulator.floor import Floor
 from multidrop.simulator.serving.command import reachable
 from multidrop.simulator.serving.endpoints import Served, serve_bus
@@ -479,3 +480,21 @@ def test_an_address_of_this_computer_only_is_no_open_door() -> None:
     inside = ("pty:/tmp/x", "tcp://127.0.0.1:1", "udp://127.0.1.1:1", "modbus://[::1]:1", "tcp://localhost:1")
     outside = ("tcp://0.0.0.0:1", "udp://192.168.0.5:1", "modbus://[::]:1", "tcp://press-pc:1")
     assert [each for each in (*inside, *outside) if reachable(each)] == list(outside)
+
+
+async def test_windows_passes_over_a_pseudo_terminal_and_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("multidrop.simulator.serving.endpoints.sys", SimpleNamespace(platform="win32"))
+    cell = read(
+        '[[bus]]\nname = "press"\nserve = ["pty:", "tcp://127.0.0.1:0"]\n[[bus.drive]]\npersonality = "LMDCM"\n'
+        '[[bus]]\nname = "other"\nserve = ["pty:other.tty"]\n[[bus.drive]]\npersonality = "LMDCM"\n',
+        "cell",
+    )
+    told: list[str] = []
+    async with AsyncExitStack() as stack:
+        floor = RunningFloor(Floor(cell))
+        stack.callback(floor.close)
+        floor.notify = told.append
+        assert [each.endpoint[:6] for each in await serve_bus(floor, cell.buses[0], stack)] == ["tcp://"]
+        assert told == ['bus "press": pty: is not served: Windows has no pseudo-terminals; its other endpoints are']
+        with pytest.raises(Diagnostic, match=r"Windows has no pseudo-terminals.*tcp://127.0.0.1:0"):
+            await serve_bus(floor, cell.buses[1], stack)
