@@ -94,7 +94,7 @@ def may_swallow(build: int, environment: Mapping[str, str]) -> bool:
 
 def swallows() -> bool:
     """True if the console of this process is reported to swallow Ctrl+X."""
-    return sys.platform == "win32" and may_swallow(sys.getwindowsversion().platform_version[2], os.environ)
+    return sys.platform == "win32" and may_swallow(version()[2], os.environ)
 
 
 if sys.platform == "win32":
@@ -148,6 +148,12 @@ if sys.platform == "win32":
             return mode.value if _kernel.GetConsoleMode(_handle(descriptor), ctypes.byref(mode)) else None
         except (OSError, ValueError):
             return None
+
+    def version() -> tuple[int, int, int]:
+        """The version of Windows and its build. Python's own is that of a library, or what a manifest asks for."""
+        found = (wintypes.ULONG * 71)(284)  # OSVERSIONINFOEXW, which begins with its size
+        ctypes.WinDLL("ntdll").RtlGetVersion(found)
+        return found[1], found[2], found[3]
 
     def is_console(descriptor: int) -> bool:
         return _mode(descriptor) is not None
@@ -256,10 +262,9 @@ if sys.platform == "win32":
 
     def facts() -> list[str]:
         """What a report names: the build of Windows, the host of the console, and its code pages."""
-        version = ".".join(map(str, sys.getwindowsversion().platform_version))
         host = "Windows Terminal" if "WT_SESSION" in os.environ else "console"
         host = f"{host}, made by OpenSSH" if "SSH_CONNECTION" in os.environ else host
         pages = (
             f"code pages {_kernel.GetConsoleCP()} in, {_kernel.GetConsoleOutputCP()} out, {_kernel.GetACP()} of files"
         )
-        return [f"Windows {version}; {host}; {pages}"]
+        return [f"Windows {'.'.join(map(str, version()))}; {host}; {pages}"]

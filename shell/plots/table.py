@@ -101,11 +101,14 @@ class TableSink:
         return f"cannot write {self.path}: {reason}; {self.writes} has what came before"
 
     def _release(self) -> None:
-        """Unlock the file; delete it if this plot made it and wrote nothing."""
+        """Unlock the file; delete it if this plot made it and wrote nothing. May be called again."""
+        if self._lock < 0:
+            return
         with contextlib.suppress(OSError):
             if self._made and not self.path.stat().st_size:
                 self.path.unlink()
         os.close(self._lock)
+        self._lock = -1
 
 
 def _rows(batch: Batch) -> Iterator[tuple[Any, ...]]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 from tests.support.cell_session import CellSession, bus, party
@@ -24,7 +25,7 @@ async def load(shop: CellSession, folder: Path, *options: str, drive: str = "a")
     """Download the file; return what was narrated, with the file's name for its path."""
     shop.events.clear()
     await shop.session.run(" ".join((f"/download {folder / 'p.mxt'} {drive}", *options)))
-    return [text.replace(f"{folder}/", "") for text in shop.told()]
+    return [text.replace(f"{folder}{os.sep}", "") for text in shop.told()]
 
 
 SLOW = bus("line", party("a"), party("b"))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import os
 from pathlib import Path
 
 import pytest
@@ -25,7 +26,7 @@ def shop_of(folder: Path) -> CellSession:
 async def load(shop: CellSession, folder: Path, *options: str) -> list[str]:
     shop.events.clear()
     await shop.session.run(" ".join((f"/download {folder / 'p.tmc'} 1", *options)))
-    return [text.replace(f"{folder}/", "") for text in shop.told()]
+    return [text.replace(f"{folder}{os.sep}", "") for text in shop.told()]
 
 
 async def test_a_download_says_what_it_has_done_and_its_backup_brings_back_what_was_there(tmp_path: Path) -> None:

@@ -2,6 +2,7 @@
 
 import asyncio
 import json
+import os
 from xml.etree import ElementTree
 
 import pytest
@@ -38,7 +39,7 @@ class Shop(CellSession):
         """What a failing script says, without the folder."""
         with pytest.raises(kind) as caught:
             await self.run(text, **values)
-        return report(caught.value).replace(f"{self.folder}/", "")
+        return report(caught.value).replace(f"{self.folder}{os.sep}", "")
 
 
 @pytest.fixture
