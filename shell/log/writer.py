@@ -5,6 +5,7 @@ from __future__ import annotations
 import errno
 import os
 import stat
+import sys
 from collections import deque
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -181,7 +182,20 @@ HELD = 1024 * 1024
 """The largest number of bytes that wait for a slow disk."""
 ENDING = 1.0
 """The longest wait for the rest at the end, s."""
+if sys.platform == "win32":
+    import _winapi
+    import msvcrt
+
 _FLAGS = os.O_WRONLY | os.O_APPEND | os.O_CREAT | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
+
+
+def _opened(path: Path) -> int:
+    """Open a file to append to it, so that another session can rename it. Raises OSError, ValueError."""
+    if sys.platform == "win32":
+        append, share_all, open_or_make, normal = 0x100084, 0x7, 0x4, 0x80  # FILE_APPEND_DATA, to look and to wait
+        handle = _winapi.CreateFile(str(path), append, share_all, 0, open_or_make, normal, 0)
+        return msvcrt.open_osfhandle(handle, os.O_APPEND)
+    return os.open(path, _FLAGS, 0o666)
 
 
 class Disk:
@@ -203,7 +217,7 @@ class Disk:
         """Bytes in the file after the last write."""
         self._path, self._size, self._files, self._head = path, size, files, head
         self._slow = False
-        self._descriptor = os.open(path, _FLAGS, 0o666)
+        self._descriptor = _opened(path)
         self._regular = stat.S_ISREG(os.fstat(self._descriptor).st_mode)
         self._writer = BoundedWriter(
             self._write, lambda loss: missing(loss.count), lambda problem: self._close(), HELD, HELD, "log"
@@ -249,7 +263,7 @@ class Disk:
         ours = os.fstat(self._descriptor)
         if (found.st_dev, found.st_ino) != (ours.st_dev, ours.st_ino):
             self._close()
-            self._descriptor = os.open(self._path, _FLAGS, 0o666)
+            self._descriptor = _opened(self._path)
 
     def _rotate(self) -> bytes:
         """Begin a new part; return its first bytes. A part that cannot be renamed now is so at a later write."""
@@ -265,7 +279,7 @@ class Disk:
         except PermissionError:  # Windows: another program reads it
             if self._path.stat().st_size > 2 * self._size:
                 raise
-        self._descriptor = os.open(self._path, _FLAGS, 0o666)
+        self._descriptor = _opened(self._path)
         return head
 
     def _close(self) -> None:

@@ -14,7 +14,7 @@ import pytest
 
 LEFT_OUT = {
     "pty": "needs pseudo-terminals",
-    "fork": "needs signals, modes, limits, links or named pipes of POSIX",
+    "fork": "needs signals, modes, limits, links or pipes of POSIX",
     "AF_UNIX": "needs AF_UNIX",
     "tmux": "needs tmux",
 }

@@ -30,7 +30,7 @@ class Shop(CellSession):
         self.folder, self.results = folder, []
 
     async def run(self, text, **values):
-        (self.folder / "s.txt").write_text(text)
+        (self.folder / "s.txt").write_text(text, encoding="utf-8")
         script = read_script(str(self.folder / "s.txt"), values, self.session.macros)
         async with self.session.automations.run():
             await run_script(self.session, script, self.results.append)

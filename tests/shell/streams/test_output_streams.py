@@ -79,6 +79,7 @@ def test_what_does_not_fit_is_dropped_and_told_in_its_place(pipe):
     assert pipe.read(b"more\n") == b"more\n"
 
 
+@pytest.mark.fork
 def test_a_reader_that_goes_away_is_told_once_and_nothing_is_waited_for(pipe):
     os.close(pipe.reader)
     pipe.out.put(b"one\n")
@@ -88,6 +89,7 @@ def test_a_reader_that_goes_away_is_told_once_and_nothing_is_waited_for(pipe):
     pipe.reader = os.dup(pipe.writer)
 
 
+@pytest.mark.fork
 def test_a_descriptor_that_somebody_else_made_non_blocking_loses_nothing(pipe):
     os.set_blocking(pipe.writer, False)
     for number in range(200):
@@ -179,6 +181,7 @@ async def test_a_terminal_that_is_not_read_loses_replies_and_no_warning(monkeypa
     os.close(master)
 
 
+@pytest.mark.fork
 async def test_automation_waits_while_a_pipe_is_behind_and_no_reply_is_dropped(monkeypatch):
     with streams(monkeypatch) as (made, reader, _):
         lines, got = 200, b""
@@ -207,6 +210,7 @@ async def test_a_file_loses_nothing_that_nobody_asked_for(monkeypatch, tmp_path)
     assert [int(line) for line in kept] == list(range(5000))
 
 
+@pytest.mark.fork
 async def test_a_disk_that_hangs_loses_what_is_over_the_bound_and_it_is_told(monkeypatch):
     monkeypatch.setattr(threads, "MOST", 300_000)
     monkeypatch.setattr(output_streams.stat, "S_ISREG", lambda mode: True)  # a pipe that takes 64 kB and then nothing
@@ -223,6 +227,7 @@ async def test_a_disk_that_hangs_loses_what_is_over_the_bound_and_it_is_told(mon
         assert 300 <= got.count(b"\n") < 700
 
 
+@pytest.mark.fork
 async def test_a_loss_is_an_object_at_its_place_in_a_stream_of_objects(monkeypatch):
     monkeypatch.setattr(output_streams, "as_json", True)
     with streams(monkeypatch) as (_, reader, errors):
@@ -241,6 +246,7 @@ async def test_a_loss_is_an_object_at_its_place_in_a_stream_of_objects(monkeypat
         assert taken(errors).decode().startswith(f"{loss['lost']} lines lost, ")
 
 
+@pytest.mark.fork
 async def test_what_nobody_asked_for_is_dropped_and_told_on_standard_error(monkeypatch):
     with streams(monkeypatch) as (_, reader, errors):
         for _ in range(500):
@@ -258,6 +264,7 @@ async def test_what_nobody_asked_for_is_dropped_and_told_on_standard_error(monke
             assert re.fullmatch(rf"(1 line|\d+ lines) lost, {times} to {times}: the output is not read", line)
 
 
+@pytest.mark.fork
 @pytest.mark.parametrize(("hurried", "told"), [(False, 1), (True, 0)])
 async def test_a_reader_that_takes_nothing_is_given_up_at_the_end(monkeypatch, hurried, told):
     monkeypatch.setattr(output_streams, "PIPE_TIMEOUT", 0.05)

@@ -84,7 +84,7 @@ def test_a_character_that_the_output_does_not_know_is_written_out():
     stream = io.TextIOWrapper(io.BytesIO(), encoding="ascii")
     write(stream, "Copyright\xa9")
     write(stream, "more")
-    assert stream.buffer.getvalue() == b"Copyright\\xa9\nmore\n"
+    assert stream.buffer.getvalue().split() == [b"Copyright\\xa9", b"more"]
 
 
 def test_a_full_disk_is_told_at_the_end(monkeypatch):
@@ -113,7 +113,7 @@ def ends(kind, folder):
         yield None, os.open(os.devnull if kind == "null" else folder / "kept.txt", os.O_WRONLY | os.O_CREAT)
 
 
-@pytest.mark.parametrize("kind", ["pipe", "socket", "terminal", "file", "null"])
+@pytest.mark.parametrize("kind", ["pipe", pytest.param("socket", marks=pytest.mark.fork), "terminal", "file", "null"])
 def test_a_reader_is_gone_once_its_end_is_closed_and_a_file_has_none(kind, tmp_path, monkeypatch):
     with ends(kind, tmp_path) as (reader, writer), os.fdopen(writer, "w") as stream:
         monkeypatch.setattr(sys, "stdout", stream)
