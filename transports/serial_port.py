@@ -47,7 +47,8 @@ async def open_serial(port: str, baud: int = 9600) -> Transport:
     """Open a port by its name or path, at `baud` bits/s, and drop stale input. Raises Unreachable."""
     if baud < 1:
         raise Unreachable(f"{port}: invalid baud rate {baud}; give one such as 9600")
-    from multidrop.transports.pipe import DescriptorPipe, ThreadedPipe, closing, in_thread
+    from multidrop.transports.pipe import DescriptorPipe, in_thread
+    from multidrop.transports.threaded import ThreadedPipe, closing
 
     if sys.platform == "win32":
         if com_name(port) in closing:

@@ -100,7 +100,7 @@ def usb_names(ports: Iterable[UsbPort]) -> dict[str, str]:
 if sys.platform == "win32":
 
     def _shared(port: str) -> mmap.mmap:
-        return mmap.mmap(-1, 4, tagname=f"multidrop {com_name(port)}")
+        return mmap.mmap(-1, 4, tagname=f"multidrop {com_name(port)}".replace("\\", "/"))
 
     def mark(port: str) -> mmap.mmap:
         """Mark a port as this process's, until the mark is closed or the process ends."""

@@ -12,7 +12,7 @@ from ipaddress import ip_address
 from typing import Any
 
 from multidrop.transports import Transport, Unreachable
-from multidrop.transports.pipe import ThreadedPipe
+from multidrop.transports.threaded import ThreadedPipe
 
 
 def exposed(host: str) -> bool:

@@ -15,11 +15,11 @@ import serial
 from serial import rfc2217
 
 from multidrop.transports import Transport, TransportLost
-from multidrop.transports.pipe import ThreadedPipe
 from multidrop.transports.relay_pipe import RelayPipe
 from multidrop.transports.rfc2217 import open_rfc2217
 from multidrop.transports.serial_port import SerialDevice, open_serial
 from multidrop.transports.sockets import SocketDevice, open_tcp, open_udp, set_socket_options
+from multidrop.transports.threaded import ThreadedPipe
 from tests.support.lent_port import lent
 from tests.support.posix import tty
 from tests.support.until import PATIENCE

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
+import sys
 from collections.abc import Sequence
 from pathlib import Path
 from types import SimpleNamespace
@@ -10,7 +12,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from multidrop.transports.serial_ports import PortInfo, list_ports, natural, stable_name
+from multidrop.transports.serial_ports import PortInfo, holder, list_ports, natural, stable_name
+
+if sys.platform == "win32":
+    from multidrop.transports.serial_ports import mark
 
 
 def listed(device: str, description: str | None) -> SimpleNamespace:
@@ -70,6 +75,15 @@ def test_listing_this_machine_works() -> None:
 def test_natural_order_is_that_of_the_numbers(numbers: list[int], prefix: str) -> None:
     names = [f"{prefix}{number}" for number in numbers]
     assert sorted(names, key=natural) == [f"{prefix}{number}" for number in sorted(numbers)]
+
+
+@pytest.mark.parametrize("name", ["COM31", r"\\.\CNCA0", "/dev/ttyUSB31"])
+def test_windows_names_the_process_of_multidrop_that_has_a_port_of_any_name(name: str) -> None:
+    if sys.platform == "win32":
+        assert holder(name) == ""
+        with contextlib.closing(mark(name)):
+            assert holder(name) == "this program itself"
+        assert holder(name) == ""
 
 
 @pytest.mark.fork

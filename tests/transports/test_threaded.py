@@ -6,7 +6,8 @@ import asyncio
 import threading
 
 from multidrop.transports import TransportLost
-from multidrop.transports.pipe import ThreadedPipe, running_loop
+from multidrop.transports.pipe import running_loop
+from multidrop.transports.threaded import ThreadedPipe
 from tests.support.until import PATIENCE
 
 PIECE, MANY = 4096, 100

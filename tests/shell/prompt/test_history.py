@@ -77,6 +77,7 @@ def test_a_link_stays_a_link_and_the_file_behind_it_is_cut(tmp_path, three_kept)
     assert sorted(os.listdir(tmp_path)) == ["elsewhere", "state"]
 
 
+@pytest.mark.fork
 def test_a_line_that_another_process_adds_while_the_file_is_cut_is_kept(tmp_path, monkeypatch, three_kept):
     ours, theirs = filled(tmp_path / "history"), History(tmp_path / "history")
     write = line_queue.write_atomically
