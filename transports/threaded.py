@@ -1,9 +1,10 @@
 """A pipe over a device whose calls block, with one thread that reads and one that writes.
 
 It serves what the loop cannot watch: every port and socket on Windows. What was read waits for the loop, and where that
-is much, the reading thread waits, so a flood stays in the port. Writes wait in a queue and go out in small pieces, so that most of them can be
-taken back. A stop of another thread takes the place of the queue, and the writing thread writes it. A close that the
-driver holds up is given up, in a thread of its own: neither the loop nor the end of the process waits for it.
+is much, the reading thread waits, so a flood stays in the port. Writes wait in a queue and go out in small pieces, so
+that most of them can be taken back. A stop of another thread takes the place of the queue, and the writing thread
+writes it. A close that the driver holds up is given up, in a thread of its own: neither the loop nor the end of the
+process waits for it.
 """
 
 from __future__ import annotations

@@ -188,7 +188,7 @@ def _make_parquet(pa: Any, path: Path, part: Path) -> None:
                 with pa.parquet.ParquetFile(path) as old:
                     for batch in old.iter_batches():
                         out.write_batch(batch)
-            with pa.csv.open_csv(part, reading, convert_options=converting) as new:
+            with pa.OSFile(str(part)) as rows, pa.csv.open_csv(rows, reading, convert_options=converting) as new:
                 for batch in new:
                     out.write_batch(batch)
         synced(beside)

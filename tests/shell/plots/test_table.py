@@ -81,7 +81,7 @@ async def test_a_second_plot_is_added_after_the_first(ending: str, tmp_path: Pat
 async def test_a_row_that_a_kill_left_in_part_is_cut_before_the_next(tmp_path: Path) -> None:
     path = tmp_path / "run.csv"
     await plotted(path, 1)
-    path.write_text(path.read_text() + "2027-01-15T08:00:03.000Z,3.00")
+    path.write_bytes(path.read_bytes() + b"2027-01-15T08:00:03.000Z,3.00")
     await plotted(path, 2)
     assert [row["value"] for row in rows(path) if row["name"] == "position"] == ["1", "2"]
 
