@@ -158,7 +158,7 @@ class Openings:
         It begins with the baud rate and the language of the line, and asks before it tries others. Raises NothingFound,
         Diagnostic where a person does not agree or nothing can be searched, and the failures of a port.
         """
-        from multidrop.shell.finding.scanning import Scanning, alike, url_of
+        from multidrop.shell.finding.scanning import Scanning, url_of
         from multidrop.shell.state.store import note
 
         workspace, record, connection = self._workspace, self._workspace.of(bus), self._workspace.of(bus).connection
@@ -174,8 +174,8 @@ class Openings:
             await searching.run([], False)
         finally:
             if bus.name in workspace.buses:
-                if found := alike(searching.found):
-                    url, before = url_of(found), connection
+                if searching.found:
+                    url, before = url_of(searching.found), connection
                     connection = replace(parse(url), name=before.name, labels=before.labels, timeout=before.timeout)
                     bus.set_baud(connection.baud or 0)
                     bus.line.inbox.echo = LocalEcho() if connection.local_echo else None

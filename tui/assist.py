@@ -73,7 +73,7 @@ class Assist:
     def wrong(self) -> Sequence[StartEntry]:
         """The first error of the configuration; opening it edits the file at its line."""
         found = self._settings.problems[:1]
-        return [StartEntry("wrong", each.where, EDIT, f"{each.message}; Enter edits the line") for each in found]
+        return [StartEntry("wrong", Path(each.where).name, EDIT, f"{each.message}; Enter edits it") for each in found]
 
     async def ports(self) -> Sequence[StartEntry]:
         """Serial ports of this machine: who holds each, or which drives replied there last. The search may be slow."""
@@ -100,14 +100,14 @@ class Assist:
         """
         from multidrop.shell.connect.opening import open_buses
         from multidrop.shell.connect.urls import parse
-        from multidrop.shell.finding.scanning import Scanning, alike, url_of
+        from multidrop.shell.finding.scanning import Scanning, url_of
 
         opener = partial(open_buses, state=self._settings.state)
         connection = parse(url, self._settings.connections)
         scanning = Scanning(self._session, opener, connection, lambda drive: found(drive.words()))
         await scanning.run([], False)
 
-        return url_of(alike(scanning.found)) if scanning.found else url
+        return url_of(scanning.found) if scanning.found else url
 
     def verbs(self) -> Sequence[tuple[str, str, str]]:
         from multidrop.shell.operations.table import VERBS

@@ -266,7 +266,8 @@ class _Return:
         self._stopped = ""
         """The drives to which a stop was sent first; its confirmation reads what moves."""
         self._reason = ""
-        self._said: set[str] = set()
+        self._said = {str(bus.lost)} if way.newcomer is not None else set()
+        """The reasons that were published: that of a port that was never open was, as it was tried first."""
 
     def _say(self, text: str) -> None:
         self._publish(self._bus.name, text)

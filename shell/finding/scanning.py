@@ -55,6 +55,10 @@ class FoundDrive:
     state: DriveState
 
     @property
+    def form(self) -> tuple[object, ...]:
+        return self.connection.baud, self.state.codec.family, bool(self.state.address)
+
+    @property
     def url(self) -> str:
         """The URL that opens this drive alone."""
         return url_of([self])
@@ -89,7 +93,8 @@ class FoundDrive:
 
 
 def url_of(found: Sequence[FoundDrive]) -> str:
-    """The URL that opens drives of one language and baud rate on one port."""
+    """The URL that opens the first drive, with those of its language, baud rate and mode on its port."""
+    found = [each for each in found if each.form == found[0].form]
     connection, codec = found[0].connection, found[0].state.codec
     if connection.scheme in DIRECT:
         return found[0].port
@@ -112,15 +117,6 @@ def url_of(found: Sequence[FoundDrive]) -> str:
     base = f"serial:{port_name(connection)}" if connection.scheme == "serial" else found[0].port
     head, _, bus = base.partition("#")
     return head + (f"?{'&'.join(keys)}" if keys else "") + (f"#{bus}" if bus else "")
-
-
-def alike(found: Sequence[FoundDrive]) -> list[FoundDrive]:
-    """The drives that one URL opens with the first one found."""
-
-    def form(drive: FoundDrive) -> tuple[object, ...]:
-        return drive.connection.baud, drive.state.codec.family, bool(drive.state.address)
-
-    return [each for each in found if form(each) == form(found[0])]
 
 
 def port_of(connection: Connection, bus: str) -> str:
