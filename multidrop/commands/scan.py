@@ -64,20 +64,14 @@ def _made(chosen: argparse.Namespace, session: Session, url: str) -> Scanning:
 
 def _conclude(as_json: bool, session: Session, found: list[FoundDrive], name: str = "") -> None:
     """Say how the drives are opened, and save the connection of the first ones where that is asked for."""
-    same = [each for each in found if _form(each) == _form(found[0])]
-    url = url_of(same)
+    url = url_of(found)
     if name:
         path = configuration.save(name, url)
         session.notify(f"{path}: connection {name} is saved: {url}", outcome=True)
     elif not as_json:
         session.notify(f"open with: multidrop shell {shlex.quote(url)}", outcome=True)
-    if (others := len(found) - len(same)) and not as_json:
+    if (others := sum(each.form != found[0].form for each in found)) and not as_json:
         session.notify(f"{others} more replied in another form; --json shows a URL for each", outcome=True)
-
-
-def _form(drive: FoundDrive) -> tuple[object, ...]:
-    codec = drive.state.codec
-    return drive.port, drive.connection.baud, codec.family, bool(drive.state.address)
 
 
 def rescue(chosen: argparse.Namespace) -> int:

@@ -56,7 +56,7 @@ class FoundDrive:
 
     @property
     def form(self) -> tuple[object, ...]:
-        return self.connection.baud, self.state.codec.family, bool(self.state.address)
+        return self.port, self.connection.baud, self.state.codec.family, bool(self.state.address)
 
     @property
     def url(self) -> str:
