@@ -168,9 +168,10 @@ class Openings:
             return await self._opener(where, lambda base: naming(f"{base}-search"))  # two buses never share a name
 
         searching = Scanning(workspace, beside, connection, lambda found: workspace.output(found.words()))
-        await workspace.reconnections.remove(bus.name)
-        await bus.link.detach(TransportLost(f"{bus.name} is being searched for drives"))
+        url = ""
         try:
+            await workspace.reconnections.remove(bus.name)
+            await bus.link.detach(TransportLost(f"{bus.name} is being searched for drives"))
             await searching.run([], False)
         finally:
             if bus.name in workspace.buses:
@@ -180,13 +181,15 @@ class Openings:
                     bus.set_baud(connection.baud or 0)
                     bus.line.inbox.echo = LocalEcho() if connection.local_echo else None
                     record.connection = connection
-                    await asyncio.to_thread(note, workspace.settings.state, url)
                     text = f"{bus.name}: it is opened as {url}; /keep {bus.name} saves that"
                     workspace.notify(text, bus=bus.name)
-                record.opened = replace(record.opened, hints=connection.hints, reopen=first(connection))
+                reopen = record.opened.reopen if connection.scheme == SIMULATED else first(connection)
+                record.opened = replace(record.opened, hints=connection.hints, reopen=reopen)
                 bus.silent = ""
                 _Newcomers(workspace).add(record.opened, connection)
                 workspace.reconnections.lost(bus)
+                if url:
+                    await asyncio.to_thread(note, workspace.settings.state, url)
 
     async def _run(self, opening: _Opening, connection: Connection, raw: bool = False, keep: bool = False) -> list[Bus]:
         """Open one URL. `keep`: a port that cannot be opened keeps a bus, which is tried again."""

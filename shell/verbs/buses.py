@@ -77,7 +77,8 @@ async def drives(call: Call) -> None:
 async def scan(call: Call) -> None:
     workspace = call.session
     bus = workspace.bus(call.word())
-    if bus.silent and workspace.reconnections.wanted:
+    unknown = bus.silent and workspace.reconnections.wanted and workspace.of(bus).raw is None
+    if unknown and call.by is By.OPERATOR:
         return await workspace.openings.search(bus)
     found = await scanning.extend(workspace, bus)
     for address in found:
