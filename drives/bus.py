@@ -93,6 +93,7 @@ class Bus:
     async def add(self, found: Iterable[DriveState]) -> None:
         """List drives that such a search has found."""
         for state in found:
+            self.silent = ""
             self.roster.found(state)
         await self.roster.search_over()
         self.link.publish(Changed(self.now()))

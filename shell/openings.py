@@ -152,6 +152,12 @@ class Openings:
             self._workspace.identified(bus)
         self._workspace.notify(described(bus), bus=bus.name)
 
+    def searches(self, bus: Bus) -> bool:
+        """Whether `search` is for this line: no drive has replied there, and its port can be opened again."""
+        record = self._workspace.of(bus)
+        simulated = record.connection is None or record.connection.scheme == SIMULATED  # it ends as it is left
+        return bool(bus.silent) and self._workspace.reconnections.wanted and record.raw is None and not simulated
+
     async def search(self, bus: Bus) -> None:
         """Search the port of a line on which no drive has replied, and go on with the line as drives reply there.
 
@@ -183,8 +189,7 @@ class Openings:
                     record.connection = connection
                     text = f"{bus.name}: it is opened as {url}; /keep {bus.name} saves that"
                     workspace.notify(text, bus=bus.name)
-                reopen = record.opened.reopen if connection.scheme == SIMULATED else first(connection)
-                record.opened = replace(record.opened, hints=connection.hints, reopen=reopen)
+                record.opened = replace(record.opened, hints=connection.hints, reopen=first(connection))
                 bus.silent = ""
                 _Newcomers(workspace).add(record.opened, connection)
                 workspace.reconnections.lost(bus)

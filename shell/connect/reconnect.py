@@ -281,6 +281,8 @@ class _Return:
         pause = FIRST
         while pause:
             await asyncio.sleep(pause)
+            if newcomer is not None and bus.drives and bus.lost is None:
+                return  # a person's search has found them
             try:
                 await self._attempt()
             except Stopped:

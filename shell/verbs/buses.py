@@ -77,10 +77,11 @@ async def drives(call: Call) -> None:
 async def scan(call: Call) -> None:
     workspace = call.session
     bus = workspace.bus(call.word())
-    unknown = bus.silent and workspace.reconnections.wanted and workspace.of(bus).raw is None
-    if unknown and call.by is By.OPERATOR:
+    if call.by is By.OPERATOR and workspace.openings.searches(bus):
         return await workspace.openings.search(bus)
     found = await scanning.extend(workspace, bus)
+    if found and workspace.of(bus).selected is None:
+        workspace.identified(bus)
     for address in found:
         workspace.output(f"{bus.name}: {address} {model(bus.drives[address])}")
     if not found:

@@ -128,6 +128,39 @@ async def test_a_stop_ends_a_search_goes_first_and_the_line_stays(tmp_path, monk
         assert [*desk.session.buses.values()] == [line] and line.lost is None
 
 
+@pytest.mark.parametrize("turns", [0, 1, 2, 3, 5, 8])
+async def test_a_search_that_a_stop_ends_as_it_begins_gives_the_line_back(tmp_path, monkeypatch, turns):
+    async with Desk(tmp_path, monkeypatch, ttyUSB9=bus("b", party("a"), baud=19200)) as desk:
+        (line,) = await desk.session.open(PORT)
+        task = desk.session.start("/scan")
+        for _ in range(turns):
+            await asyncio.sleep(0)
+        desk.session.stop()
+        assert not await task
+        await asyncio.sleep(8)
+        assert [*desk.session.buses.values()] == [line] and line.lost is None and line.silent
+        assert desk.session.enter_alone() == "/scan"
+
+
+async def test_a_simulated_line_is_searched_and_comes_back_as_it_was(tmp_path):
+    (tmp_path / "cell.toml").write_text(bus("b", party("a")))
+    session: Any = Session(Settings({}, tmp_path / "config", tmp_path / "state"), reconnect=True)
+
+    async def agree(question: str) -> bool:
+        return True
+
+    async def screen(name: str) -> None: ...
+
+    session.front = Front(agree, screen=screen)
+    (line,) = await session.open(f"sim:{tmp_path / 'cell.toml'}#b?drives=z")
+    assert line.silent
+    await session.run("/scan")
+    await asyncio.sleep(8)
+    assert [*line.drives] == ["a"] and session.buses == {"b": line}
+    await session.run("@a PR P")
+    await session.close()
+
+
 async def test_a_port_that_is_not_there_keeps_its_place_and_is_tried_like_a_lost_one(tmp_path, monkeypatch):
     cells = {"ttyUSB9": bus("b", party("a")), "ttyUSB8": bus("c", party("k"))}
     async with Desk(tmp_path, monkeypatch, **cells) as desk:
