@@ -75,6 +75,17 @@ async def test_an_enter_typed_before_the_line_was_seen_reads_no_error() -> None:
         assert session.lines == []
 
 
+@pytest.mark.tui
+@pytest.mark.pty
+async def test_both_keys_of_one_read_count() -> None:
+    async with demo() as (screen, session, _):
+        session.buses["pmx"].lost = None
+        read = [each for each in a_move(session) if not isinstance(each.event, Silent)]
+        session.emit(*read)
+        await screen.type(b"\x01\r")
+        assert isinstance(screen.app.screen, WhyPage) and session.place == ("press", "b")
+
+
 class Looked(CellSession):
     """A cell with one drive that is polled for a screen."""
 

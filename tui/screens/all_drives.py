@@ -159,8 +159,9 @@ class AllDrives(AskingPage):
     def __init__(self, host: Host) -> None:
         super().__init__(host)
         self._chosen: tuple[str, str] | None = None
-        self._places: list[Place] = []
-        self._view: View | None = None
+        # Known from the beginning: keys of the read that opened the page count, too.
+        self._view = View(host.session, host.model, (), host.session.now(), True)
+        self._places = worst_first(self._view, "")
 
     def show(self, view: View) -> None:
         self._view = view
@@ -211,8 +212,6 @@ class AllDrives(AskingPage):
 
     def edited(self, text: str) -> None:
         """Narrow the list at once: Enter may follow in the same read. An address that is typed is the chosen drive."""
-        if self._view is None:
-            return
         self._places = worst_first(self._view, text)
         named = [
             place for place in self._places if text in (place.glance.address, f"{place.bus}:{place.glance.address}")
