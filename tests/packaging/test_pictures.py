@@ -25,14 +25,14 @@ def pictures() -> ModuleType:
 
 
 def test_each_picture_is_taken_and_each_is_shown(pictures: ModuleType) -> None:
-    shown = {name for page in PAGES for name in re.findall(r"pictures/([\w.-]+)\)", page.read_text())}
+    shown = {name for page in PAGES for name in re.findall(r"pictures/([\w.-]+)\)", page.read_text(encoding="utf-8"))}
     taken = {f"{name}.svg" for name in (pictures.MOVING, *pictures.SCENES)}
     assert shown == taken == {path.name for path in pictures.PICTURES.iterdir()}
 
 
 @pytest.mark.tui
 def test_a_picture_shows_what_the_program_shows(pictures: ModuleType) -> None:
-    kept = (pictures.PICTURES / "macros-80x24.svg").read_text()
+    kept = (pictures.PICTURES / "macros-80x24.svg").read_text(encoding="utf-8")
     assert words(pictures.taken("macros-80x24")) == words(kept), "make pictures takes them again"
 
 
@@ -44,7 +44,7 @@ def words(svg: str) -> set[str]:
 
 
 def test_the_moving_picture_is_one_file_that_needs_nothing_else(pictures: ModuleType) -> None:
-    kept = (pictures.PICTURES / "tour.svg").read_text()
+    kept = (pictures.PICTURES / "tour.svg").read_text(encoding="utf-8")
     assert "<script" not in kept and set(re.findall(r"https?://[^\"\s]+", kept)) <= {
         "http://www.w3.org/2000/svg",
         "https://www.textualize.io",

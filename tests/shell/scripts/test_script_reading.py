@@ -106,6 +106,7 @@ async def test_a_line_of_standard_input_has_an_end(tmp_path):
     os.close(descriptor)
 
 
+@pytest.mark.fork
 async def test_standard_input_is_read_ahead_of_the_lines_within_bounds():
     reader, writer = os.pipe()
     os.write(writer, b"first\n")
