@@ -228,11 +228,17 @@ class Actions:
         """Search the lines typed before; the one that is taken goes into the line and is not sent."""
         await self._parts.questions.history(self._parts.assist.history(), self.action_begin_line)
 
+    @property
+    def _page(self) -> str:
+        """The sheet of the page in front; empty on the main screen."""
+        front = self._parts.app.screen
+        return front.SHEET if isinstance(front, Page) else ""
+
     def commands(self) -> list[Command]:
         parts = self._parts
         switches = Switches(parts.polling.on, parts.mouse_on, parts.model.bus("").twinned)
         return parts.recent.first(
-            list(all_commands(parts.session, parts.macros, parts.assist.verbs(), parts.keymap, switches))
+            list(all_commands(parts.session, parts.macros, parts.assist.verbs(), parts.keymap, switches, self._page))
         )
 
     async def action_palette(self) -> None:
@@ -240,11 +246,11 @@ class Actions:
         parts = self._parts
         if isinstance(parts.app.screen, Search):
             return
-        found = self.commands()
+        found, page = self.commands(), parts.app.screen
 
         async def run(number: int) -> None:
             parts.recent.used(found[number])
-            await parts.app.run_action(found[number].action, parts.main)
+            await parts.app.run_action(found[number].action, page if found[number].here else parts.main)
 
         width = min(PALETTE, parts.app.size.width) - PADDING
         await parts.questions.palette(lambda typed: commands_like(found, typed, width), run)

@@ -120,7 +120,7 @@ SHEETS: dict[str, Sheet] = {
         "Every drive of every line has a row, and the worst comes first. A drive that is lost, silent or in error is "
         "above those that move, and those are above the ones at rest. What you type keeps only the rows that have it: "
         "a bus, an address, a name, a state. Enter selects the drive and goes back, or shows why it is in trouble.",
-        {"Rows": (_STEP, _LEAP, Key("enter", "take", "select the drive; of one in trouble: show why", "select"))},
+        {"Rows": (_STEP, _LEAP, Key("enter", "", "select the drive; of one in trouble: show why", "select"))},
         ("page",),
     ),
     "why": Sheet(
@@ -170,19 +170,20 @@ SHEETS: dict[str, Sheet] = {
     ),
     "macros": Sheet(
         "macros",
-        "Each macro has a row with its key, its length and its note, and the chosen one shows its lines below. Enter "
-        "plays it, and the row shows the step. A recording keeps what you type, with the pauses between the lines.",
+        "Each macro has a row with its key, its length and its note, and the chosen one shows its lines below. Type to "
+        "narrow the list. Enter plays it, and the row shows the step. A recording keeps what you type, with the pauses "
+        "between the lines.",
         {
             "The chosen macro": (
                 _STEP,
                 _LEAP,
-                Key("enter", "play", "play it, once a press", "play"),
-                Key("s", "end", "end it", "end it"),
-                Key("e", "edit", "edit its file", "edit"),
-                Key("k", "key", "put it on a key", "key"),
-                Key("delete", "delete", "delete its file; asks", "delete"),
+                Key("enter", "", "play it, once a press", "play"),
+                Key("ctrl+e", "edit", "edit its file", "edit"),
+                Key("ctrl+k", "key", "put it on a key", "key"),
+                Key("delete", "delete", "delete its file; asks", "delete", first=True),
+                Key("", "end", "end it, wherever it is", "end the chosen one"),
             ),
-            "Macros": (Key("n", "act.record", "record one, or end the recording", "record"),),
+            "Macros": (Key("", "act.record", "record one, or end the recording", "record a macro"),),
         },
         ("page",),
     ),
@@ -214,24 +215,23 @@ SHEETS: dict[str, Sheet] = {
     ),
     "parameters": Sheet(
         "parameters",
-        "Every setting of the selected drive, with its value, its unit and its meaning. Enter edits the chosen one: "
-        "the value is checked, the lines are shown, and a second Enter sends them. The table is compared with the "
+        "Every setting of the selected drive, read when the page is opened. Type to narrow the list: a name, a "
+        "value, a meaning. Enter edits the chosen one: the value is checked, the lines are shown, and a second Enter sends them. The table is compared with the "
         "defaults, with a file, or with another drive, and marks what differs.",
         {
             "Settings": (
-                _STEP._replace(first=False),
-                _LEAP._replace(first=False),
-                Key("slash", "ask('search')", "search names, values and meanings", "search"),
-                Key("enter", "enter", "edit the chosen one; then send the lines that are shown", "edit"),
-                Key("r", "read", "read all of them again", "read"),
-                Key("S", "save", "the drive keeps its settings; asks", "save"),
+                _STEP,
+                _LEAP,
+                Key("enter", "", "edit the chosen one; then send the lines that are shown", "edit"),
+                Key("ctrl+s", "save", "the drive keeps its settings; asks", "save"),
+                Key("", "read", "every setting; changes nothing", "read again"),
             ),
             "Compare": (
-                Key("d", "defaults", "with the defaults, or with nothing", "default"),
-                Key("f", "ask('file')", "with a file of /params backup", "file"),
-                Key("a", "ask('drive')", "with another drive", "drive"),
-                Key("equals_sign", "differing", "show only what differs, or everything", "only diff"),
-                Key("v", "variables", "show the variables of the program alone, or everything", "variables"),
+                Key("", "defaults", "or with nothing", "compare with the defaults"),
+                Key("", "ask('file')", "one of /params backup", "compare with a file"),
+                Key("", "ask('drive')", "whose settings were read", "compare with another drive"),
+                Key("", "differing", "or everything", "show only what differs"),
+                Key("", "variables", "of the program alone, or everything", "show the variables"),
             ),
         },
         ("page",),
@@ -399,7 +399,7 @@ def bound(name: str) -> list[BindingType]:
     made: list[BindingType] = []
     for key in SHEETS[name].keys:
         for keys, action, function in key.single:
-            if action:
+            if action and (keys or function):
                 first = key.first or bool(function) or keys.startswith("ctrl+")
                 spelled = keys or f"{NONE}{function}"
                 about = key.about.replace("{}", function.rpartition("-")[2])
@@ -426,7 +426,10 @@ def below(name: str) -> list[str]:
 def footer(name: str) -> list[Key]:
     """The keys in the footer of a sheet, in order."""
     sheet = SHEETS[name]
-    own, others = [key for key in sheet.keys if key.word], sum((SHEETS[each].keys for each in below(name)), [])
+    own, others = (
+        [key for key in sheet.keys if key.word and key.keys],
+        sum((SHEETS[each].keys for each in below(name)), []),
+    )
     found: list[Key] = []
     for word in sheet.foot:
         found += own if word == "*" else [key for key in others if key.word == word][:1]

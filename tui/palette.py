@@ -34,6 +34,8 @@ class Command(NamedTuple):
     """Its key as shown, or the line to type instead."""
     urgent: bool = False
     """It comes before what was used lately."""
+    here: bool = False
+    """It is a function of the page in front."""
 
 
 class Switches(NamedTuple):
@@ -55,22 +57,30 @@ class Recent:
         self._actions = [command.action, *(each for each in self._actions if each != command.action)][:LATELY]
 
     def first(self, commands: Sequence[Command]) -> list[Command]:
-        """Order commands: the urgent ones, those used lately, all others."""
-        urgent = [each for each in commands if each.urgent]
-        lately = [each for action in self._actions for each in commands if each.action == action and not each.urgent]
+        """Order commands: the urgent ones, those of the page, those used lately, all others."""
+        urgent = [each for each in commands if each.urgent] + [each for each in commands if each.here]
+        lately = [each for action in self._actions for each in commands if each.action == action and each not in urgent]
         return [*urgent, *lately, *(each for each in commands if each not in urgent and each not in lately)]
 
 
 def all_commands(
-    session: Session, macros: FunctionKeys, verbs: Iterable[tuple[str, str, str]], keys: Keymap, switches: Switches
+    session: Session,
+    macros: FunctionKeys,
+    verbs: Iterable[tuple[str, str, str]],
+    keys: Keymap,
+    switches: Switches,
+    sheet: str = "",
 ) -> Iterator[Command]:
-    """Each function, the most urgent first."""
+    """Each function, the most urgent first; those of the page in front come next."""
     yield Command("Stop all", "every drive, macro and script, now", "app.stop_all", "^X", urgent=True)
     if session.latched:
         yield Command("Resume", "let macros and scripts run again", _line("/resume"), "/resume", urgent=True)
     if session.recording:
-        yield Command("End recording", f"keep {session.recording}", "act.record", "/record stop")
-    else:
+        yield Command("End recording", f"keep {session.recording}", "act.record", "/record stop", urgent=True)
+    for key in SHEETS[sheet].keys if sheet else ():
+        if key.word and key.action and " / " not in key.action and ".." not in key.keys:
+            yield Command(key.word.capitalize(), key.about, key.action, key.shown, here=True)
+    if not session.recording:
         yield Command("Record a macro", "what is typed from now on", "act.record", "/record NAME")
     log = "End the log" if session.log is not None else "Begin a log"
     about = (
@@ -228,8 +238,12 @@ def entries(sheet: str, keys: Keymap, macros: Iterable[Entry]) -> list[Entry]:
     groups = all_groups(sheet)
     near = groups.pop("Pages", [])
     for group, of_group in groups.items():
-        shown = [(keys.shown(each.name) if each.name else each.shown, each.about) for each in of_group]
-        found += [(group, ""), *(each for each in shown if each[0])]
+        found.append((group, ""))
+        for each in of_group:
+            if each.keys:
+                found.append((keys.shown(each.name) if each.name else each.shown, each.about))
+            elif not each.name:
+                found.append(("^P", f"{each.word}: {each.about}"))
     if near:
         here = f"page-{sheet}"
         found.append(("Near", ""))

@@ -30,7 +30,7 @@ from multidrop.tui.panels.drive import (
 from multidrop.tui.panels.view import NOT_REFERENCED, Glance, View, glances_of
 from multidrop.tui.readout import READ, SPAN, Point, Readout, State
 from multidrop.tui.text import age, fit
-from multidrop.tui.widgets.lines import Row, Span, spread, width_of
+from multidrop.tui.widgets.lines import Link, Row, Span, spread, width_of
 
 
 def spark(readout: Readout, now: float, width: int, value: Callable[[Point], int] = attrgetter("position")) -> str:
@@ -119,7 +119,8 @@ def _name(glance: Glance, axis: Readout, *, first: bool) -> Span:
     pointer = "▸" if glance.selected and first else " "
     name = f"{glance.address} {glance.label}".strip() or "drive"
     shown = f"{name} {axis.axis}".rstrip() if first else axis.axis.rjust(len(name) + 1 if axis.axis else 0)
-    return f"{pointer}{fit(shown, NAME - 1)} ", "accent" if glance.selected else "text"
+    text = Link(f"{pointer}{fit(shown, NAME - 1)} ", f"act.select({glance.address!r})")
+    return text, "accent" if glance.selected else "text"
 
 
 def _state_role(glance: Glance, now: float) -> str:

@@ -5,10 +5,9 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Awaitable, Sequence
 from dataclasses import replace
-from string import ascii_letters, digits
 from typing import ClassVar, NamedTuple
 
-from textual.binding import Binding, BindingType
+from textual.binding import BindingType
 
 from multidrop.dialects.text import visible
 from multidrop.shell.roles import Series
@@ -20,9 +19,9 @@ from multidrop.tui.panels.plot import plot_rows
 from multidrop.tui.panels.table import panel, title_row
 from multidrop.tui.panels.view import NOT_REFERENCED, Glance, View, glances_of
 from multidrop.tui.readout import State
-from multidrop.tui.screens.page import AskingPage, Host
+from multidrop.tui.screens.page import Host, ListPage
 from multidrop.tui.text import fit
-from multidrop.tui.widgets.lines import Row, Span, beside, in_view, spread, width_of
+from multidrop.tui.widgets.lines import Row, Span, beside, spread, width_of
 
 URGENCY = (
     *(State.LOST, State.SILENT, State.MOVING, State.DWELL, State.STORING, State.UNKNOWN),
@@ -142,19 +141,14 @@ def summary(places: Sequence[Place]) -> str:
     return " · ".join([*said, *(f"{counts[state]} {state.word}" for state in URGENCY if counts[state])])
 
 
-class AllDrives(AskingPage):
+class AllDrives(ListPage):
     """All drives. Enter selects one; what is typed filters."""
 
-    AUTO_FOCUS = ""
     SHEET = "drives"
-    BINDINGS: ClassVar[list[BindingType]] = [
-        *bound("drives"),
-        Binding("slash", "filter('')", show=False),
-        *(Binding(each, f"filter('{each}')", show=False) for each in ascii_letters + digits),
-    ]
+    BINDINGS: ClassVar[list[BindingType]] = bound("drives")
     WANTS = frozenset({"motion", "conditions"})
     PARTS = {"heading": None, "filter": None, "columns": None, "drives": "1fr", "chosen": 0}
-    FIELD = "filter"
+    FIELD, LIST = "filter", "drives"
 
     def __init__(self, host: Host) -> None:
         super().__init__(host)
@@ -169,18 +163,17 @@ class AllDrives(AskingPage):
         at = self._at()
         if self._chosen is None:
             self.action_step(0)  # it stays the chosen one when another gets worse
-        rows, width = self.lines("drives"), self.size.width
-        below = self.lines("chosen")
+        now, width = view.now, self.size.width
+        part = self.lines("chosen")
         drives = sum(len(bus.drives) for bus in view.session.buses.values())
         room = self.size.height - HEAD - max(FEWEST, drives)
         room = room if width >= WIDE and room >= LEAST else 0
-        if below.styles.height is None or below.styles.height.value != room:
-            below.styles.height = room
-        below.put(self._chosen_rows(view, at, width, room) if room and self._places else [])
-        shown = in_view(self._places, at, rows.size.height)
-        rows.put([drive_row(place, view.now, width, n == at) for n, place in shown] or [_NOTHING])
+        if part.styles.height is None or part.styles.height.value != room:
+            part.styles.height = room
+        part.put(self._chosen_rows(view, at, width, room) if room and self._places else [])
+        below = self.put_rows(self._places, at, lambda place, chosen: drive_row(place, now, width, chosen), [_NOTHING])
         heading: Row = ((" ALL DRIVES   ", "strong"), (summary(self._places), "text"))
-        self.lines("heading").put([spread(heading, [("worst first ", "dim")], width)])
+        self.lines("heading").put([spread(heading, [below, ("worst first ", "dim")], width)])
         self.lines("columns").put([columns_row(width)])
 
     def _chosen_rows(self, view: View, at: int, width: int, height: int) -> list[Row]:
@@ -199,13 +192,12 @@ class AllDrives(AskingPage):
 
     def action_step(self, by: int) -> None:
         if self._places:
-            place = self._places[min(max(self._at() + by, 0), len(self._places) - 1)]
-            self._chosen = (place.bus, place.glance.address)
+            self.choose(min(max(self._at() + by, 0), len(self._places) - 1))
 
-    def action_filter(self, typed: str) -> None:
-        """Show the filter and type into it: a letter or `/` begins it."""
-        self.ask_for(self.field.value + typed, "filter")
-        self.field.cursor_position = len(self.field.value)
+    def choose(self, at: int) -> None:
+        """Choose a row by its place."""
+        if at < len(self._places):
+            self._chosen = (self._places[at].bus, self._places[at].glance.address)
 
     def typed(self, text: str) -> Awaitable[None]:
         return self.action_take()
@@ -218,13 +210,6 @@ class AllDrives(AskingPage):
         ]
         chosen = (named or self._places)[:1]
         self._chosen = (chosen[0].bus, chosen[0].glance.address) if chosen else None
-
-    def action_leave(self) -> None:
-        """Leave the filter, then the page."""
-        if self.field.display:
-            self.end_asking()
-            return
-        super().action_leave()
 
     async def action_take(self) -> None:
         """Select the drive; one in trouble is shown with the reason, any other on the main screen."""

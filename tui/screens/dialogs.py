@@ -64,6 +64,18 @@ class Options(OptionList):
         super().__init__(*(Option(Text(visible(each)) if isinstance(each, str) else each) for each in options), id=id)
         self._taken = taken
 
+    def watch_scroll_y(self, old: float, new: float) -> None:
+        super().watch_scroll_y(old, new)
+        self.tell_below()
+
+    def on_resize(self) -> None:
+        self.tell_below()
+
+    def tell_below(self) -> None:
+        """Have the box say how many rows are below."""
+        if isinstance(self.screen, Over):
+            self.screen.say_below(round(self.max_scroll_y - self.scroll_y))
+
     def action_select(self) -> None:
         number = self.highlighted
         if number is not None and not self.get_option_at_index(number).disabled:
@@ -75,6 +87,14 @@ class Over(ModalScreen[T], Generic[T]):
 
     SHEET: ClassVar[str] = "box"
     BINDINGS: ClassVar[list[BindingType]] = bound("box")
+
+    hint = ""
+    """The keys at the foot of the box."""
+
+    def say_below(self, rows: int) -> None:
+        """Show how many rows of the list are below, beside the keys."""
+        for keys in self.query(".keys").results(Static):
+            keys.update(f"{self.hint}{f'   ▼ {rows} below' if rows > 0 else ''}" if self.hint else keys.content)
 
     def on_mount(self) -> None:
         if self.is_attached:  # else it is closed already, as the app ends
@@ -238,6 +258,7 @@ class Search(Dialog[str]):
         options.clear_options()
         options.add_options([Option(match.text) for match in self.found] or [Option("nothing matches", disabled=True)])
         options.highlighted = 0 if self.found else None
+        options.call_after_refresh(options.tell_below)
 
     def action_step(self, by: int) -> None:
         options = self.query_one(Options)

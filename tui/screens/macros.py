@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Sequence
-from string import ascii_letters, digits
 from typing import ClassVar, NamedTuple
 
-from textual.binding import Binding, BindingType
+from textual.binding import BindingType
 
 from multidrop.dialects import Diagnostic
 from multidrop.macros import Macro, MacroStore
@@ -15,7 +14,7 @@ from multidrop.shell.playing import Playing
 from multidrop.tui.key_table import bound
 from multidrop.tui.panels.view import View
 from multidrop.tui.screens.dialogs import Ask, Confirm
-from multidrop.tui.screens.page import Host, Page
+from multidrop.tui.screens.page import Host, ListPage
 from multidrop.tui.screens.program_rows import news_rows, rule
 from multidrop.tui.text import fit, visible
 from multidrop.tui.widgets.lines import Row, in_view, spread
@@ -25,8 +24,10 @@ NEWS = 3
 """Lines of the transcript below the macros."""
 NOTHING: tuple[Row, ...] = (
     ((" no macro yet", "dim"),),
-    ((" n records one: what you type is kept, with the pauses between the lines", "dim"),),
+    ((" ^P, record a macro: what you type is kept, with the pauses between the lines", "dim"),),
 )
+
+_NONE: tuple[Row, ...] = (((" no macro has that", "dim"),),)
 
 
 class Listed(NamedTuple):
@@ -42,6 +43,11 @@ class Listed(NamedTuple):
         if self.macro is None or not self.macro.key:
             return "-"
         return self.macro.key if self.macro.page == "1" else f"{self.macro.key}.{self.macro.page}"
+
+    @property
+    def words(self) -> str:
+        """What narrows the list."""
+        return f"{self.name} {self.place} {self.macro.note if self.macro is not None else ''}".casefold()
 
 
 def listed(store: MacroStore) -> list[Listed]:
@@ -96,27 +102,23 @@ def step_rows(each: Listed, playing: Playing | None, width: int, height: int) ->
 ENTER = "enter"
 
 
-class MacrosPage(Page):
-    """The macros. Enter plays the chosen one.
+class MacrosPage(ListPage):
+    """The macros. Enter plays the chosen one that is shown, or the one whose whole name was typed."""
 
-    A letter or a digit that is no key here leaves none chosen: a name that is typed plays no other macro.
-    """
-
-    AUTO_FOCUS = ""
     SHEET = "macros"
-    BINDINGS: ClassVar[list[BindingType]] = [
-        *bound("macros"),
-        *(Binding(each, "unchoose", show=False) for each in ascii_letters + digits if each not in "ekns"),
-    ]
+    BINDINGS: ClassVar[list[BindingType]] = bound("macros")
+    FIELD, LIST = "filter", "macros"
     WANTS = frozenset({"motion"})
-    PARTS = {"heading": None, "macros": "1fr", "steps": None, "news": NEWS + 1}
+    PARTS = {"heading": None, "filter": None, "macros": "1fr", "steps": None, "news": NEWS + 1}
 
     def __init__(self, host: Host) -> None:
         super().__init__(host)
         self._macros: list[Listed] = []
+        self._shown: list[Listed] = []
+        """Those that have what was typed."""
         self._at = 0
-        self._typed = False
-        """What was typed is no key here: none is chosen until an arrow chooses one."""
+        self._painted = False
+        """The rows were shown as they are."""
         self._read_for: object = None
         """The facts of the app at the last reading: it makes new ones whenever a macro may have changed."""
         self._reading = self._known = False
@@ -129,25 +131,28 @@ class MacrosPage(Page):
             self.run_worker(self._read())
         width, height = self.size.width, max(2, self.size.height - NEWS - 5)
         playing = {each.name: each for each in view.session.playing}
-        self._at = min(self._at, max(0, len(self._macros) - 1))
-        enter = "↑↓ choose one; nothing plays " if self._typed else "Enter plays "
-        recording = f"● recording {view.session.recording}: n ends it " if view.session.recording else enter
-        heading: Row = ((" MACROS   ", "strong"), (f"{len(self._macros)}", "text"))
-        self.lines("heading").put(
-            [spread(heading, [(recording, "motion" if view.session.recording else "dim")], width)]
-        )
-        room = min(max(len(self._macros), 2), height // 2)
+        self.edited(self.words)
         chosen = self._chosen()
-        shown = in_view(self._macros, self._at, room)
-        rows = [macro_row(each, playing.get(each.name), width, each is chosen) for _, each in shown]
-        self.lines("macros").put(rows or (NOTHING if self._known else []))
-        self._show_steps(playing, width, height - room)
+        room = min(max(len(self._shown), 2), height // 2)
+        below = self.put_rows(
+            self._shown,
+            self._at,
+            lambda each, is_chosen: macro_row(each, playing.get(each.name), width, is_chosen),
+            (NOTHING if not self._macros else _NONE) if self._known else [],
+            room,
+        )
+        recording = f"● recording {view.session.recording}: /record stop ends it " if view.session.recording else ""
+        heading: Row = ((" MACROS   ", "strong"), (f"{len(self._shown)} of {len(self._macros)}", "text"))
+        self.lines("heading").put(
+            [spread(heading, [below, (recording or "Enter plays ", "motion" if recording else "dim")], width)]
+        )
+        self._painted = self.host.keyboard.idle
+        self._show_steps(chosen, playing, width, height - room)
         wall = view.session.wall
         records = news_rows(self.host.last_records(NEWS), lambda at: f"{wall(at):%H:%M:%S}", width)
         self.lines("news").put([rule("transcript", width), *records])
 
-    def _show_steps(self, playing: dict[str, Playing], width: int, room: int) -> None:
-        chosen = self._chosen()
+    def _show_steps(self, chosen: Listed | None, playing: dict[str, Playing], width: int, room: int) -> None:
         rows: list[Row] = []
         if chosen is not None:
             rows.append(rule(visible(chosen.name), width))
@@ -160,23 +165,42 @@ class MacrosPage(Page):
         try:
             name = chosen.name if (chosen := self._chosen()) is not None else ""
             self._macros = await asyncio.to_thread(listed, self.host.session.macros)
-            names, self._known = [each.name for each in self._macros], True
+            self._known = True
+            self.edited(self.words)
+            names = [each.name for each in self._shown]
             self._at = names.index(name) if name in names else self._at
         finally:
             self._reading = False
 
     def _chosen(self) -> Listed | None:
-        return self._macros[self._at] if self._at < len(self._macros) and not self._typed else None
+        return self._shown[self._at] if self._at < len(self._shown) else None
 
     # Keys
 
-    def action_step(self, by: int) -> None:
-        """Choose another macro; after letters the one that was chosen before them."""
-        by, self._typed = 0 if self._typed else by, False
-        self._at = min(max(self._at + by, 0), max(0, len(self._macros) - 1))
+    def edited(self, text: str) -> None:
+        """Keep the macros that have every typed word in name, key or note; one with just that name is chosen."""
+        words, before = text.casefold().split(), self._shown
+        self._shown = [each for each in self._macros if all(word in each.words for word in words)]
+        if self._shown != before:
+            self._painted = False
+            named = [n for n, each in enumerate(self._shown) if each.name == text]
+            self._at = named[0] if named else 0 if words else self._at
+        self._at = min(self._at, max(0, len(self._shown) - 1))
 
-    def action_unchoose(self) -> None:
-        self._typed = True
+    def choose(self, at: int) -> None:
+        self._at = at
+
+    async def action_clicked(self, at: int) -> None:
+        """Choose a row. A click plays nothing."""
+        self.choose(at)
+
+    def action_step(self, by: int) -> None:
+        self._at = min(max(self._at + by, 0), max(0, len(self._shown) - 1))
+
+    def typed(self, text: str) -> None:
+        """Play the chosen macro, if it was shown; an Enter that was typed ahead plays only a whole name."""
+        if (chosen := self._chosen()) is not None and (self._painted or chosen.name == text):
+            self.action_play()
 
     def _type(self, *words: str) -> None:
         self.host.outbox.type(" ".join(words))

@@ -30,7 +30,7 @@ from multidrop.tui.terminal.canvas import FrontCompositor
 from multidrop.tui.terminal.keyboard import Keyboard
 from multidrop.tui.texts import Texts
 from multidrop.tui.widgets.bars import Banner, Footer, TopLine
-from multidrop.tui.widgets.lines import Lines, Span
+from multidrop.tui.widgets.lines import Lines, Link, Row, Span, T, in_view
 
 
 class Framed(Screen[None]):
@@ -173,6 +173,75 @@ class AskingPage(Page):
     def overtaken(self, begun: Begun) -> bool:
         """True if a stop, or another drive, came since something was begun."""
         return begun[1:3] != (self.host.session.stops, self.host.session.place)
+
+
+class ListPage(AskingPage):
+    """A page of rows to choose from: typing narrows them, arrows and the wheel choose, Enter and a click take one."""
+
+    LIST: ClassVar[str] = ""
+    """The name of the rows among the parts."""
+
+    def content(self) -> ComposeResult:
+        """Make the parts; the line that narrows the rows is always there."""
+        for part in super().content():
+            part.display = True
+            yield part
+
+    def on_mount(self) -> None:
+        """Show what failed on this page alone, and take what is typed."""
+        self.host.model.trouble = ""
+        self.end_asking()
+
+    def end_asking(self) -> None:
+        """Narrow again with what was typed for that."""
+        self.field.value, self.field.placeholder = self.words, "type to narrow"
+        self.field.cursor_position = len(self.words)
+        self.set_focus(self.field)
+
+    @property
+    def words(self) -> str:
+        """What narrows the rows."""
+        return self.field.value
+
+    def put_rows(
+        self,
+        items: Sequence[T],
+        at: int,
+        row: Callable[[T, bool], Row],
+        nothing: Sequence[Row],
+        height: int | None = None,
+    ) -> Span:
+        """Show the rows around the chosen one; return how many are below them."""
+        part = self.lines(self.LIST)
+        shown = in_view(items, at, part.size.height if height is None else height)
+        rows = [_linked(row(each, number == at), number) for number, each in shown]
+        part.put(rows or nothing)
+        below = len(items) - shown[-1][0] - 1 if shown else 0
+        return f"▼ {below} below " if below else "", "strong"
+
+    def choose(self, at: int) -> None:
+        """Choose a row by its place."""
+        raise NotImplementedError
+
+    def action_step(self, by: int) -> None:
+        """Choose another row."""
+        raise NotImplementedError
+
+    def on_mouse_scroll_down(self) -> None:
+        self.action_step(1)
+
+    def on_mouse_scroll_up(self) -> None:
+        self.action_step(-1)
+
+    async def action_clicked(self, at: int) -> None:
+        """Choose a row and take it."""
+        self.choose(at)
+        await self.field.action_submit()
+
+
+def _linked(row: Row, number: int) -> Row:
+    text, role = row[0]
+    return (Link(text, f"screen.clicked({number})"), role), *row[1:]
 
 
 class PageEntry(NamedTuple):

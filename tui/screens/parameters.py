@@ -22,9 +22,9 @@ from multidrop.shell.params.page import Row as Setting
 from multidrop.tui.key_table import bound
 from multidrop.tui.panels.table import column_rows, panel
 from multidrop.tui.panels.view import Glance, View, name_of
-from multidrop.tui.screens.page import AskingPage, Begun, Host
+from multidrop.tui.screens.page import Begun, Host, ListPage
 from multidrop.tui.text import age, fit
-from multidrop.tui.widgets.lines import Row, Span, in_view, spread
+from multidrop.tui.widgets.lines import Row, Span, spread
 
 NAME, VALUE, UNIT = 8, 16, 10
 TOLD = ("range", "value", "values", "note")
@@ -68,11 +68,7 @@ class SettingsTable:
     def compare(self, name: str, values: dict[str, Value]) -> None:
         self.other, self.at = (name, values), 0
 
-    def rows(self, width: int, height: int, units: Callable[[str, Value], str]) -> list[Row]:
-        """The rows in view; `units`: a value in units, to follow it."""
-        return [self._row(each, width, n == self.at, units) for n, each in in_view(self.shown, self.at, height)]
-
-    def heading(self, view: View, glance: Glance | None, width: int) -> Row:
+    def heading(self, view: View, glance: Glance | None, width: int, below: Span) -> Row:
         """The drive, how many settings are shown, and when they were read."""
         name = f"{view.session.selected_bus}:{name_of(glance)}" if glance is not None else "no drive selected"
         left: list[Span] = [(" PARAMETERS   ", "strong"), (name, "accent")]
@@ -81,14 +77,13 @@ class SettingsTable:
         left.append((f"   {len(self.shown)} of {len(self.found.readings)}", "text"))
         overtaken = glance.readout.touched > glance.readout.settings_at
         ago = f"read {age(view.now - glance.readout.settings_at)} ago{', lines were sent since' if overtaken else ''} "
-        return spread(left, [(ago, "strong" if overtaken else "dim")], width)
+        return spread(left, [below, (ago, "strong" if overtaken else "dim")], width)
 
     def columns(self, width: int) -> Row:
-        """The names of the columns, and what is searched."""
+        """The names of the columns, and what is shown."""
         other = f"{fit(self.other[0], VALUE).strip():>{VALUE}} " if self.other is not None else ""
         only = "  only what differs" if self.only_differing else ""
-        search = f"  search: {self.words}" if self.words else ""
-        text = f"   {fit('name', NAME)} {'value':>{VALUE}} {fit('unit', UNIT)} {other}{only}{search}"
+        text = f"   {fit('name', NAME)} {'value':>{VALUE}} {fit('unit', UNIT)} {other}{only}"
         return ((fit(text, width), "dim"),)
 
     def about(self, drive: Drive | None) -> str:
@@ -102,7 +97,7 @@ class SettingsTable:
         except Diagnostic:
             return f"{row.reading.name} {row.meaning}"
 
-    def _row(self, row: Setting, width: int, chosen: bool, units: Callable[[str, Value], str]) -> Row:
+    def row(self, row: Setting, width: int, chosen: bool, units: Callable[[str, Value], str]) -> Row:
         there: list[Span] = []
         if self.other is not None:
             there.append((f"{_aligned(row.other or '–')} ", "strong" if row.differs else "dim"))
@@ -128,25 +123,23 @@ def _aligned(text: str) -> str:
     return f"{fit(shown, VALUE).strip():>{VALUE}}"
 
 
-SEARCH, FILE, DRIVE, EDIT = "search", "file", "drive", "value"
+FILE, DRIVE, EDIT = "file", "drive", "value"
 READING = "reading; the footer shows how far"
 ASKS = {
-    SEARCH: "letters of a name, a value or a meaning",
     FILE: "a file of settings, from /params backup",
     DRIVE: "the address of another drive, whose settings /params read has read",
     EDIT: "a value, or fields with commas; Enter shows the lines, Esc changes nothing",
 }
 
 
-class ParametersPage(AskingPage):
+class ParametersPage(ListPage):
     """All settings of the selected drive."""
 
-    AUTO_FOCUS = ""
     SHEET = "parameters"
     BINDINGS: ClassVar[list[BindingType]] = bound("parameters")
     WANTS = frozenset({"motion"})
-    PARTS = {"heading": None, "columns": None, "table": "1fr", "meaning": None, "asked": None, "said": None}
-    FIELD = "asked"
+    PARTS = {"heading": None, "asked": None, "columns": None, "table": "1fr", "meaning": None, "said": None}
+    FIELD, LIST = "asked", "table"
 
     def __init__(self, host: Host) -> None:
         super().__init__(host)
@@ -155,14 +148,17 @@ class ParametersPage(AskingPage):
         self._pending: Begun | None = None
         self._painted = False
         """The pending lines were shown."""
+        self._asked_for = False
+        """The settings were asked for, as nobody had read them."""
         self._reading = False
         """The settings are to be read again once no line runs or waits."""
         self._place = host.session.place
         self._glance: Glance | None = None
 
-    def on_mount(self) -> None:
-        """Hide the field until it is needed; what failed before is not the page's."""
-        self.host.model.trouble = ""
+    @property
+    def words(self) -> str:
+        """What narrows the rows."""
+        return self._table.words
 
     # What is shown
 
@@ -175,7 +171,7 @@ class ParametersPage(AskingPage):
         # Forget what was begun before a stop, or for another drive.
         place = view.session.place
         if place != self._place:
-            self._place, self._table = place, SettingsTable()
+            self._place, self._table, self._asked_for = place, SettingsTable(), False
             self._close("")
         begun = [each for each in (self._asked, self._pending) if each is not None]
         if any(each.stops != view.session.stops for each in begun):
@@ -186,12 +182,21 @@ class ParametersPage(AskingPage):
         if self._reading and self.host.outbox.idle:
             self._reading = False
             self.host.outbox.type("/params read")
-        width, lines, drive = self.size.width, self.lines("table"), self.host.session.selected
+        width, drive = self.size.width, self.host.session.selected
+        if self._glance is not None and self._settings() is None and not self._asked_for and self.host.outbox.idle:
+            self._asked_for = True
+            self.action_read()
         if self.said[0] == READING and self._table.found is not self._settings():
             self.say("", "dim")
         self._table.make(self._settings(), drive)
-        lines.put(self._table.rows(width, max(0, lines.size.height), self._in_units) or self._nothing(view))
-        self.lines("heading").put([self._table.heading(view, self._glance, width)])
+        table = self._table
+        below = self.put_rows(
+            table.shown,
+            table.at,
+            lambda row, chosen: table.row(row, width, chosen, self._in_units),
+            self._nothing(view),
+        )
+        self.lines("heading").put([table.heading(view, self._glance, width, below)])
         self.lines("columns").put([self._table.columns(width)])
         self.lines("meaning").put([((f" {fit(self._table.about(drive), width - 2)}", "dim"),)])
         self.lines("said").put([((f" {fit(self.said[0], width - 2)}", self.said[1]),)])
@@ -206,14 +211,28 @@ class ParametersPage(AskingPage):
         if self._settings() is None:
             room = self.lines("table").size
             known = column_rows([[panel("drive")], [panel("cards")]], view, room.width, max(0, room.height - 2), False)
-            return [((" not read yet: r reads every setting; nothing is changed by it", "strong"),), (), *known]
+            return [
+                ((" not read yet: ^P, read again, reads every setting; nothing is changed by it", "strong"),),
+                (),
+                *known,
+            ]
         return [((" nothing differs" if self._table.only_differing else " no setting has that", "dim"),)]
 
     # Keys
 
+    def choose(self, at: int) -> None:
+        if self._pending is None and self._asked is None:
+            self._table.at = at
+
     def action_step(self, by: int) -> None:
-        if self._pending is None:
+        if self._pending is None and self._asked is None:
             self._table.step(by)
+
+    async def action_clicked(self, at: int) -> None:
+        """Choose a setting and edit it. A click sends nothing."""
+        if self._pending is None and self._asked is None:
+            self.choose(at)
+            self.action_enter()
 
     def action_read(self) -> None:
         if self._glance is None:
@@ -232,25 +251,26 @@ class ParametersPage(AskingPage):
             table.other = ("default", found.defaults)
         else:
             self.say(
-                "the defaults of its settings are not known" if found is not None else "r reads the settings first"
+                "the defaults of its settings are not known" if found is not None else "its settings are not read yet"
             )
 
     def action_differing(self) -> None:
         """Show only what differs, or everything."""
         table = self._table
         if table.other is None:
-            self.say("d, f or a chooses what to compare with first")
+            self.say("choose first what to compare with: ^P, compare")
         else:
             table.only_differing, table.at = not table.only_differing, 0
 
     def action_variables(self) -> None:
         """Show the variables of the program alone, or everything."""
-        self._table.words = "" if self._table.words == VARIABLES else VARIABLES
+        self.field.value = "" if self.field.value == VARIABLES else VARIABLES
 
     def action_ask(self, kind: str, name: str = "", value: str = "") -> None:
         self._pending = None
         self._asked = self.begin(kind, name)
-        self.ask_for(self._table.words if kind == SEARCH else value, ASKS[kind])
+        self.ask_for(value, ASKS[kind])
+        self.field.select_all()
         self.say(f"{name}: {ASKS[kind]}" if name else ASKS[kind], "dim")
 
     def action_enter(self) -> None:
@@ -278,8 +298,6 @@ class ParametersPage(AskingPage):
 
     def action_leave(self) -> None:
         """Leave the field or the pending lines, then the page."""
-        if self._asked is not None and self._asked.kind == SEARCH:
-            self._table.words = ""
         if self._asked is not None or self._pending is not None:
             self._close("nothing was sent" if self._asked is None or self._asked.kind == EDIT else "")
             return
@@ -288,18 +306,19 @@ class ParametersPage(AskingPage):
     # What is typed
 
     def edited(self, text: str) -> None:
-        """Search while the words are typed."""
-        if self._asked is not None and self._asked.kind == SEARCH:
+        """Narrow while the words are typed; lines that wait for Enter are dropped."""
+        if self._asked is None and text != self._table.words:
             self._table.words, self._table.at = text, 0
+            if self._pending is not None:
+                self._close("nothing was sent")
 
     def typed(self, text: str) -> None:
         asked = self._asked
-        if asked is None or self.overtaken(asked):
-            self._close("it was not used")
+        if asked is None:
+            self.action_enter()
             return
-        if asked.kind == SEARCH:
-            self._table.words = text
-            self._close("")
+        if self.overtaken(asked):
+            self._close("it was not used")
             return
         try:
             taken = {FILE: self._file, DRIVE: self._drive, EDIT: self._value}[asked.kind]

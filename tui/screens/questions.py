@@ -168,11 +168,11 @@ def _place_of(key: str) -> tuple[str, str]:
 
 
 def drive_choices(session: Session, glances: Callable[[Bus], list[Glance]]) -> tuple[list[Offer], str]:
-    """Every drive of every bus, and the key of the selected one. A key is the bus, a line feed, the address."""
+    """Every drive of every bus, the selected bus first, and the key of the selected one: bus, line feed, address."""
     now = session.now()
     options: list[Offer] = []
     current = ""
-    for bus in session.buses.values():
+    for bus in sorted(session.buses.values(), key=lambda bus: bus.name != session.selected_bus):
         for glance in glances(bus):
             key = f"{bus.name}\n{glance.address}"
             current = key if glance.selected else current

@@ -74,7 +74,8 @@ class Start(Over[None]):
             options = Options((), self._taken, id="places")
             options.can_focus = False
             yield options
-            yield Static(f"{hint('start')}   {'^Q quit' if self.only else ''}", classes="keys", markup=False)
+            self.hint = hint("start").replace("Esc close", "^Q quit" if self.only else "Esc close")
+            yield Static(self.hint, classes="keys", markup=False)
 
     def on_mount(self) -> None:
         """Show what is known at once; add the ports when they are found."""

@@ -13,6 +13,7 @@ from typing import TypeVar
 from rich.cells import cell_len
 from rich.segment import Segment
 from rich.style import Style
+from textual import events
 from textual.geometry import Region, Size
 from textual.strip import Strip
 from textual.widget import Widget
@@ -29,6 +30,17 @@ MOST_STRIPS = 500
 SERIES = ("series1", "series2", "series3", "series4", "series5", "series6")
 """The roles of curves."""
 ROLES = ("text", "strong", "dim", "accent", "focus", "found", "motion", "error", "stop", "key", "rule", *SERIES)
+
+
+class Link(str):
+    """A text with an action, which a click anywhere on its row runs."""
+
+    action: str
+
+    def __new__(cls, text: str, action: str) -> Link:
+        link = super().__new__(cls, text)
+        link.action = action
+        return link
 
 
 def width_of(row: Sequence[Span]) -> int:
@@ -146,6 +158,14 @@ class Lines(Widget):
     def render_line(self, y: int) -> Strip:
         rows = self.shown()
         return self.strip(rows[y] if y < len(rows) else (), self.size.width)
+
+    def _action_at(self, y: int) -> str:
+        row = self.rows[y] if y < len(self.rows) else ()
+        return next((text.action for text, _ in row if isinstance(text, Link)), "")
+
+    async def on_click(self, event: events.Click) -> None:
+        if action := self._action_at(event.y):
+            await self.run_action(action)
 
     @property
     def plain(self) -> str:
