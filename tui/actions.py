@@ -55,6 +55,8 @@ class Actions:
 
     def __init__(self, parts: Parts) -> None:
         self._parts = parts
+        self._key = ""
+        """The function key that the last recording was begun for."""
 
     def check_action(self, action: str, parameters: tuple[object, ...]) -> bool:
         """True if an action is possible: Escape ends the tour unless it closes something."""
@@ -193,9 +195,20 @@ class Actions:
             parts.show_line(clash, "x")
         elif name is not None:
             await self.action_run_line(f"/play {name}")
+        elif parts.session.recording:
+            self._end_recording(key, parts.session.recording)
         else:
-            page = f" --page {macros.page}" if macros.place else ""
-            parts.show_line(f"{key} plays nothing; /key {key} NAME{page} puts a macro on it", ".")
+            self._key = key
+            await parts.questions.macro_name(lambda name: self.action_run_line(f"/record {name}"), key)
+
+    def _end_recording(self, key: str, name: str) -> None:
+        """End the recording that was begun on a key, and put it there; another key ends none."""
+        macros = self._parts.macros
+        if key == self._key:
+            self._parts.outbox.type("/record stop")
+            self._parts.outbox.type(f"/key {key} {name}{f' --page {macros.page}' if macros.place else ''}")
+        else:
+            self._parts.show_line(f"{key} plays nothing; /record stop ends the recording of {name}", ".")
 
     def action_macro_page(self) -> None:
         macros = self._parts.macros

@@ -181,7 +181,7 @@ SHEETS: dict[str, Sheet] = {
                 Key("ctrl+e", "edit", "edit its file", "edit"),
                 Key("ctrl+k", "key", "put it on a key", "key"),
                 Key("delete", "delete", "delete its file; asks", "delete", first=True),
-                Key("", "end", "end it, wherever it is", "end the chosen one"),
+                Key("ctrl+b,insert", "end", "end it, if it plays", "hold"),
             ),
             "Macros": (Key("", "act.record", "record one, or end the recording", "record a macro"),),
         },
@@ -215,9 +215,9 @@ SHEETS: dict[str, Sheet] = {
     ),
     "parameters": Sheet(
         "parameters",
-        "Every setting of the selected drive, read when the page is opened. Type to narrow the list: a name, a "
-        "value, a meaning. Enter edits the chosen one: the value is checked, the lines are shown, and a second Enter sends them. The table is compared with the "
-        "defaults, with a file, or with another drive, and marks what differs.",
+        "Every setting of the selected drive, read when it is opened. Type to narrow the list: a name, a value, a "
+        "meaning. Enter edits the chosen one: the value is checked, the lines are shown, and a second Enter sends "
+        "them. The table is compared with the defaults, with a file, or with another drive, and marks what differs.",
         {
             "Settings": (
                 _STEP,

@@ -11,7 +11,7 @@ from multidrop.transports import TransportLost
 from multidrop.tui.outbox import BURST
 from multidrop.tui.polling import LIVELY, OTHERS, PLOT, REST, STATUS
 from multidrop.tui.readout import State
-from multidrop.tui.screens.dialogs import Choose, Confirm, Offer, TooSmall, offers_like
+from multidrop.tui.screens.dialogs import Ask, Choose, Confirm, Offer, TooSmall, offers_like
 from multidrop.tui.screens.start import Start
 from tests.support.fake_session import (
     FakeBus,
@@ -146,12 +146,17 @@ async def test_pasted_lines_after_one_that_failed_are_not_sent() -> None:
         assert "'BAD' failed; 2 lines were not sent: MR 1 · MR 2" in app.main.page("press").plain
 
 
-async def test_a_function_key_plays_its_macro_and_a_free_one_says_how_to_use_it() -> None:
+async def test_a_function_key_plays_its_macro_and_a_free_one_records_one_for_it() -> None:
     async with on_screen(width=100) as (pilot, app, session):
         await settle(pilot)
         await press(pilot, "f3", "f7")
         assert session.lines == [("/play shuttle", By.OPERATOR)]
-        assert "F7 plays nothing" in app.main.page("press").plain
+        assert isinstance(app.screen, Ask) and app.screen.heading.startswith("F7 plays nothing yet")
+        await press(pilot, *"go", "enter", "f8")
+        assert "F8 plays nothing; /record stop ends the recording of go" in app.main.page("press").plain
+        session.time += 1
+        await press(pilot, "f7")
+        assert [line for line, _ in session.lines[1:]] == ["/record go", "/record stop", "/key F7 go"]
         assert "F3 shuttle" in app.main.lines("footer").plain
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+from collections import defaultdict
 from collections.abc import Iterable
 from pathlib import Path
 
@@ -30,6 +31,19 @@ def single_keys(name: str) -> list[tuple[str, str]]:
 def test_the_table_in_the_documentation_is_the_table_of_the_program() -> None:
     page = key_docs.PAGE.read_text(encoding="utf-8")
     assert key_docs.written(page) == page, "python -m tests.support.key_docs writes it anew"
+
+
+def test_a_letter_and_a_key_with_ctrl_have_the_same_word_wherever_they_work() -> None:
+    words: dict[str, set[str]] = defaultdict(set)
+    for sheet in SHEETS.values():
+        for each in sheet.keys:
+            if each.word and key_docs.kind(each) != "other":
+                words[key_docs.spelled(each)].add(each.word)
+    assert {keys: found for keys, found in words.items() if len(found) > 1} == {}
+
+
+def test_no_capital_is_a_key() -> None:
+    assert [key for name in SHEETS for key, _ in single_keys(name) if len(key) == 1 and key != key.lower()] == []
 
 
 def test_the_prefixes_of_screen_and_tmux_have_an_alternative() -> None:

@@ -33,7 +33,7 @@ async def test_enter_selects_a_drive_without_trouble_and_goes_back() -> None:
         session.emit(*a_move(session))
         await press(pilot, "ctrl+a")
         session.select("b", "press")
-        await press(pilot, "slash", *"gantry")
+        await press(pilot, *"gantry")
         assert len(rows(app)) == 1
         await press(pilot, "enter")
         assert app.screen is app.main

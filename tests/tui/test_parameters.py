@@ -97,17 +97,21 @@ async def opened(pilot: Pilot[int], session: FakeSession, found: Readings | None
     return page
 
 
+DEFAULTS = ("ctrl+p", *"with the defaults", "enter")
+DIFFERING = ("ctrl+p", *"only what", "enter")
+
+
 def names(page: ParametersPage) -> list[str]:
     return [row.lstrip("▸ ≠").split()[0] for row in page.lines("table").plain.split("\n") if row.strip()]
 
 
 @at_screen
-async def test_settings_are_read_when_asked_for() -> None:
+async def test_settings_are_read_when_the_page_opens_and_again_by_name() -> None:
     async with on_screen() as (pilot, _, session):
         page = await opened(pilot, session, None)
-        assert "r reads every setting" in page.lines("table").plain
-        await press(pilot, "r")
-        assert session.sent == ["press:a /params read"]
+        assert "not read yet" in page.lines("table").plain and session.sent == ["press:a /params read"]
+        await press(pilot, "ctrl+p", *"read again", "enter")
+        assert session.sent == ["press:a /params read"] * 2
 
 
 @at_screen
@@ -115,11 +119,11 @@ async def test_search_compare_and_differences_only() -> None:
     async with on_screen() as (pilot, _, session):
         page = await opened(pilot, session)
         assert names(page) == ["A", "MS", "VI", "VM", "IS1", "DN", "Q1"]
-        await press(pilot, "d", "equals_sign")
+        await press(pilot, *DEFAULTS, *DIFFERING)
         assert names(page) == ["VM", "IS1"]
-        await press(pilot, "slash", *"vm", "enter")
+        await press(pilot, *"vm")
         assert names(page) == ["VM"] and "768000" in page.lines("table").plain
-        await press(pilot, "equals_sign", "v")
+        await press(pilot, "ctrl+u", *DIFFERING, "ctrl+p", *"variables", "enter")
         assert names(page) == ["Q1"]
         assert session.sent == []
 
@@ -138,8 +142,8 @@ async def test_values_are_followed_by_what_they_are_in_units() -> None:
 async def test_a_value_is_checked_then_shown_then_sent_and_read_again() -> None:
     async with on_screen() as (pilot, _, session):
         page = await opened(pilot, session)
-        await press(pilot, "slash", *"vm", "enter", "enter")
-        await press(pilot, *["backspace"] * 6, *"10", "enter")
+        await press(pilot, *"vm", "enter")
+        await press(pilot, *"10", "enter")
         assert "nothing was sent" in page.lines("said").plain and session.sent == []
         await press(pilot, *["backspace"] * 2, *"500000", "enter")
         assert "Enter sends VM=500000" in page.lines("said").plain and session.sent == []
@@ -166,13 +170,13 @@ async def test_a_file_and_another_drive_to_compare_with(tmp_path: Path) -> None:
     (tmp_path / "a.toml").write_text("[parameters]\nVM = 100\n")
     async with on_screen(session) as (pilot, _, _):
         page = await opened(pilot, session)
-        await pilot.press("f")
+        await pilot.press("ctrl+p", *"with a file", "enter")
         page.field.value = str(tmp_path / "none.toml")
         await press(pilot, "enter")
         assert "nothing was sent" in page.lines("said").plain
         page.field.value = str(tmp_path / "a.toml")
-        await press(pilot, "enter", "equals_sign")
+        await press(pilot, "enter", *DIFFERING)
         assert names(page) == ["VM"] and "a.toml" in page.lines("columns").plain
         await emit(pilot, SettingsRead(session.time, "press", "b", Readings((Reading("MS", 64),))))
-        await press(pilot, "a", "b", "enter")
+        await press(pilot, "ctrl+p", *"with another", "enter", "b", "enter")
         assert names(page) == ["MS"]

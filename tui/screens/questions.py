@@ -84,12 +84,20 @@ class Questions:
                 screen.dismiss(None)
             closed()
 
-    async def macro_name(self, record: Callable[[str], Awaitable[None]]) -> None:
+    async def macro_name(self, record: Callable[[str], Awaitable[None]], key: str = "") -> None:
+        """Ask for the name of a macro that is recorded; for a key, which ends the recording."""
+
         async def named(name: str) -> None:
             if name:
                 await record(name)
 
-        await self._open(Ask("Record what is typed as a macro named", about="/record stop ends it"), named)
+        await self._open(
+            Ask(
+                f"{key and f'{key} plays nothing yet. '}Record what is typed as a macro named",
+                about=f"{key or '/record stop'} ends it",
+            ),
+            named,
+        )
 
     async def history(self, lines: Sequence[str], take: Callable[[str], None]) -> None:
         """Search the lines typed before, oldest first in `lines`."""
