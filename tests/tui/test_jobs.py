@@ -14,6 +14,7 @@ from multidrop.dialects.values import Reading, Readings
 from multidrop.drives.events import Sample
 from multidrop.shell.events import OnBus, SettingsRead
 from multidrop.tui.app import MultidropApp
+from multidrop.tui.screens.all_drives import AllDrives
 from multidrop.tui.screens.program import ProgramPage
 from tests.support.fake_session import (
     FakeBus,
