@@ -186,6 +186,7 @@ SHEETS: dict[str, Sheet] = {
             "Macros": (Key("", "act.record", "record one, or end the recording", "record a macro"),),
         },
         ("page",),
+        ("back", "everything", "*"),
     ),
     "program": Sheet(
         "program",
@@ -235,6 +236,7 @@ SHEETS: dict[str, Sheet] = {
             ),
         },
         ("page",),
+        ("back", "everything", "*"),
     ),
     "controls": Sheet(
         "controls",

@@ -11,6 +11,7 @@ import pytest
 from textual import events
 from textual.pilot import Pilot
 
+from multidrop.shell.channel import Field as Wanted
 from multidrop.tui.app import MultidropApp
 from multidrop.tui.key_table import SHEETS, all_groups
 from multidrop.tui.screens.dialogs import Field
@@ -91,6 +92,13 @@ def shown_keys(name: str) -> list[str]:
     return list(dict.fromkeys(keys))
 
 
+async def pressed(app: MultidropApp, key: str) -> None:
+    """Press a key, and let it do what it does."""
+    app.post_message(events.Key(key, key if len(key) == 1 else None))
+    while not app.keyboard.idle:
+        await asyncio.sleep(0)
+
+
 async def walked(pilot: Pilot[int], session: FakeSession, name: str, keys: Iterable[str]) -> None:
     """Press every key on a page: each is noticed, and after each the stop works."""
     app = pilot.app
@@ -108,10 +116,8 @@ async def walked(pilot: Pilot[int], session: FakeSession, name: str, keys: Itera
             screen = app.screen
         assert noticed(app, key), f"{key} on {name}"
         stops = session.stops
-        for each in (key, "ctrl+x"):
-            app.post_message(events.Key(each, each if len(each) == 1 else None))
-            while not app.keyboard.idle:
-                await asyncio.sleep(0)
+        await pressed(app, key)
+        await pressed(app, "ctrl+x")
         assert session.stops == stops + 1, f"the stop after {key} on {name}"
         app.tick()
         assert app._exception is None, f"{key} on {name}"
@@ -133,3 +139,47 @@ async def test_every_key_that_is_shown_is_noticed_and_the_stop_works_after_it(
         app.texts.open("a.mxt")
         await settle(pilot)
         await walked(pilot, session, name, shown_keys(name))
+
+
+async def opened(app: MultidropApp, name: str) -> None:
+    """Open a box, or a bar of the main screen."""
+    if name in BOXES:
+        for key in BOXES[name]:
+            await pressed(app, key)
+    elif name == "start":
+        await app.run_action("act.open")
+    elif name == "question":
+        app.run_worker(app.questions.go_on("Send it?", ["a line"], lambda: None))
+    else:
+        app.run_worker(app.questions.fill("go", [Wanted("speed", "a number", "5", lambda text: "")], lambda: None))
+
+
+BOXES = {
+    "list": ("ctrl+p",),
+    "answers": ("ctrl+q",),
+    "line": ("f9",),
+    "find": ("P", "ctrl+f", "P"),
+    "pick": ("shift+up",),
+}
+
+
+@pytest.mark.tui
+@pytest.mark.parametrize("name", [*BOXES, "start", "question", "form"])
+async def test_every_key_of_a_box_is_noticed_and_the_stop_works_after_it(name: str) -> None:
+    session = demo_session()
+    session.moves = ["a moves"]
+    app = make_app(session)
+    async with app.run_test(size=(80, 24)) as pilot:
+        session.emit(*a_talk(session))
+        await settle(pilot)
+        for key in shown_keys(name):
+            session.time += 1
+            await opened(app, name)
+            await pilot.pause()
+            assert noticed(app, key), f"{key} on {name}"
+            stops = session.stops
+            await pressed(app, key)
+            await pressed(app, "ctrl+x")
+            assert session.stops == stops + 1, f"the stop after {key} on {name}"
+            await settle(pilot)
+            assert app.screen is app.main and not app.main.reader.open

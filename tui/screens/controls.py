@@ -95,7 +95,7 @@ WORDS = {
 }
 NO_CONTROLS = "this family has no controls"
 WHOLE = re.compile(r"[+-]?[0-9]{1,10}")
-KEY = 8
+KEY = 9
 WORD = 10
 LINE = 22
 

@@ -217,7 +217,7 @@ class ListPage(AskingPage):
         rows = [_linked(row(each, number == at), number) for number, each in shown]
         part.put(rows or nothing)
         below = len(items) - shown[-1][0] - 1 if shown else 0
-        return f"▼ {below} below " if below else "", "strong"
+        return f"▼ {below} below   " if below else "", "strong"
 
     def choose(self, at: int) -> None:
         """Choose a row by its place."""
