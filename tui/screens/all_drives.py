@@ -159,7 +159,7 @@ class AllDrives(ListPage):
 
     def show(self, view: View) -> None:
         self._view = view
-        self._places = worst_first(view, self.field.value)
+        self._places = worst_first(view, self.words)
         at = self._at()
         if self._chosen is None:
             self.action_step(0)  # it stays the chosen one when another gets worse

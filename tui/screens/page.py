@@ -181,6 +181,10 @@ class ListPage(AskingPage):
     LIST: ClassVar[str] = ""
     """The name of the rows among the parts."""
 
+    def __init__(self, host: Host) -> None:
+        super().__init__(host)
+        self.field = Field(self.typed, edited=lambda text: self.edited(text.removeprefix("/")), id=self.FIELD)
+
     def content(self) -> ComposeResult:
         """Make the parts; the line that narrows the rows is always there."""
         for part in super().content():
@@ -200,8 +204,8 @@ class ListPage(AskingPage):
 
     @property
     def words(self) -> str:
-        """What narrows the rows."""
-        return self.field.value
+        """What narrows the rows; a `/` before it, which begins a search elsewhere, is none of it."""
+        return self.field.value.removeprefix("/")
 
     def put_rows(
         self,
