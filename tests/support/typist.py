@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import sys
 from collections.abc import AsyncIterator
 from pathlib import Path
 from typing import Any
@@ -18,6 +19,7 @@ from multidrop.shell.configuration import Settings
 from multidrop.shell.events import Entered, Notified, Output
 from multidrop.shell.prompt.prompt import Prompt
 from multidrop.shell.session import Session
+from tests.support.posix import left_out
 from tests.support.until import until
 
 COLUMNS = 200
@@ -88,6 +90,8 @@ class Typist:
 @contextlib.asynccontextmanager
 async def typist(folder: Path, output: Terminal | None = None) -> AsyncIterator[Typist]:
     """Run a prompt whose settings and state are in this folder. `output`: its terminal; a wide one by default."""
+    if sys.platform == "win32":  # prompt_toolkit waits for keys in a thread there, for which virtual time does not wait
+        left_out("fork")
     session = Session(Settings(folder=folder / "config", state=folder / "state"))
     with create_pipe_input() as keys, create_app_session(input=keys, output=output or Wide()) as terminal:
         made = Typist(session, keys, terminal)
