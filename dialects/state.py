@@ -57,6 +57,8 @@ class DriveState:
     address: str = ""
     name: str = ""
     """The name that the drive itself bears, also where the host does not use it as the address."""
+    label: str = ""
+    """The name that a person gave it, which is shown in place of its address."""
     product: str = ""
     version: str = ""
     part: str = ""

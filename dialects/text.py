@@ -53,3 +53,8 @@ def whole(text: str, low: int, high: int) -> int | None:
         return None
     number = int(text)
     return number if low <= number <= high else None
+
+
+def counted(number: int, one: str, many: str = "") -> str:
+    """Format a number of things, as `1 line` or `3 lines`. `many`: a plural that is not made by an s."""
+    return f"{number} {one if number == 1 else many or f'{one}s'}"

@@ -314,7 +314,7 @@ class Conversation(Generic[T]):
 
     @property
     def _name(self) -> str:
-        return self._state.address or self._link.name
+        return self._state.label or self._state.address or self._link.name
 
 
 async def awaited(start: Callable[[OnOver[T]], Conversation[T]]) -> T:

@@ -127,7 +127,6 @@ class Drive:
 
     def __init__(self, conversations: Conversations, neighbours: Neighbours, state: DriveState) -> None:
         self.state = state
-        self.label = ""
         self.transferring = False
         """A program is being transferred: the drive stays busy for a while."""
         self.seen: Seen | None = None
@@ -179,7 +178,7 @@ class Drive:
     def programs(self) -> Programs[Any]:
         """Its family's programs. Raises Inexpressible where the host loads none."""
         if self.family.programs is None:
-            raise _no_programs(self)
+            raise Inexpressible(f"{self.shown}: {self.family.no_programs}")
         return self.family.programs
 
     @property
@@ -187,7 +186,7 @@ class Drive:
         """Its family's program files. Raises Inexpressible where the host loads none."""
         files = program_languages().get(self.family.name)
         if files is None:
-            raise _no_programs(self)
+            raise Inexpressible(f"{self.shown}: {self.family.no_programs}")
         return files
 
     @property
@@ -203,9 +202,18 @@ class Drive:
         return self.state.programming
 
     @property
+    def label(self) -> str:
+        """The name that a person gave it; empty without one."""
+        return self.state.label
+
+    @label.setter
+    def label(self, label: str) -> None:
+        self.state.label = label
+
+    @property
     def shown(self) -> str:
-        """Its name in messages: the address, or the name of the link where it has none."""
-        return self.address or self.link.name
+        """Its name in messages: its label, else its address, or the name of the link where it has none."""
+        return self.label or self.address or self.link.name
 
     @property
     def stops(self) -> int:
@@ -445,10 +453,6 @@ class Drive:
             on_over(outcome)
 
         return self._conversations.start(procedure, state, over, watch)
-
-
-def _no_programs(drive: Drive) -> Inexpressible:
-    return Inexpressible(f"{drive.shown}: {drive.family.no_programs}")
 
 
 def _refuse_while_stored(drives: Sequence[Drive], remedy: str) -> None:

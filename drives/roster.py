@@ -195,6 +195,7 @@ class Roster:
                 _compare(drive.state, state)
                 state.follows(drive.state)
                 self.restarts.replied_again(drive)
+                state.label = drive.label
                 drive.state, drive.missing = state, False
             self.drives[state.address] = drive
         self.unlisted |= {drive.address: drive for drive in before.values() if drive not in self.drives.values()}
@@ -312,7 +313,7 @@ class Roster:
 
 def _compare(before: DriveState, now: DriveState) -> None:
     """Note in one line that another drive replies, or the same one with other settings."""
-    who = now.address or "the drive"
+    who = now.label or now.address or "the drive"
     if not (now.product and before.product):
         return
     differences = [

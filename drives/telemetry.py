@@ -324,7 +324,7 @@ class _ValuePoller(_Poller[Value]):
 
     def _silent(self, thing: Value, due: _Due) -> None:
         if due.refusals >= NAKS:
-            self._refused(thing, due, f"{thing.address or self._link.name} replies NAK to '{thing.word}'")
+            self._refused(thing, due, f"{self._drive(thing).shown}: NAK to '{thing.word}'")
 
     def _refused(self, thing: Value, due: _Due, why: str) -> None:
         """Read a value no longer, and say so once: each refusal may start a subroutine for errors in the drive."""

@@ -15,7 +15,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from multidrop.dialects.errors import Diagnostic
-from multidrop.dialects.text import visible
+from multidrop.dialects.text import counted, visible
 from multidrop.macros.atomic import reserved
 
 _UNIT = r"(?:(?:[mcu]?m|in|deg|rad|m?turn)(?:/s2?|/min)?|m?rpm)"
@@ -224,9 +224,9 @@ class Macro:
     """The page of the key: a number or a word."""
     roles: tuple[str, ...] = ()
     """The names that stand for buses in its lines; a bus is chosen for each when it is played."""
-    on_stop: tuple[str, ...] = ()
+    on_early_end: tuple[str, ...] = ()
     """The lines that run after it was stopped or failed."""
-    on_stop_moves: bool = False
+    on_early_end_moves: bool = False
     """Those lines may start motion."""
     recorded: str = ""
     """The time of the recording."""
@@ -243,7 +243,7 @@ class Macro:
     @property
     def length(self) -> str:
         """The number of its lines, in words."""
-        return f"{len(self.steps)} {'line' if len(self.steps) == 1 else 'lines'}"
+        return counted(len(self.steps), "line")
 
     @property
     def place(self) -> str:
@@ -269,7 +269,9 @@ class Macro:
 
     def _numbered(self) -> Iterator[tuple[str, str]]:
         yield from ((self.where(number), step.line) for number, step in enumerate(self.steps, 1))
-        yield from ((f"macro {self.name}, on_stop {number}", line) for number, line in enumerate(self.on_stop, 1))
+        yield from (
+            (f"macro {self.name}, on_early_end {number}", line) for number, line in enumerate(self.on_early_end, 1)
+        )
 
 
 def checked_values(macro: Macro, given: Mapping[str, str]) -> dict[str, str]:
@@ -346,14 +348,14 @@ def check(macro: Macro, where: str = "", at: At | None = None) -> None:
         _check_line(step.line, f"step {number}", at("line", number))
         for text in (step.drive, *step.replies):
             _check_text(text, f"step {number}: what was recorded", at("replies", number))
-    for number, line in enumerate(macro.on_stop, 1):
-        _check_line(line, f"on_stop {number}", at("on_stop", 0))
+    for number, line in enumerate(macro.on_early_end, 1):
+        _check_line(line, f"on_early_end {number}", at("on_early_end", 0))
     try:
         names = {each.name for each in macro.parameters}
     except Diagnostic as problem:  # a step is named by its number, as the lines count
         place = problem.where.partition(", ")[2]
         step_number = re.match(r"step (\d+)", place)
-        place_of = at("line", int(step_number[1])) if step_number else at("on_stop", 0)
+        place_of = at("line", int(step_number[1])) if step_number else at("on_early_end", 0)
         raise Diagnostic(f"{place}: {problem.message}", place_of, problem.hint) from None
     if both := sorted(names & set(macro.roles)):
         raise Diagnostic(f"{both[0]} is a role and a value", at("roles", 0), "give one of them another name")

@@ -23,16 +23,18 @@ _KEYS: Mapping[str, type | tuple[type, ...]] = {
     "note": str,
     "recorded": str,
     "roles": list,
-    "on_stop": list,
-    "on_stop_moves": bool,
+    "on_early_end": list,
+    "on_early_end_moves": bool,
     "step": list,
 }
 _STEP_KEYS: Mapping[str, type | tuple[type, ...]] = {"after": float, "line": str, "drive": str, "replies": list}
+_OLD = {"on_early_end": "on_stop", "on_early_end_moves": "on_stop_moves"}
+"""Keys by their names in files of version 0.1.0."""
 _LARGEST = 10**15
 """Largest whole number; a float has no room for one of some hundred digits."""
 _TYPE_NAMES = {
     "after": "a number",
-    "on_stop_moves": "true or false",
+    "on_early_end_moves": "true or false",
     "page": "a number or text in quotes",
     "step": "[[step]] tables",
 }
@@ -50,9 +52,9 @@ def format_macro(macro: Macro) -> str:
     parts.append(f"note = {quoted(macro.note)}\n")
     if macro.recorded:
         parts.append(f"recorded = {quoted(macro.recorded)}\n")
-    parts += [f"{key} = {_texts(values)}\n" for key in ("roles", "on_stop") if (values := getattr(macro, key))]
-    if macro.on_stop_moves:
-        parts.append("on_stop_moves = true\n")
+    parts += [f"{key} = {_texts(values)}\n" for key in ("roles", "on_early_end") if (values := getattr(macro, key))]
+    if macro.on_early_end_moves:
+        parts.append("on_early_end_moves = true\n")
     for step in macro.steps:
         parts.append(f"\n[[step]]\nafter = {float(step.after)!r}\nline = {quoted(step.line)}\n")
         parts.append(f"drive = {quoted(step.drive)}\n" if step.drive else "")
@@ -63,7 +65,15 @@ def format_macro(macro: Macro) -> str:
 def parse_macro(text: str, where: str = "") -> Macro:
     """Parse the text of a file. Raises Diagnostic with `where` for any text that is not a macro."""
     table = toml_of(text, where)
-    at = in_text(text, where)
+    place, old = in_text(text, where), {now: before for now, before in _OLD.items() if before in table}
+
+    def at(key: str, number: int) -> str:
+        return place(old.get(key, key), number)
+
+    for now, before in old.items():
+        if now in table:
+            raise Diagnostic(f"{before} is the old name of {now}, which is there too", at(now, 0), "keep one of them")
+        table[now] = table.pop(before)
     _check_table(table, _KEYS, 0, at)
     if "name" not in table:
         raise Diagnostic("no name", where, 'add name = "..."')
@@ -74,8 +84,8 @@ def parse_macro(text: str, where: str = "") -> Macro:
         table.get("note", ""),
         str(table.get("page", FIRST_PAGE)),
         _list(table, "roles", 0, at),
-        _list(table, "on_stop", 0, at),
-        table.get("on_stop_moves", False),
+        _list(table, "on_early_end", 0, at),
+        table.get("on_early_end_moves", False),
         table.get("recorded", ""),
     )
     check(macro, where, at)

@@ -196,7 +196,7 @@ def is_key_name(name: str) -> bool:
 
 def _string(macro: Macro) -> str:
     where = f"macro {macro.name}"
-    for what, present in (("a role", macro.roles), ("a value", macro.parameters), ("on_stop", macro.on_stop)):
+    for what, present in (("a role", macro.roles), ("a value", macro.parameters), ("on_early_end", macro.on_early_end)):
         if present:
             raise Diagnostic(f"{what} has no counterpart in function keys", where, "nothing was exported")
     parts: list[str] = []

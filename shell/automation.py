@@ -27,7 +27,7 @@ from multidrop.shell.workspace import Workspace
 LINGER = 3.0
 """The longest wait for a stop to be sent and confirmed, s."""
 ENDING = 10.0
-"""The longest wait of a front end for automations that end, with their `on_stop` lines, s."""
+"""The longest wait of a front end for automations that end, with their `on_early_end` lines, s."""
 SOON = 0.5
 """The time after which a front end says that it waits for them, s."""
 POLL = 0.02

@@ -19,6 +19,7 @@ from multidrop.dialects import Diagnostic, DriveError, NoAnswer, Refused, Stoppe
 from multidrop.dialects.certifying import BYTES, FITS, MOVES, Occupied, Question, owed, restored
 from multidrop.dialects.files import escaped_toml, text_of, toml_of
 from multidrop.dialects.on_demand import imported
+from multidrop.dialects.text import counted
 from multidrop.drives.drive import Drive
 from multidrop.drives.events import Concluded, Transaction
 from multidrop.shell import new_file
@@ -91,7 +92,7 @@ async def certify(session: Session, drive: Drive, file: str) -> None:
             _write(session, asking.report, file)
     found, who = asking.report, session.display_name(drive)
     others = f"; {len(found.unlike)} not as our rulings have it: {', '.join(found.unlike)}" if found.unlike else ""
-    counts = f"{len(found.answers)} questions answered, {len(found.unasked)} not asked"
+    counts = f"{counted(len(found.answers), 'question')} answered, {len(found.unasked)} not asked"
     session.notify(f"{who}: {counts}{others}{new_file.place(file)}", outcome=True)
     for reason in dict.fromkeys(found.unasked.values()):
         count = sum(each == reason for each in found.unasked.values())
@@ -188,7 +189,8 @@ class Asking:
         """Ask a person, unless --yes has agreed; the reason why the motor must not be moved."""
         questions, stops = self._session.questions, self._drive.stops
         names = ", ".join(each.name for each in moving)
-        what = f"{self._who}: {len(moving)} more questions move the motor by 400 steps at most, and back ({names})"
+        more = f"{counted(len(moving), 'more question')} ({names})"
+        what = f"{self._who}: {more}: the motor moves by 400 steps at most, and back"
         agreed = questions.agreed or await questions.agrees(what)
         if self._drive.stops != stops:
             raise Stopped(f"{self._who}: a stop came before the answer")

@@ -11,6 +11,7 @@ from dataclasses import replace
 
 from multidrop.dialects import Diagnostic
 from multidrop.dialects.files import text_of
+from multidrop.dialects.text import counted
 from multidrop.macros import FIRST_PAGE, MacroStore, format_macro
 from multidrop.macros.atomic import write_atomically
 from multidrop.macros.vendor import REMARK, STOP, exported, imported, is_key_name
@@ -85,7 +86,7 @@ def set_key(store: MacroStore, key: str, name: str, page: str = FIRST_PAGE) -> t
         store.set_key(other, "")
     if name != OFF:
         store.set_key(name, key, page)
-    off = f", {' and '.join(before)} no more" if before else ""
+    off = f"; no longer on it: {', '.join(before)}" if before else ""
     plays = "nothing" if name == OFF else name
     return f"{shown} plays {plays}{off}", [f"{each}: it may be on {shown} too" for each in broken]
 
@@ -140,7 +141,7 @@ def export(store: MacroStore, file: str, names: Sequence[str], output: Callable[
     text = exported(chosen)
     new_file.write(file, text, output)
     count = text.count("\n")
-    return [f"{count} {'macro' if count == 1 else 'macros'}{new_file.place(file)}"]
+    return [f"{counted(count, 'macro')}{new_file.place(file)}"]
 
 
 def text_of_macro(store: MacroStore, name: str) -> list[str]:

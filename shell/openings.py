@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+from collections import Counter
 from collections.abc import Callable, Coroutine, Iterator, Sequence
 from dataclasses import replace
 from functools import partial
@@ -36,7 +37,7 @@ def described(bus: Bus) -> str:
     """A bus and its drives in one line: `press: a b c LMDCM 6.002, Hw: 3.2; d LMDCM 5.0`."""
     alike: dict[str, list[str]] = {}
     for drive in bus.drives.values():
-        alike.setdefault(model(drive), []).append(drive.address)
+        alike.setdefault(model(drive), []).append(drive.label or drive.address)
     drives = "; ".join(" ".join(filter(None, [*addresses, each])) for each, addresses in alike.items())
     return f"{bus.name}: {drives or 'no drive has replied'}"
 
@@ -68,8 +69,9 @@ class Openings:
 
     async def open(self, url: str, name: str | None = None, *, raw: bool = False) -> list[Bus]:
         """Open one URL; its first bus is selected where none is. `raw`: look for no drives."""
-        opening = _Opening(self._workspace, self._reserved, next(self._places), name)
-        opened = await self._run(opening, parse(url, self._workspace.settings.connections), raw)
+        connection = parse(url, self._workspace.settings.connections)
+        opening = _Opening(self._workspace, self._reserved, next(self._places), name, by_port=connection.by_port)
+        opened = await self._run(opening, connection, raw)
         self._select_first(opened)
         return opened
 
@@ -79,18 +81,21 @@ class Openings:
         No bus is selected before every URL ahead of it is open or has failed: a typed line must not go to another
         line of drives only because that one was faster. A failure goes to `failed`; without it, it ends the others.
         """
-        numbers, prepared = [], []
+        parsed: dict[int, Connection] = {}
         for number, url in enumerate(urls):
             try:
-                connection = parse(url, self._workspace.settings.connections)
-                sole = connection.short if connection.scheme != SIMULATED else ""
-                opening = _Opening(self._workspace, self._reserved, next(self._places), sole=sole)
-                prepared.append((opening, connection))
-                numbers.append(number)
+                parsed[number] = parse(url, self._workspace.settings.connections)
             except Diagnostic as problem:
                 if failed is None:
                     raise
                 failed(number, problem)
+        numbers, prepared, shorts = list(parsed), [], Counter(each.short for each in parsed.values())
+        for connection in parsed.values():
+            sole = connection.short if connection.scheme != SIMULATED else ""
+            if shorts[sole] > 1:
+                sole = connection.by_port or sole
+            opening = _Opening(self._workspace, self._reserved, next(self._places), None, sole, connection.by_port)
+            prepared.append((opening, connection))
         on_failure = failed and (lambda which, failure: failed(numbers[which], failure))
         keep = failed is not None and self._tabbed and not self._raw
         await side_by_side([self._run(*each, self._raw, keep) for each in prepared], self._select_first, on_failure)
@@ -230,13 +235,22 @@ class _Opening:
     """One URL on its way: its place among the buses, and the names that are reserved for its own."""
 
     def __init__(
-        self, workspace: Workspace, reserved: set[str], place: int, name: str | None = None, sole: str = ""
+        self,
+        workspace: Workspace,
+        reserved: set[str],
+        place: int,
+        name: str | None = None,
+        sole: str = "",
+        by_port: str = "",
     ) -> None:
-        """`sole`: the base of the name of its only bus, which is chosen before other URLs choose theirs."""
+        """`sole`: the base of the name of its only bus, which is chosen before other URLs choose theirs.
+
+        `by_port`: its name where that is taken.
+        """
         self._workspace = workspace
         self._reserved = reserved
         self.place = place
-        self._name = name
+        self._name, self._by_port = name, by_port
         self._stops = workspace.stops
         self._before = {*workspace.buses, *reserved}
         self._next = ""
@@ -258,7 +272,9 @@ class _Opening:
                 raise Diagnostic(f"bus {self._name} is already open", hint="use another name, or /close it first")
             name = self._name if taken == self._before else f"{self._name}-{base}"
         taken |= {*self._reserved, *self._workspace.buses}
-        chosen = next(each for each in (name, *(f"{name}-{number}" for number in range(2, 1000))) if each not in taken)
+        others = (f"{name}-{number}" for number in range(2, 1000))
+        by_port = [self._by_port] if self._by_port and self._name is None else []
+        chosen = next(each for each in (name, *by_port, *others) if each not in taken)
         self.names.add(chosen)
         self.bases[chosen] = base
         self._reserved.add(chosen)

@@ -11,6 +11,7 @@ from multidrop.dialects import Diagnostic, SourceLine
 from multidrop.dialects.debugging import Row
 from multidrop.dialects.family import Programs
 from multidrop.dialects.program_files import Held, Stored
+from multidrop.dialects.text import counted
 from multidrop.drives.drive import Drive
 from multidrop.shell import new_file
 from multidrop.shell.channel import Channel, running, transferring
@@ -156,4 +157,6 @@ def check_one(drive: Drive) -> None:
 def save_new(workspace: Workspace, drive: Drive, file: str, lines: Sequence[str]) -> None:
     """Write the lines of a drive to a new file (`-`: standard output), or raise Diagnostic: then there is none."""
     new_file.write(file, "".join(f"{line}\n" for line in lines), workspace.output)
-    workspace.notify(f"{workspace.display_name(drive)}: {len(lines)} lines{new_file.place(file)}", outcome=True)
+    workspace.notify(
+        f"{workspace.display_name(drive)}: {counted(len(lines), 'line')}{new_file.place(file)}", outcome=True
+    )

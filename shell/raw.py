@@ -38,20 +38,32 @@ _ITEM = re.compile(r'"([^"]*)"|(\S+)')
 
 
 class Form(Enum):
-    """How bytes are shown, and how many of them in a row."""
+    """How bytes are shown; the most of them in a row, and the most cells of their text."""
 
-    TEXT = ("text", 64)
-    HEX = ("hex", 24)
-    BOTH = ("both", 16)
+    TEXT = ("text", 64, 256)
+    HEX = ("hex", 24, 96)
+    BOTH = ("both", 12, 24)
+    """With their time both columns fit in 80 cells."""
 
     def rows(self, data: bytes) -> Iterator[str]:
-        width = self.value[1]
-        for at in range(0, len(data), width):
-            piece = data[at : at + width]
+        _, most, cells = self.value
+        for piece in parts_of(data, most, cells) if data else ():
             if self is Form.BOTH:
-                yield f"{text_of(piece):<24} {hex_of(piece)}"
+                yield f"{text_of(piece):<{cells}} {hex_of(piece)}"
             else:
                 yield text_of(piece) if self is Form.TEXT else hex_of(piece)
+
+
+def parts_of(data: bytes, most: int, cells: int) -> Iterator[bytes]:
+    """Divide bytes into rows of at most `most` bytes, and of at most `cells` of text."""
+    part = b""
+    for each in data:
+        longer = part + bytes([each])
+        if part and (len(longer) > most or len(text_of(longer)) > cells):
+            yield part
+            longer = bytes([each])
+        part = longer
+    yield part
 
 
 def text_of(data: bytes) -> str:

@@ -57,7 +57,7 @@ TRAVEL = "multidrop.shell.travel:ask"
 
 def bare(word: str) -> Diagnostic:
     """The refusal of a bare word where nobody types."""
-    return Diagnostic(f"'{word}' is no command of a drive, nothing was sent", hint=f"{BARE_WORDS[word]} is the verb")
+    return Diagnostic(f"not a command of a drive: '{word}'; nothing was sent", hint=f"{BARE_WORDS[word]} is the verb")
 
 
 CALL = "multidrop.shell.verbs.call:Call"
@@ -369,9 +369,7 @@ class LinePath:
         stops = self._session.stops
         for record in map(self._session.of, buses):
             if record.doubt:
-                what = (
-                    f"it is read only, as names, units or guards are not in force: {record.doubt}; go on all the same"
-                )
+                what = f"it is read only, as names, units or guards are not in force: {record.doubt}; go on anyway"
                 await self._session.questions.confirm(what, record.bus.name, by=by)
                 record.doubt = ""
         if stops != self._session.stops:

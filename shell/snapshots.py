@@ -7,6 +7,7 @@ from dataclasses import replace
 
 from multidrop.dialects import Diagnostic, DriveError, Stopped
 from multidrop.dialects.program_files import Held, Stored
+from multidrop.dialects.text import counted
 from multidrop.dialects.units import Scale
 from multidrop.dialects.values import Snapshot
 from multidrop.drives.bus import Bus
@@ -46,7 +47,7 @@ async def save(workspace: Workspace, file: str, scales: Scales = lambda drive: {
                 workspace.notify(f"{place}: not read: {names}; the file says why", warning=True)
     count = sum(len(bus.drives) for bus in buses)
     opens = "" if file == new_file.STANDARD_OUTPUT else f"; sim:{file} opens it"
-    workspace.notify(f"{count} drive{'s' * (count != 1)}{new_file.place(file)}{opens}", outcome=True)
+    workspace.notify(f"{counted(count, 'drive')}{new_file.place(file)}{opens}", outcome=True)
     if failures:
         raise failures[0]
     try:

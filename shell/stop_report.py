@@ -16,20 +16,21 @@ from multidrop.drives.stopping import Fate, Halt
 
 E_STOP = " - use the E-stop"
 NOT_OPEN = "still being opened"
-UNCONFIRMED = "reads velocity 0, but not twice at one position"
+UNCONFIRMED = "had velocity 0 once, but not twice at one position"
 GAP = "   "
 RESUME = "/resume lets macros run"
 SHOWN = 8
 """The largest number of names in one place."""
-PARTS = (
-    (Fate.STANDING, "stands", "stand"),
-    (Fate.STARTED, "started again", "started again"),
-    (Fate.SENT, "not read yet", "not read yet"),
-    (Fate.MOVING, "MOVES", "MOVE"),
-    (Fate.RUNNING, "RUNS A PROGRAM", "RUN PROGRAMS"),
-    (Fate.NOT_KNOWN, "NOT KNOWN", "NOT KNOWN"),
-    (Fate.NOT_REACHED, "NOT REACHED", "NOT REACHED"),
-)
+PARTS = {
+    Fate.STANDING: ("■", "at rest"),
+    Fate.STARTED: ("■", "started again"),
+    Fate.SENT: ("✗", "not read yet"),
+    Fate.MOVING: ("▶", "STILL MOVING"),
+    Fate.RUNNING: ("▷", "STILL RUNNING A PROGRAM"),
+    Fate.NOT_KNOWN: ("?", "NOT KNOWN"),
+    Fate.NOT_REACHED: ("‼", "NOT REACHED"),
+}
+"""The sign and the words of each fate, the most urgent one last."""
 CALM = (Fate.STANDING, Fate.STARTED, Fate.SENT)
 UNNAMED = (Fate.STANDING, Fate.SENT)
 """Fates shown by number, without names."""
@@ -106,8 +107,8 @@ def _found(halt: Halt, drives: Sequence[Drive], several: bool) -> Iterator[Found
     if not drives:
         yield Found(Fate.NOT_KNOWN if halt.data else Fate.NOT_REACHED, bus, bus, why)
     for drive in drives:
-        address = drive.address or bus
-        yield Found(halt.fate(drive), f"{bus}:{drive.address}" if several and drive.address else address, bus, why)
+        name = drive.label or drive.address
+        yield Found(halt.fate(drive), f"{bus}:{name}" if several and name else name or bus, bus, why)
 
 
 def names(tally: Tally, fate: Fate) -> str:
@@ -127,21 +128,22 @@ def names(tally: Tally, fate: Fate) -> str:
 def parts(tally: Tally, *, named: bool = True, calm: bool = True) -> list[str]:
     """One part for each fate: `9 stand`, `1 NOT KNOWN: noisy`. Without `calm` only the alarming fates."""
     found = []
-    for fate, one, many in PARTS:
+    for fate, (_, said) in PARTS.items():
         count = len(tally.of(fate))
         if count and (calm or fate not in CALM):
             who = f": {names(tally, fate)}" if named and fate not in UNNAMED else ""
-            found.append(f"{count} {one if count == 1 else many}{who}")
+            found.append(f"{count} {said}{who}")
     return found
 
 
 def words(tally: Tally) -> str:
-    """The tally in one line, such as `all 12 read velocity 0`."""
+    """The tally in one line, such as `velocity 0 was read from all 12`."""
     if not tally.found:
         return "no drive is open"
     if tally.stand:
         count = len(tally.found)
-        return f"{tally.found[0].name} reads velocity 0" if count == 1 else f"all {count} read velocity 0"
+        who = tally.found[0].name if count == 1 else "both" if count == 2 else f"all {count}"
+        return f"velocity 0 was read from {who}"
     return ", ".join(parts(tally)) + (E_STOP if tally.urgent else "")
 
 
@@ -156,20 +158,21 @@ def _ways(tally: Tally) -> list[str]:
     if tally.stand:
         sure = "■ STOPPED" if tally.found else "· NO STOP SENT"
         head = f"{sure}   {words(tally)}"
-        return [f"{head}       {RESUME}", head]
+        return [f"{head}       {RESUME}", head, f"{sure}   {RESUME}"]
     clock = f"{tally.at:%H:%M:%S}"
     if tally.sure:
         return [GAP.join((f"■ STOP {clock}", *parts(tally), RESUME)), GAP.join(("■ STOP", *parts(tally, named=False)))]
     tail = E_STOP if tally.urgent else ""
+    head = f"{next(sign for fate, (sign, _) in reversed(PARTS.items()) if tally.of(fate))} STOP SENT"
     rows = (
-        (f"✗ STOP SENT {clock}", *parts(tally)),
-        (f"✗ STOP SENT {clock}", *parts(tally, calm=False)),
-        ("✗ STOP SENT", *parts(tally, calm=False)),
-        (f"✗ STOP SENT {clock}", *parts(tally, named=False)),
-        ("✗ STOP SENT", *parts(tally, named=False, calm=False)),
+        (f"{head} {clock}", *parts(tally)),
+        (f"{head} {clock}", *parts(tally, calm=False)),
+        (head, *parts(tally, calm=False)),
+        (f"{head} {clock}", *parts(tally, named=False)),
+        (head, *parts(tally, named=False, calm=False)),
     )
     unsure = sum(each.fate not in CALM for each in tally.found)
-    return [*(GAP.join(row) + tail for row in rows), f"✗ STOP SENT{GAP}{unsure} NOT SURE{tail}"]
+    return [*(GAP.join(row) + tail for row in rows), f"{head}{GAP}{unsure} NOT SURE{tail}"]
 
 
 def last_seen(drive: Drive, now: float) -> str:
@@ -197,7 +200,7 @@ def unreached(halts: Iterable[Halt], now: float) -> list[str]:
     for halt in halts:
         missed = [drive for drive in halt.drives if halt.fate(drive) is Fate.NOT_REACHED]
         if missed or not (halt.data or halt.drives):
-            seen = ", ".join(f"{drive.address} {last_seen(drive, now)}".strip() for drive in missed)
+            seen = ", ".join(f"{drive.label or drive.address} {last_seen(drive, now)}".strip() for drive in missed)
             why = ", ".join(dict.fromkeys(halt.trouble)) or "a defect"
             lines.append(f"{halt.link.name}: stop not sent ({why}): {seen or 'its drives are not known'}{E_STOP}")
     return lines

@@ -15,6 +15,8 @@ from dataclasses import dataclass
 from datetime import datetime
 from typing import TypeVar
 
+from multidrop.dialects.text import counted
+
 LIMIT = 64 * 1024
 """The largest number of bytes that wait for a reader, except those to keep."""
 MOST = 64 * 1024 * 1024
@@ -42,7 +44,7 @@ class Loss:
     def __str__(self) -> str:
         """The loss in words; its times are local."""
         since, until = (datetime.fromtimestamp(at).strftime("%H:%M:%S.%f")[:-3] for at in (self.since, self.until))
-        return f"{self.count} {'line' if self.count == 1 else 'lines'} lost, {since} to {until}"
+        return f"{counted(self.count, 'line')} lost, {since} to {until}"
 
 
 class BoundedWriter:

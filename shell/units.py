@@ -246,7 +246,7 @@ class Units:
         for match in _BRACES.finditer(bare):
             if QUANTITY.fullmatch(match[0]) is None:
                 quantity(match[0][1:-1], self.own)
-                raise Diagnostic(f"{match[0]} is no quantity", "", "valid: {NUMBER SPACE UNIT}, as in {12.5 mm}")
+                raise Diagnostic(f"not a quantity: {match[0]}", "", "valid: {NUMBER SPACE UNIT}, as in {12.5 mm}")
         for unit in _BARE.finditer(bare):
             if unit[2].partition("/")[0] in (*PLACES, *SHORT, *self.own):
                 written = f"{{{unit[1].replace(',', '.')} {unit[2]}}}"

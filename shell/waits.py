@@ -199,7 +199,7 @@ class Standing:
 
     @property
     def text(self) -> str:
-        """In words: `b stands at 51200`."""
+        """In words: `b is at rest at 51200`."""
         if not self.axes:
             return f"{self.name} not known ({self.why})"
         if self.unconfirmed:
@@ -227,7 +227,7 @@ class Standing:
 def _axis(each: Motion, place: str) -> str:
     axis = f"{each.axis} " if each.axis else ""
     at = f"{each.position}{place}"
-    return f"{axis}moves at {each.velocity} a second at {at}" if each.velocity else f"{axis}stands at {at}"
+    return f"{axis}moves at {each.velocity} a second at {at}" if each.velocity else f"{axis}is at rest at {at}"
 
 
 async def standings(workspace: Workspace, drives: Iterable[Drive], units: Units | None = None) -> tuple[Standing, ...]:

@@ -121,7 +121,7 @@ class Workspace(Channel):
         self.playing: list[Playing] = []
         """The macros that play; a macro follows the one that plays it."""
         self.dropped: list[str] = []
-        """The macros whose `on_stop` lines a stop dropped; `/resume` says so."""
+        """The macros whose `on_early_end` lines a stop dropped; `/resume` says so."""
         self.doubted = ""
         """Why drives are read only: the stop key may be swallowed. Empty: it is not doubted."""
         self.watching = ""
@@ -294,8 +294,9 @@ class Workspace(Channel):
         return join_target(drive.link.name if len(self.buses) > 1 else "", drive.address)
 
     def display_name(self, drive: Drive) -> str:
-        """The drive's name for a person: `b`, or `press:b` where several buses are open."""
-        return self.qualified_address(drive) if drive.address else drive.link.name
+        """The drive's name for a person: `b`, or `press:b` where several buses are open; valid as an address."""
+        name = drive.label or drive.address
+        return join_target(drive.link.name if len(self.buses) > 1 else "", name) if name else drive.link.name
 
     # Stop
 
@@ -397,6 +398,11 @@ def _still_opening(opening: list[BeingOpened], number: int) -> list[str]:
 async def _close(bus: Bus, reconnections: Reconnections) -> None:
     await reconnections.remove(bus.name)
     await bus.close()
+
+
+def address_of(workspace: Workspace, drive: Drive) -> str:
+    """The drive's name for a program: `b`, or `press:b` where several buses are open, whatever a person calls it."""
+    return workspace.qualified_address(drive) if drive.address else drive.link.name
 
 
 def _present(bus: Bus, drive: Drive | None) -> Drive | None:

@@ -150,10 +150,6 @@ class Programs(NamedTuple):
     refusals: Callable[[str, str, str, Sequence[Problem]], list[Problem]] | None = None
 
 
-def counted(number: int, what: str) -> str:
-    return f"{number} {what}{'' if number == 1 else 's'}"
-
-
 def next_look(due: float | None, now: float, limit: float) -> float:
     """Return the time up to which a run advances at once: `SLICE` beyond the next event of the drive."""
     return limit if due is None else min(max(due, now) + SLICE, limit)

@@ -40,7 +40,7 @@ from multidrop.tui.frame_scheduler import AGEING, Frames
 from multidrop.tui.key_table import bound
 from multidrop.tui.keymap import FunctionKeys, keymap
 from multidrop.tui.outbox import Outbox
-from multidrop.tui.panels.view import figures_at
+from multidrop.tui.panels.view import figures_at, name_at
 from multidrop.tui.polling import Polling
 from multidrop.tui.presenter import Presenter
 from multidrop.tui.screen_model import Record, ScreenModel
@@ -58,6 +58,8 @@ from multidrop.tui.widgets.bars import Banner, Footer
 from multidrop.tui.widgets.entry import Entry
 from multidrop.tui.widgets.theme import DEFAULTS, SignFilter, Signs, dress, ink_of, signs_for, wrong_theme
 
+TOLD = 5.0
+"""Seconds for which a line about a key is shown."""
 INTERRUPTED = 130
 """The exit code after a signal."""
 
@@ -93,9 +95,8 @@ class MultidropApp(App[int]):
         # With NO_COLOR, only this makes Textual take colours away altogether; else it makes greys of them.
         super().__init__(driver_class=driver, ansi_color=True if "NO_COLOR" in os.environ else None)
         self.session, self.urls, self.assist = session, list(urls), assist
-        self.model = model or ScreenModel(
-            lambda: session.selected_bus, lambda: session.buses, partial(figures_at, session)
-        )
+        figures, named = partial(figures_at, session), partial(name_at, session)
+        self.model = model or ScreenModel(lambda: session.selected_bus, lambda: session.buses, figures, named)
         self.polling, self.macros = Polling(), FunctionKeys()
         self.keymap = keymap(bindings(), look.keys)
         self.presenter = Presenter(session, self.model, self.polling, self.macros, self.keymap)
@@ -107,13 +108,13 @@ class MultidropApp(App[int]):
             lambda lines: self.typist.pasted(lines),
         )
         self.main.times = look.times
-        self.keyboard = Keyboard(self, self._warn)
+        self.keyboard = Keyboard(self, self._tell)
         self.outbox = Outbox(session, self._warn, self.run_worker)
         self.selection = Selection(
             session, self.model, self.main, self.presenter.label, self.keyboard.turn_deaf, self.show_line
         )
         self.unsent = Unsent(self.main, self.model, session.now, self.assist.keep, self._warn)
-        self.questions = Questions(self, session)
+        self.questions = Questions(self, session, self.main, self.keyboard)
         self.tour = Tour(session, self.keymap, lambda: getattr(self.screen, "heading", type(self.screen).__name__))
         self.opener = Opener(self, session, self.assist, self.keyboard, self.show_line, self.tour.begin)
         self.typist = Typist(
@@ -338,7 +339,7 @@ class MultidropApp(App[int]):
         page = next((each for each in self.screen_stack if isinstance(each, Page) and each.is_running), None)
         self.presenter.paint(self.main, self.session.now(), panels, page)
         if panels:
-            self.main.show_tour(self.tour.rows(self.size.width) if self.tour.on else [])
+            self.main.show_rows("tour", self.tour.rows(self.size.width) if self.tour.on else [])
             self.typist.show_hint()
             self._raise_banner()
         return True
@@ -389,7 +390,7 @@ class MultidropApp(App[int]):
     # Typing
 
     def _clock(self, at: float) -> str:
-        return f"{self.session.wall(at):%H:%M:%S}"
+        return f"{self.session.wall(at):%H:%M:%S.%f}"[:-3]
 
     def last_records(self, number: int) -> Sequence[Record]:
         records = self.main.page(self.main.current).records
@@ -402,6 +403,20 @@ class MultidropApp(App[int]):
 
     def _warn(self, text: str) -> None:
         self.show_line(text, "!")
+
+    def _tell(self, text: str) -> None:
+        """Warn in the box that is open, else in the transcript."""
+        if isinstance(self.screen, Over):
+            self.screen.tell(text)
+        else:
+            self._warn(text)
+
+    def notify(self, message: str, *, timeout: float | None = None, **_: object) -> None:
+        """Show a line for a while where it covers nothing: in the box that is open, else above the footer."""
+        shown = next((each for each in reversed(self.screen_stack) if isinstance(each, Over | Framed)), None)
+        if shown is not None:
+            shown.tell(message)
+            self.set_timer(timeout or TOLD, lambda: shown.tell("") if shown.told == message else None)
 
     def on_entry_edited(self, event: Entry.Edited) -> None:
         """Show the meaning of the typed text, once no more keys wait."""

@@ -343,7 +343,7 @@ SHEETS: dict[str, Sheet] = {
                 Key("y", "answer(True)", "yes, go on", "yes"),
                 Key("n", "answer(False)", "no, send nothing", "no"),
                 Key("up / down", " / ", "the answer above, below", "choose"),
-                Key("pageup / pagedown", "read(-1) / read(1)", "read the lines before the question", first=True),
+                Key("pageup / pagedown", "look(-1) / look(1)", "look back, on in the transcript", first=True),
                 Key("enter", "", "take the chosen answer", "take"),
             )
         },

@@ -18,9 +18,11 @@ from collections.abc import Callable, Coroutine, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
+from multidrop.dialects.text import counted
 from multidrop.shell.line_syntax import Place, pinned
 from multidrop.shell.prompt.line_queue import BURST, LEAVING, Line
 from multidrop.shell.session import Session
+from multidrop.tui.panels.view import name_at
 
 NAMED = 4
 """Number of lines that a report of unsent lines quotes."""
@@ -134,7 +136,8 @@ class Outbox:
         typed = line.sent
         if line.place != self._session.place:
             if line.verb:
-                self._hold(lane, f"another drive was selected than {':'.join(filter(None, line.place))}")
+                name = name_at(self._session, *line.place) or line.place.address
+                self._hold(lane, f"another drive was selected than {':'.join(filter(None, (line.place.bus, name)))}")
                 return None
             typed = pinned(line.text, *line.place)
         lane.running = lane.waiting.popleft()
@@ -193,4 +196,4 @@ def them(lines: Sequence[object]) -> str:
 def not_sent(lines: Sequence[str]) -> str:
     """`3 lines were not sent: MR 1 · MR 2 · MR 3`."""
     named = " · ".join(line[:40] for line in lines[:NAMED]) + (" …" if len(lines) > NAMED else "")
-    return f"{len(lines)} lines were not sent: {named}" if len(lines) > 1 else f"not sent: {named}"
+    return f"{counted(len(lines), 'line was', 'lines were')} not sent: {named}"

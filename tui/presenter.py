@@ -17,7 +17,7 @@ from multidrop.tui.readout import State
 from multidrop.tui.screen_model import BusFacts, Record, ScreenModel, bus_old, bus_state
 from multidrop.tui.screens.main_screen import MainScreen
 from multidrop.tui.screens.page import Framed, Page
-from multidrop.tui.widgets.bars import Tab, banner_row, footer_row, top_row
+from multidrop.tui.widgets.bars import TRYING, Tab, banner_row, footer_row, top_row
 from multidrop.tui.widgets.lines import Row
 
 FLOOD = 3
@@ -102,7 +102,7 @@ class Presenter:
         main.beside.transcript.show_new()
 
     def banner(self, width: int) -> Row:
-        """The red line: what is known since a stop that is latched, and why a bus is lost."""
+        """The line below the tabs: what is known since a stop that is latched, and why a bus is lost."""
         bus = self.session.buses.get(self.session.selected_bus)
         lost = self.loss(bus) if bus is not None else ""
         if self.session.latched and not lost:
@@ -113,7 +113,7 @@ class Presenter:
         """The reason of a loss, and whether the bus is being tried again; empty while it is not lost."""
         if bus.lost is None:
             return ""
-        return f"{bus.lost}; trying again" if bus.name in self.session.reconnections.trying else str(bus.lost)
+        return f"{bus.lost}{TRYING}" if bus.name in self.session.reconnections.trying else str(bus.lost)
 
     def _paint_frame(self, screen: Framed, now: float) -> None:
         width = screen.size.width
@@ -147,7 +147,7 @@ class Presenter:
             return ((f" {self.session.selected_bus} raw, /raw off ends ▸ ", "motion"),)
         drive = self.session.selected
         bus = self.session.selected_bus if len(self.session.buses) > 1 else ""
-        where = ":".join(filter(None, (bus, drive.address if drive is not None else "")))
+        where = ":".join(filter(None, (bus, drive.label or drive.address if drive is not None else "")))
         if drive is not None and drive.programming:
             return ((f" {where} ◆ stores ▸ ", "motion"),)
         return ((f" {where} ▸ " if where else " ▸ ", "accent"),)

@@ -363,6 +363,5 @@ class Readout:
         if state is State.UNKNOWN:
             return "not read yet"
         if state in READ and self.last is not None and self.old(now):
-            ago = age(now - self.last.at)
-            return f"{'moved' if state is State.MOVING else 'stood'} {ago}{'' if 'min' in ago else ' ago'}"
+            return f"{'moving' if state is State.MOVING else 'at rest'} {age(now - self.last.at)} ago"
         return state.word

@@ -7,6 +7,7 @@ reply, and unknown until the first poll. A state that may be outdated stays, wit
 
 from __future__ import annotations
 
+import re
 from collections import deque
 from collections.abc import Callable, Container, Iterator
 from dataclasses import dataclass, field
@@ -60,8 +61,8 @@ class Happening(NamedTuple):
     help: str = ""
 
 
-SILENT = Happening("does not reply to polls", warning=True)
-BACK = Happening("replies again")
+SILENT = Happening("no reply to polls", warning=True)
+BACK = Happening("polls get a reply again")
 
 
 def changes_of(known: Readout, event: Sample | Silent | Conditioned) -> Iterator[Happening]:
@@ -74,7 +75,7 @@ def changes_of(known: Readout, event: Sample | Silent | Conditioned) -> Iterator
             yield BACK
         axis = next((each for each in known.axes if each.axis == event.axis), None)
         if axis is not None and axis.last is not None and axis.trouble != event.trouble:
-            text = event.trouble or f"no more: {axis.trouble}"
+            text = event.trouble or f"cleared: {axis.trouble}"
             yield Happening(_named(text, event.axis), warning=bool(event.trouble))
     else:
         for each, after in zip(known.axes, event.conditions, strict=False):
@@ -90,7 +91,7 @@ def _conditioned(known: Readout, after: Conditions, failed_at: float) -> Iterato
     for lamp in after.lamps:
         if lamp.on and lamp.function in LIMITS and not lamp.output and (lamp.name, lamp.function) not in lit:
             place = "" if last is None else f" at {known.figures.place(last.position)}"
-            stands = "; it stands" if last is not None and last.velocity == 0 else ""
+            stands = "; it is at rest" if last is not None and last.velocity == 0 else ""
             yield Happening(_named(f"{LIMITS[lamp.function]} reached{place}{stands}", after.axis), warning=True)
     told = failed_at >= known.conditioned_at or (after.error_text and after.error_text == known.trouble)
     if after.error and not before.error and not told:
@@ -190,6 +191,8 @@ class TrafficStore:
         return True
 
 
+VERBS = "refused|replied|does|did|is|has|had|holds|cannot|moves"
+"""Words after the name of a drive; without one of them, `a` is an article."""
 KEPT = 50_000
 """Records that a transcript keeps."""
 
@@ -208,6 +211,8 @@ class Record(NamedTuple):
     """The line that explains it: `/help 35`."""
     private: bool = False
     """A remark of this screen to its person, which watchers do not get."""
+    name: str = ""
+    """The name that a person gave to the drive, which is shown in place of its address."""
 
 
 @dataclass
@@ -238,9 +243,12 @@ class ScreenModel:
         current: Callable[[], str],
         opened: Callable[[], Container[str]],
         figures: Callable[[str, str, str], Figures] = lambda bus, address, axis: NATIVE,
+        named: Callable[[str, str], str] = lambda bus, address: "",
     ) -> None:
         self.figures = figures
         """Returns the figures of an axis: of a bus, an address, its name."""
+        self._named = named
+        """Returns the name that a person gave to a drive: of a bus, an address."""
         self.buses: dict[str, BusFacts] = {}
         self.traces, self.look = Traces(), Look()
         """The plotted samples, and how a person looks at them."""
@@ -265,10 +273,10 @@ class ScreenModel:
                         self.bus(event.bus).readout(event.address).sent = event.line, event.at
                 mine = event.by is By.OPERATOR
                 record = Record(event.at, event.address, ">" if mine else "»", event.line, mine=mine)
-                self.page(event.bus).append(record)
+                self._of_drive(event.bus, record)
             case Printed():
                 record = Record(event.at, event.address, "", event.text, mine=event.by is By.OPERATOR)
-                self.page(event.bus).append(record)
+                self._of_drive(event.bus, record)
             case Output():
                 self.page("").append(Record(event.at, "", "", event.text, columns=event.columns))
             case Notified():
@@ -284,8 +292,7 @@ class ScreenModel:
                         readout.failure = event.text[max(0, event.text.find("error ")) :], event.at
                 explained = "" if event.code is None else f"/help {event.code}"
                 mine = event.by is By.OPERATOR
-                record = Record(event.at, event.address, "x", event.text, mine=mine, help=explained)
-                self.page(event.bus).append(record)
+                self._of_drive(event.bus, Record(event.at, event.address, "x", event.text, mine=mine, help=explained))
             case Bytes():
                 mark = "↑" if event.outgoing else "↓"
                 rows = [Record(event.at, "", mark, row, columns=True, mine=False) for row in event.rows]
@@ -324,6 +331,14 @@ class ScreenModel:
         """The place for records of a bus; those of a bus that is not open go to the current page."""
         return self.bus(name if name in self._opened() else "").fresh
 
+    def _of_drive(self, bus: str, record: Record) -> None:
+        """Append a record of a drive under the name that it has in messages, which need not repeat it."""
+        name = self._named(bus, record.address) if record.address else ""
+        if record.mark == "x" and record.address:
+            own = rf"(?:{re.escape(bus)}:)?(?:{re.escape(name or record.address)}|{re.escape(record.address)})"
+            record = record._replace(text=re.sub(rf"^{own}(?:: | (?=(?:{VERBS})\b))", "", record.text))
+        self.page(bus).append(record._replace(name=name))
+
     def rename(self, before: str, now: str) -> None:
         self.buses[now] = self.buses.pop(before, BusFacts())
         self.traces.rename(before, now)
@@ -357,7 +372,7 @@ class ScreenModel:
             readout.note(inner)
             for each in happened:
                 mark = "!" if each.warning else "."
-                self.page(event.bus).append(Record(inner.at, inner.address, mark, each.text, help=each.help))
+                self._of_drive(event.bus, Record(inner.at, inner.address, mark, each.text, help=each.help))
         elif isinstance(inner, TwinEvent):
             if isinstance(inner, Predicted):
                 self.traces.predict(event.bus, inner)

@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from datetime import datetime, timedelta
 
 from multidrop.dialects import Diagnostic
-from multidrop.dialects.text import visible
+from multidrop.dialects.text import counted, visible
 from multidrop.shell import new_file
 from multidrop.shell.channel import Field, Front
 from multidrop.shell.roles import Filter, Transcripts
@@ -36,14 +36,10 @@ class Hooks:
         )
 
     async def _go_on(self, question: str) -> bool:
-        self._parts.keyboard.turn_deaf()
-        main = self._parts.main
-        self._presenter.take_records(main)
-        return await self._parts.questions.go_on(question, main.transcript.since_typed(), self._closed)
+        self._presenter.take_records(self._parts.main)
+        return await self._parts.questions.go_on(question, self._closed)
 
     async def _fill_in(self, title: str, fields: Sequence[Field]) -> dict[str, str] | None:
-        """Put a form of the session. Keys typed ahead are not for it."""
-        self._parts.keyboard.turn_deaf()
         return await self._parts.questions.fill(title, fields, self._closed)
 
     async def _show_page(self, name: str) -> None:
@@ -88,8 +84,12 @@ class Hooks:
         now = session.now()
         await asyncio.to_thread(_write, path, records, session.wall(now) - timedelta(seconds=now))
         what = f", {page.sight.filter.words}" if page.sight.filter else ""
-        older = f"; {page.records.dropped} older ones were dropped before" if page.records.dropped else ""
-        return f"{len(records)} lines{what}, in {path}{older}"
+        older = (
+            f"; {counted(page.records.dropped, 'older line was', 'older lines were')} dropped before"
+            if page.records.dropped
+            else ""
+        )
+        return f"{counted(len(records), 'line')}{what}, in {path}{older}"
 
     async def _offer_unsent(self) -> None:
         """Offer the lines that were not sent. Raises Diagnostic if there are none."""

@@ -53,7 +53,7 @@ STEPS = (
     Step("Let drive a run without end: SL 100000 and Enter.", _typed("SL")),
     Step("^X stops every drive, macro and script, from anywhere, always. Press it now.", lambda facts: facts.stopped),
     Step(
-        "The red line says STOPPED once every drive was read at velocity 0. Macros and scripts wait: type /resume.",
+        "STOPPED below the tabs means: velocity 0 was read from every drive. Macros and scripts wait: type /resume.",
         lambda facts: not facts.latched,
     ),
     Step(

@@ -13,6 +13,7 @@ import re
 from collections.abc import Callable
 
 from multidrop.dialects.files import split_lines
+from multidrop.dialects.text import counted
 from multidrop.shell.events import FAILURES
 from multidrop.shell.line_syntax import Place
 from multidrop.shell.session import Session
@@ -206,7 +207,7 @@ class Typist:
     def show_hint(self) -> None:
         """Show how many lines wait, and the meaning of the typed text."""
         waiting = self._outbox.waiting
-        waits = f"{waiting} lines wait" if waiting > 1 else "a line waits"
+        waits = counted(waiting, "line waits", "lines wait")
         self._main.set_hint(self._meaning, f"{waits} for the one before" if waiting else "")
 
     async def typed(self, text: str, empty: Callable[[], object]) -> None:

@@ -171,7 +171,7 @@ class Calls:
         """End all calls, and stop what they started; return the outcome in lines. The session can go on."""
         self._going = False
         self.shell.interrupt()
-        if self._tasks:  # a macro executes its `on_stop` lines
+        if self._tasks:  # a macro executes its `on_early_end` lines
             await asyncio.wait([*self._tasks], timeout=ENDING)
         await self._end(early=True)
         every = self.shell.automations.interrupted

@@ -26,6 +26,7 @@ from multidrop.shell.line_syntax import join_target
 from multidrop.shell.scripts.expression import Value, Word, written
 from multidrop.shell.scripts.questions import ask
 from multidrop.shell.travel import BEYOND
+from multidrop.shell.workspace import address_of
 
 if TYPE_CHECKING:
     from multidrop.api.telemetry import AsyncTelemetry
@@ -97,7 +98,7 @@ class DriveFacts:
     @property
     def name(self) -> str:
         """Its address, with the bus where several are open."""
-        return self._calls.shell.display_name(self._drive)
+        return address_of(self._calls.shell, self._drive)
 
     @property
     def address(self) -> str:

@@ -12,6 +12,7 @@ from multidrop.drives.drive import Drive
 from multidrop.drives.events import Changed, Conditioned, Lost
 from multidrop.shell.events import OnBus, SessionEvent
 from multidrop.shell.session import Session
+from multidrop.shell.workspace import address_of
 
 Kind = Literal["limit", "error", "program ended", "lost", "back"]
 LIMITS = {"lim+": "the plus limit is reached", "lim-": "the minus limit is reached"}
@@ -82,7 +83,7 @@ class AsyncEvents(AsyncStream[Event]):
             drive = self._drives.get((event.bus, event.event.address))
             if drive is not None:
                 for each in event.event.conditions:
-                    self._compare(f"{self._shell.display_name(drive)} {each.axis}".strip(), each)
+                    self._compare(f"{address_of(self._shell, drive)} {each.axis}".strip(), each)
         elif isinstance(event.event, Lost):
             self._away.add(event.bus)
             self._publish("lost", event.bus, str(event.event.error))

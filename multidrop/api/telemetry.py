@@ -19,6 +19,7 @@ from multidrop.drives.events import Lost
 from multidrop.drives.events import Sample as Read
 from multidrop.shell.events import OnBus, SessionEvent
 from multidrop.shell.session import Session
+from multidrop.shell.workspace import address_of
 
 
 class _Sample(NamedTuple):
@@ -146,7 +147,7 @@ class AsyncTelemetry(AsyncStream[Sample]):
         """Begin to read. A rate of `math.inf` is as fast as the line allows."""
         self.missed = 0
         """The number of samples that were dropped because the program did not take them."""
-        self._names = {(drive.link.name, drive.address): shell.display_name(drive) for drive in drives}
+        self._names = {(drive.link.name, drive.address): address_of(shell, drive) for drive in drives}
         self._begun = shell.now()
         super().__init__(
             shell,

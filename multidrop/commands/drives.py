@@ -20,6 +20,7 @@ from multidrop.shell.params import file as files
 from multidrop.shell.params import replacement, work
 from multidrop.shell.params.work import Options, check_new, each, file_of, is_several, targets
 from multidrop.shell.programs import transfers
+from multidrop.shell.workspace import address_of
 from multidrop.simulator import cells
 
 if TYPE_CHECKING:
@@ -37,7 +38,7 @@ def list_(chosen: argparse.Namespace) -> int:
             held = await program_listing.read(session, drive, "list")
             held.check_listed(name)
             for at, text in held.lines:
-                session.output(json.dumps({"drive": name, "at": at, "text": text}))
+                session.output(json.dumps({"drive": address_of(session, drive), "at": at, "text": text}))
             return
         own = f"{name}: " if is_several(chosen.drive) else ""
         for line in await program_listing.readable(session, drive):
@@ -55,7 +56,13 @@ def program_diff(chosen: argparse.Namespace) -> int:
         nonlocal differ
         name, found = session.display_name(drive), await transfers.differences(session, drive, chosen.file)
         for row in found:
-            facts = {"drive": name, "line": row.number or None, "here": row.here, "at": row.at, "there": row.there}
+            facts = {
+                "drive": address_of(session, drive),
+                "line": row.number or None,
+                "here": row.here,
+                "at": row.at,
+                "there": row.there,
+            }
             session.output(json.dumps(facts) if chosen.json else transfers.in_words(chosen.file, row, name))
         differ = differ or bool(found)
         if not found:

@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from multidrop.dialects import Diagnostic
-from multidrop.dialects.text import visible
+from multidrop.dialects.text import counted, visible
 from multidrop.shell import configuration
 from multidrop.shell.line_syntax import join_target
 from multidrop.shell.log import files, steps
@@ -55,13 +55,13 @@ def grep(chosen: argparse.Namespace) -> int:
     wanted = _wanted(chosen)
     found = 0
 
-    def counted(entry: Entry) -> bool:
+    def matching(entry: Entry) -> bool:
         nonlocal found
         matches = wanted(entry) and pattern.search(text(entry)) is not None
         found += matches
         return matches
 
-    code = _reported(lambda: _print(files.whole(_path(chosen)), chosen, counted))
+    code = _reported(lambda: _print(files.whole(_path(chosen)), chosen, matching))
     return code or (0 if found else NOTHING_FOUND)
 
 
@@ -103,8 +103,11 @@ def judge(chosen: argparse.Namespace) -> int:
                 write(sys.stdout, f"{line.where}: {text(entry)[:STAMP]} {rule}: {said}")
 
     code = _reported(work)
-    counts = f"{found.commands} commands, {found.stops} stops" + ", older sessions left out" * bool(found.unmarked)
-    broken = f"{len(found.breaches)} breaches" if found.breaches else f"all {len(RULES)} rules held"
+    counts = (
+        f"{counted(found.commands, 'command')}, {counted(found.stops, 'stop')}"
+        + ", older sessions left out" * bool(found.unmarked)
+    )
+    broken = counted(len(found.breaches), "breach", "breaches") if found.breaches else f"all {len(RULES)} rules held"
     write(sys.stderr, f"{path}: {broken} ({counts})")
     return code or (BROKEN if found.breaches else 0)
 

@@ -18,6 +18,7 @@ from multidrop.dialects import Diagnostic
 from multidrop.dialects.families import program_language_of
 from multidrop.dialects.files import program_text_of
 from multidrop.dialects.program_files import errors
+from multidrop.dialects.text import counted
 from multidrop.shell.programs.checking import Checked, examine, rewrite
 from multidrop.shell.streams.stdout import reader_left, shortened, write
 
@@ -46,7 +47,7 @@ def _check_file(file: str, chosen: argparse.Namespace) -> int:
         fact = {"file": checked.file, "errors": len(errors(checked.problems)), "summary": checked.facts}
         _write_fact({**fact, "formatted": checked.respelled} if chosen.format else fact)
     elif checked.right:
-        count = f"{checked.respelled} line{'' if checked.respelled == 1 else 's'}"
+        count = counted(checked.respelled, "line")
         write(sys.stdout, f"{checked.file}: {checked.facts}" + (f"; {count} formatted" if chosen.format else ""))
     return 0 if checked.right else WRONG
 
@@ -61,7 +62,7 @@ def _report(checked: Checked, json: bool) -> None:
         else:
             write(sys.stderr, shortened(each.line_for(checked.file)))
     if not json and (more := len(checked.problems) - MOST) > 0:
-        write(sys.stderr, f"{checked.file}: {more} more problem{'' if more == 1 else 's'}, not shown")
+        write(sys.stderr, f"{checked.file}: {counted(more, 'more problem')}, not shown")
 
 
 def _write_fact(fact: Mapping[str, object]) -> None:
@@ -147,7 +148,7 @@ def convert(chosen: argparse.Namespace) -> int:
         runs = []
         for run in converted.differences(chosen.until):
             runs.append(run)
-            status.show(f"{len(runs)} worlds run")
+            status.show(f"{counted(len(runs), 'world')} run")
         status.erase()
         new_file.write(chosen.output, found.text, lambda line: write(sys.stdout, line))
     except Diagnostic as problem:
@@ -156,8 +157,8 @@ def convert(chosen: argparse.Namespace) -> int:
     stream = sys.stderr if chosen.output == new_file.STANDARD_OUTPUT else sys.stdout
     lines = [f"{each.where(chosen.file)}: {each.what}; {each.hint}" for each in found.changes]
     lines += [f"differs with {world}: {difference}" for world, difference in differ[:SHOWN]]
-    lines += [f"and in {len(differ) - SHOWN} more worlds"] if differ[SHOWN:] else []
-    count = f"{len(found.changes)} change{'' if len(found.changes) == 1 else 's'}"
-    beside = f"run beside each other in {len(runs)} world{'' if len(runs) == 1 else 's'}, {len(differ)} differ"
+    lines += [f"and in {counted(len(differ) - SHOWN, 'more world')}"] if differ[SHOWN:] else []
+    count = counted(len(found.changes), "change")
+    beside = f"run beside each other in {counted(len(runs), 'world')}, {len(differ)} differ"
     write(stream, *lines, f"{converted.source} to {converted.target}{new_file.place(chosen.output)}: {count}; {beside}")
     return FAILED if differ else 0

@@ -15,6 +15,7 @@ from functools import partial
 
 from multidrop.commands import fail
 from multidrop.dialects import Diagnostic
+from multidrop.dialects.text import counted
 from multidrop.shell import configuration
 from multidrop.shell.batch.report import Case as JUnitCase
 from multidrop.shell.batch.report import JUnitFile
@@ -137,7 +138,7 @@ class Report:
         self._shown_at = now
         left = (now - self._began) / done * (count - done)
         failed = sum(not each.ok for each in self._early.values()) + len(self._failed)
-        self._status.show(f"{done} of {count} cases, {failed} failed, {_time(left)} left")
+        self._status.show(f"{done} of {counted(count, 'case')}, {failed} failed, {_time(left)} left")
 
     def erase(self) -> None:
         self._status.erase()
@@ -167,7 +168,7 @@ class Report:
 
     @property
     def _counted(self) -> str:
-        return f"{len(self._reported)} case{'' if len(self._reported) == 1 else 's'}"
+        return counted(len(self._reported), "case")
 
     def _groups(self, interruption: Interruption, seconds: float) -> list[Group]:
         """Put failures into groups; look for simpler worlds in this time, until there is a signal."""

@@ -19,6 +19,7 @@ from concurrent.futures import Executor, ThreadPoolExecutor, wait
 from typing import TYPE_CHECKING, Any
 
 from multidrop.dialects import Diagnostic, DriveError, Stopped
+from multidrop.dialects.text import counted
 from multidrop.shell import waits
 from multidrop.shell.automation import outcome, settled
 from multidrop.shell.events import By, Printed, SessionEvent
@@ -65,13 +66,16 @@ class ReplayReport:
         self, channel: Channel, lines: int, differences: int, uncompared: int, positions: Positions | None
     ) -> None:
         moved = f"; {uncompared} in motion printed another number" if uncompared else ""
-        channel.notify(f"{lines} lines replayed, {differences} differ{moved}", outcome=True)
+        channel.notify(
+            f"{counted(lines, 'line')} replayed, {differences} differ{moved}",
+            outcome=True,
+        )
         fact: dict[str, object] = {"lines": lines, "differ": differences}
         if positions is not None:
             largest, compared = positions.largest, positions.compared
             for name, number in compared.items():
-                noun = "position" if number == 1 else "positions"
-                text = f"{name}: {number} {noun} compared, largest difference {largest[name]} steps"
+                most = counted(largest[name], "step")
+                text = f"{name}: {counted(number, 'position')} compared, largest difference {most}"
                 channel.notify(text, outcome=True)
             fact |= {"compared": sum(compared.values()), "diverged": len(positions.diverged), "largest": largest}
         if self._json:
@@ -80,7 +84,7 @@ class ReplayReport:
     @staticmethod
     def words(lines: int, differences: int, positions: Positions | None) -> str:
         """The differences in words; empty: none."""
-        said = [f"{differences} of {lines} lines gave another answer than in the log"] if differences else []
+        said = [f"{differences} of {counted(lines, 'line')} gave another answer than in the log"] if differences else []
         if positions is not None and positions.diverged:
             axes = f"{len(positions.diverged)} of {len(positions.compared)} axes"
             said.append(f"{axes} were not where the log has them")
@@ -166,12 +170,13 @@ class Replay:
         if left_out:
             self._session.notify(f"not replayed: {', '.join(left_out)}", outcome=True)
         if self._found.unsent:
-            self._session.notify(f"not replayed: {self._found.unsent} lines that were not sent then", outcome=True)
+            self._session.notify(
+                f"not replayed: {counted(self._found.unsent, 'line')} that the log has as not sent", outcome=True
+            )
         if not self._simulated:
             moving = self._announced()
-            await self._session.questions.confirm(
-                f"{len(self.steps)} lines are sent; {moving} of them can start motion or ask first"
-            )
+            lines = counted(len(self.steps), "line is", "lines are")
+            await self._session.questions.confirm(f"{lines} sent; {moving} of them can start motion or ask first")
         self._session.questions.agreed = True
 
     def _announced(self) -> int:

@@ -18,7 +18,7 @@ from xml.etree import ElementTree
 
 from multidrop.dialects import Diagnostic
 from multidrop.dialects.files import LARGEST_PROGRAM, bytes_of, why
-from multidrop.dialects.text import visible
+from multidrop.dialects.text import counted, visible
 from multidrop.macros.atomic import write_atomically
 from multidrop.shell import new_file
 from multidrop.shell.streams.stdout import report as described
@@ -142,7 +142,7 @@ class Report:
         self._begun = datetime.now().astimezone()
         self._junit = JUnitFile(junit, name, self._begun)
         self._cases: list[Case] = []
-        self._lines = self._checks = self._failed = 0
+        self._lines = self._checks = self._failed = self._failed_checks = 0
         self._failure = ""
         self._ending: Ending | None = None
 
@@ -155,6 +155,7 @@ class Report:
         self._lines += 1
         self._checks += result.check
         self._failed += not result.ok
+        self._failed_checks += result.check and not result.ok
         if self._json:
             write(sys.stdout, json.dumps(result.fact()))
         if counts and self._junit.wanted and (result.check or not result.ok):
@@ -175,7 +176,9 @@ class Report:
             summary |= self._ending.fact() if self._ending is not None else {}
             write(sys.stdout, json.dumps({"summary": summary}))
         elif self._checks:
-            words = f"{self._lines} lines, {self._checks} checks, {self._failed} failed, {seconds:.1f} s"
+            words = f"{counted(self._lines, 'line')}, {counted(self._checks, 'check')}, {self._failed_checks} failed"
+            others = self._failed - self._failed_checks
+            words += f", {counted(others, 'other line')} failed" * bool(others) + f", {seconds:.1f} s"
             write(sys.stderr, f"{self._name}: {self._begun.isoformat(' ', 'seconds')}: {words}")
         if not self._junit.wanted:
             return code

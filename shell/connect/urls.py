@@ -74,6 +74,11 @@ class Connection:
             return f"{self.host}-{PurePath(self.target).name}"
         return self.name or (PurePath(self.target).name if self.target else self.host) or self.scheme
 
+    @property
+    def by_port(self) -> str:
+        """The name of its bus beside another one of the same host; empty where no port tells them apart."""
+        return f"{self.short}-{self.port}" if self.port and not (self.name or self.target) else ""
+
 
 def parse(text: str, saved: Mapping[str, SavedConnection] | None = None) -> Connection:
     """Parse a URL, a bare port or a saved name. Raises Diagnostic, which never holds a password."""

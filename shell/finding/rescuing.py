@@ -11,6 +11,7 @@ from collections.abc import Sequence
 
 from multidrop.dialects import Diagnostic, Procedure
 from multidrop.dialects.families import FAMILIES, family_of
+from multidrop.dialects.text import counted
 from multidrop.drives.events import BusEvent, Traffic
 from multidrop.shell.finding.scanning import HAZARD, SO_FAR, FoundDrive, Scanning, Stage, listed
 from multidrop.shell.workspace import Workspace
@@ -143,7 +144,7 @@ class Rescue:
                 async with asyncio.timeout(LISTENS):
                     await signed.wait()
             except TimeoutError:
-                what = f"{len(received)} bytes that cannot be read" if received else "nothing"
+                what = f"{counted(len(received), 'byte')} that cannot be read" if received else "nothing"
                 return f"received {what} with {stage.words}; a drive in party mode sends no sign-on"
             finally:
                 leave()

@@ -12,7 +12,7 @@ from pathlib import Path
 
 from multidrop.dialects import Diagnostic, Kind, Priority, Request
 from multidrop.dialects.files import why
-from multidrop.dialects.text import visible
+from multidrop.dialects.text import counted, visible
 from multidrop.drives.bus import Bus
 from multidrop.drives.events import BusEvent, Ended, Sent, Traffic, Unsolicited
 from multidrop.shell.events import (
@@ -92,7 +92,7 @@ class SessionLog:
         return line_of(self._entry(self._workspace.now(), "log", text, marks=True))
 
     def _missing(self, number: int) -> bytes:
-        text = f"{number} entries are missing here: the disk did not take them"
+        text = f"{counted(number, 'entry is', 'entries are')} missing here: the disk did not take them"
         return line_of(self._entry(self._workspace.now(), "missing", text, warning=True))
 
     def _take(self, event: SessionEvent) -> None:

@@ -64,7 +64,7 @@ PLAY = Operation(
     help="""Play a macro; {NAME} in its lines takes the given value. The first failure ends it.
 
     A role of the macro takes the name of an open bus. What is missing is asked for. `/play stop` ends what plays and
-    stops the drives that it set in motion; its on_stop lines follow. After Ctrl+X they do not.
+    stops the drives that it set in motion; its on_early_end lines follow. After Ctrl+X they do not.
     """,
     work="macros:play",
     words={

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 
 from multidrop.dialects import Diagnostic, DriveError, Inexpressible, Refused
 from multidrop.dialects.program_files import LOCKED
+from multidrop.dialects.text import counted
 from multidrop.dialects.values import Change, Permission, Plan, Readings, differing
 from multidrop.shell import snapshots
 from multidrop.shell.channel import transferring
@@ -129,9 +130,10 @@ class _Replacement:
         if now.readings.values.get("LK") and self._program.lines:
             raise Refused(f"{self._name}: {LOCKED} (nothing was sent)")
         if now.program and self._clearing and not self._program.lines:
+            held = counted(len(now.program), "line")
             raise Refused(
-                f"{self._name}: it holds a program of {len(now.program)} lines, and {spec.name!r} in {self._file} has "
-                f"none: {self._clearing} erases it (nothing was sent)"
+                f"{self._name}: it holds a program of {held}, and {spec.name!r} in {self._file} has none: "
+                f"{self._clearing} erases it (nothing was sent)"
             )
 
     def _show(self, now: Snapshot, here: DriveSpec) -> list[str]:
@@ -143,10 +145,10 @@ class _Replacement:
                 out(f"{self._name}: {key} {mine or 'not known'}; in {self._file} {theirs}")
         changes = []
         if self._differs(here):
-            changes.append(f"a program of {len(self._program.lines)} lines")
-            out(f"{self._name}: program: {len(self._program.lines)} lines in place of {len(now.program)}")
+            changes.append(f"a program of {counted(len(self._program.lines), 'line')}")
+            out(f"{self._name}: program: {counted(len(self._program.lines), 'line')} in place of {len(now.program)}")
         elif now.program and not self._program.lines:
-            out(f"{self._name}: its program of {len(now.program)} lines stays: {self._file} has none")
+            out(f"{self._name}: its program of {counted(len(now.program), 'line')} stays: {self._file} has none")
         readings = replace(now.readings, labels=(*now.readings.labels, *self._program.labels))
         ordinary, whole = self._plan(readings), self._plan(readings, communication=True)
         final = {each.name: each for each in whole if not each.temporary}
@@ -155,7 +157,7 @@ class _Replacement:
             before = "" if each.before is None else f" (was {shown(each.before)})"
             out(f"{self._name}: {each.text}{before}{', at the end' if name in wire else ''}")
         if count := len(final) - len(wire):
-            changes.append(f"{count} setting{'s' * (count != 1)}")
+            changes.append(counted(count, "setting"))
         if wire:
             changes.append(f"then {', '.join(final[name].text for name in wire)}")
         if spec.name == UNNAMED != here.name:

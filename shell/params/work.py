@@ -15,6 +15,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from multidrop.dialects import Diagnostic, DriveError, NoAnswer, Refused, Stopped
+from multidrop.dialects.text import counted
 from multidrop.dialects.values import (
     COMMUNICATION,
     IO,
@@ -124,7 +125,7 @@ async def backup(workspace: Workspace, name: str, target: str) -> None:
         found, who = await files.read(workspace, drive, "backup"), workspace.display_name(drive)
         text = files.formatted(files.identity(drive.state, drive.family.values.parameters.language), found)
         new_file.write(own, text, workspace.output)
-        workspace.notify(f"{who}: {len(found.readings)} settings{new_file.place(own)}")
+        workspace.notify(f"{who}: {counted(len(found.readings), 'setting')}{new_file.place(own)}")
         if found.unread:
             names = files.listed([name for name, _ in found.unread])
             workspace.notify(f"{who}: not read: {names}; [unread] in the file has the reasons", warning=True)
@@ -137,7 +138,7 @@ async def read(workspace: Workspace, target: str) -> None:
 
     async def count(drive: Drive) -> None:
         found = await files.read(workspace, drive, "reading")
-        workspace.notify(f"{workspace.display_name(drive)}: {len(found.readings)} settings read")
+        workspace.notify(f"{workspace.display_name(drive)}: {counted(len(found.readings), 'setting')} read")
 
     await each(workspace, targets(workspace, target), count)
 
@@ -278,7 +279,7 @@ async def restore(session: Session, drive: Drive, file: files.SettingsFile, opti
         return
     await check_ready(drive)
     if options.dry_run:
-        session.notify(f"{who}: {len(plan)} steps; nothing was sent (--dry-run)", outcome=True)
+        session.notify(f"{who}: {counted(len(plan), 'step')}; nothing was sent (--dry-run)", outcome=True)
         return
     await _agree(session, drive, present, plan, file)
     aside = {*wanted.withheld, *dict(plan.withheld), *dict(plan.impossible)}
@@ -355,7 +356,7 @@ async def _agree(workspace: Workspace, drive: Drive, present: Readings, plan: Pl
     names = list(dict.fromkeys(change.name for change in plan if not change.temporary))
     who, agreed = workspace.display_name(drive), workspace.questions.agreed
     await workspace.questions.confirm(
-        f"{len(names)} setting{'s' * (len(names) != 1)} of {file.path} will be written: {files.listed(names)}", who
+        f"{counted(len(names), 'setting')} of {file.path} will be written: {files.listed(names)}", who
     )
     if agreed:
         return
@@ -398,7 +399,7 @@ async def _finish(workspace: Workspace, drive: Drive, plan: Plan, goal: Mapping[
     written = {change.name for change in plan}
     unseen = sorted(name for name in written if name not in after)
     aside = f", without {', '.join(unseen)}, which cannot be read" if unseen else ""
-    result = f"{who}: {len(written)} setting{'s' * (len(written) != 1)} restored and read back{aside}"
+    result = f"{who}: {counted(len(written), 'setting')} restored and read back{aside}"
     saving = drive.family.values.parameters.saving
     if options.save:
         await transferring(drive, drive.family.values.parameters.save(drive.state))

@@ -17,6 +17,7 @@ from multidrop.shell.params.work import targets
 from multidrop.shell.plots.command import lost
 from multidrop.shell.session import Session
 from multidrop.shell.streams.stdout import write
+from multidrop.shell.workspace import address_of
 from multidrop.transports import TransportLost
 
 WIDTH = 11
@@ -44,7 +45,7 @@ async def _poll(session: Session, asked: Polling) -> None:
     wanted = _wanted(session, asked)
     for drive, word in wanted:
         await drive.run(drive.family.values.first(drive.state, word))
-    columns = [f"{session.display_name(drive).rstrip(':')}.{word}" for drive, word in wanted]
+    columns = [f"{address_of(session, drive).rstrip(':')}.{word}" for drive, word in wanted]
     if not asked.json:
         write(sys.stdout, f"{'time':<{STAMP}}" + "".join(f"  {name:>{WIDTH}}" for name in columns))
     due = session.now()

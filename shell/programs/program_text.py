@@ -14,6 +14,7 @@ from multidrop.dialects import Diagnostic
 from multidrop.dialects.families import program_language_of, program_languages
 from multidrop.dialects.files import split_lines
 from multidrop.dialects.program_files import Block, Entry, Offer, Part, Problem, Span, UserName, errors
+from multidrop.dialects.text import counted
 
 BYTE_ORDER_MARK = "\ufeff"
 
@@ -143,7 +144,7 @@ class ProgramText:
         lines = [f"{name.word}: {name.about or name.kind}"]
         lines += [f"  {self.line(place.line).strip()}" for place in name.declared[:1]]
         count = len({place.line for place in name.places})
-        return [*lines, f"  in {count} line{'' if count == 1 else 's'}"]
+        return [*lines, f"  in {counted(count, 'line')}"]
 
     def offers_at(self, line: int, column: int) -> tuple[Span, Sequence[Offer]]:
         """Return what may be typed at a place, and the begun word that it replaces."""

@@ -18,6 +18,7 @@ from multidrop.dialects.errors import Differs
 from multidrop.dialects.families import program_languages
 from multidrop.dialects.files import program_text_of
 from multidrop.dialects.program_files import LOCKED, Difference, Held, errors, refuse
+from multidrop.dialects.text import counted
 from multidrop.drives.drive import Drive, still
 from multidrop.shell.channel import running, transferring
 from multidrop.shell.events import By, Printed
@@ -245,7 +246,7 @@ class _Download:
         outside = [line.text for line in self._outside(lines)]
         more = f" and {len(outside) - MOST} more" if len(outside) > MOST else ""
         executed = f"; executed at once: {', '.join(outside[:MOST])}{more}" if outside else ""
-        self._say(f"{self._file} downloaded, {len(lines)} lines{executed}")
+        self._say(f"{self._file} downloaded, {counted(len(lines), 'line')}{executed}")
         return sent
 
     async def _save(self, lines: Sequence[SourceLine]) -> None:
@@ -273,10 +274,10 @@ class _Download:
         for each in found[:MOST]:
             self._session.notify(in_words(self._file, each, self._name), warning=True)
         if found:
-            count = f"{len(found)} lines differ" if len(found) > 1 else "1 line differs"
+            count = counted(len(found), "line differs", "lines differ")
             raise Differs(f"{self._name}: {count} from {self._file}; download it again")
         size = self._programs.size(lines)
-        self._say(f"verified, {size} lines")
+        self._say(f"verified, {counted(size, 'line')}")
         plain = " ".join(self._programs.file(self._drive.state, held, True))
         if size == len(held.lines) and text.split() != plain.split():
             workspace = self._session

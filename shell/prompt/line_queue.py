@@ -22,7 +22,7 @@ from pathlib import Path
 
 from multidrop.dialects import Diagnostic
 from multidrop.dialects.files import lines_of
-from multidrop.dialects.text import visible
+from multidrop.dialects.text import counted, visible
 from multidrop.macros.atomic import write_atomically
 from multidrop.shell.events import FAILURES
 from multidrop.shell.line_syntax import NOWHERE, DriveLine, Place, TypedLine, VerbLine, parse
@@ -291,7 +291,9 @@ class LineQueue:
         for line in lines[:SHOWN]:
             self._session.notify(f"not sent, as {why}: {line}", warning=True)
         if len(lines) > SHOWN:
-            self._session.notify(f"{len(lines) - SHOWN} more lines were not sent", warning=True)
+            self._session.notify(
+                f"{counted(len(lines) - SHOWN, 'more line was', 'more lines were')} not sent", warning=True
+            )
 
 
 def shown(line: str) -> str:

@@ -25,6 +25,7 @@ from prompt_toolkit.formatted_text import StyleAndTextTuples
 from prompt_toolkit.history import History as PromptHistory
 from prompt_toolkit.output import ColorDepth, DummyOutput
 
+from multidrop.dialects.text import counted
 from multidrop.shell import stop_report
 from multidrop.shell.events import Progressed
 from multidrop.shell.openings import model
@@ -200,7 +201,7 @@ class LinesAbove:
         """The next chunk of what waits; the number of missing lines is in their place."""
         lines, self._saved = self._saved, []
         if self._missing:
-            count = "1 line is" if self._missing == 1 else f"{self._missing} lines are"
+            count = counted(self._missing, "line is", "lines are")
             lines.append(f"{count} missing here: the terminal did not take them")
             self._missing = 0
         size = 0
@@ -279,7 +280,7 @@ class Pager:
             self._session.output(line, columns=True)
         del self.rest[:shown]
         if self.rest:
-            self._session.notify(f"Enter shows the next of {len(self.rest)} more lines")
+            self._session.notify(f"Enter shows the next of {counted(len(self.rest), 'more line')}")
         return shown > 0
 
 

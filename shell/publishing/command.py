@@ -8,6 +8,7 @@ from collections.abc import Callable, Sequence
 from ipaddress import ip_address
 
 from multidrop.dialects import Diagnostic
+from multidrop.dialects.text import counted
 from multidrop.drives.bus import Bus
 from multidrop.shell.batch import runner
 from multidrop.shell.events import FAILURES
@@ -87,8 +88,8 @@ async def _until_ended(workspace: Session, target: Target, period: float, absent
     feed = Feed(workspace, publisher, topics, period)
     await publisher.begin()
     drives, lines = sum(len(bus.drives) for bus in workspace.buses.values()), len(workspace.buses)
-    counted = f"{drives} {'drive' if drives == 1 else 'drives'} on {lines} {'line' if lines == 1 else 'lines'}"
-    write(sys.stderr, f"publishing {counted} to {target.text}; Ctrl+C ends it")
+    what = f"{counted(drives, 'drive')} on {counted(lines, 'line')}"
+    write(sys.stderr, f"publishing {what} to {target.text}; Ctrl+C ends it")
     feed.begin()
     waits = [asyncio.create_task(open_later(workspace, url, feed.add)) for url in absent]
     try:
@@ -101,7 +102,7 @@ async def _until_ended(workspace: Session, target: Target, period: float, absent
             each.cancel()
         feed.end()
         await publisher.end(Message(topics.status, BYE, retain=True))
-        parts = [f"{publisher.sent} messages published"]
+        parts = [f"{counted(publisher.sent, 'message')} published"]
         parts += [f"{publisher.lost} dropped, as they had no room"] if publisher.lost else []
         parts += [f"{publisher.waiting} not sent: the broker is away"] if publisher.waiting else []
         write(sys.stderr, "; ".join(parts))

@@ -12,7 +12,7 @@ from functools import partial
 from typing import NamedTuple
 
 from multidrop.dialects import Diagnostic
-from multidrop.dialects.text import visible
+from multidrop.dialects.text import counted, visible
 from multidrop.dialects.units import Takes
 from multidrop.dialects.values import UNREAD, Conditions
 from multidrop.drives.bus import Bus
@@ -317,9 +317,8 @@ class Feed:
     def dropped(self, numbers: Counter[str]) -> None:
         for bus in self._lines:
             if number := numbers[bus]:
-                self._missing(
-                    bus, f"{number} messages are missing before this: they had no room while the broker was away"
-                )
+                missing = counted(number, "message is", "messages are")
+                self._missing(bus, f"{missing} missing before this: no room was left while the broker was away")
 
     def put(self, topic: str, text: str, bus: str, retain: bool = False) -> None:
         self._publisher.put(Message(topic, text, retain, bus))
@@ -348,7 +347,10 @@ class Feed:
                 now = self._workspace.now()
                 for bus, limit in self._limits.items():
                     if number := limit.missing(now):
-                        self._missing(bus, f"{number} lines are missing here: {LINES:g} a second are published")
+                        self._missing(
+                            bus,
+                            f"{counted(number, 'line is', 'lines are')} missing here: {LINES:g} a second are published",
+                        )
                 self._publisher.look()
             if self._publisher.connected:
                 self._publisher.put(Message(self._topics.status, ONLINE, retain=True))

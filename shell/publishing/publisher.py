@@ -13,6 +13,7 @@ from collections import Counter, deque
 from collections.abc import Callable, Sequence
 
 from multidrop.dialects import Diagnostic
+from multidrop.dialects.text import counted
 from multidrop.shell.publishing.broker import Connection, Message
 from multidrop.transports import TransportLost
 
@@ -137,7 +138,8 @@ class Publisher:
         self._said_dropped = asyncio.get_running_loop().time()
         dropped = self._backlog.take_dropped()
         self.lost += dropped.total()
-        self._notify(f"{dropped.total()} messages for the broker were dropped, the oldest of those that waited")
+        lost = counted(dropped.total(), "message for the broker was", "messages for the broker were")
+        self._notify(f"{lost} dropped, the oldest of those that waited")
         self._dropped(dropped)
 
     async def end(self, goodbye: Message) -> None:

@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 from typing import TypeVar
 
 from multidrop.dialects import Diagnostic, DriveError, Stopped
+from multidrop.dialects.text import counted
 from multidrop.macros import checked_values, fill
 from multidrop.shell import waits
 from multidrop.shell.events import FAILURES, By, Failed
@@ -146,7 +147,7 @@ class Execution:
         if not self.failed:
             return
         places = list(dict.fromkeys(self.failed))
-        more = f" and {len(places) - SHOWN} other places" if len(places) > SHOWN else ""
+        more = f" and {counted(len(places) - SHOWN, 'other place')}" if len(places) > SHOWN else ""
         times = "a /verify" if len(self.failed) == 1 else f"{len(self.failed)} times a /verify"
         self.session.automations.leave()  # it has come to its end: what moves goes on, as after a good one
         raise CheckFailed(f"{times} did not hold: {', '.join(places[:SHOWN])}{more}; the rest was done")

@@ -1,7 +1,7 @@
 """Scripts, macros and typed lines from their beginning to their end.
 
-The drives that an unfinished macro set in motion are stopped first; its `on_stop` lines follow. After a stop of
-everything no `on_stop` line is executed, then or later.
+The drives that an unfinished macro set in motion are stopped first; its `on_early_end` lines follow. After a stop of
+everything no `on_early_end` line is executed, then or later.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ from dataclasses import replace
 from itertools import islice
 
 from multidrop.dialects import Diagnostic, NoAnswer, Stopped
+from multidrop.dialects.text import counted
 from multidrop.drives.drive import Drive
 from multidrop.drives.events import Lost
 from multidrop.macros import Macro
@@ -120,9 +121,9 @@ async def play(
     """Play a macro to its end as one automation, listed in `session.playing` meanwhile. Raises the first failure.
 
     It is checked whole first, and the drives that it moves are claimed, as far as its lines show them. Its early end
-    stops those that it started, executes its `on_stop` lines, and is reported. `times` None: until it is ended. `fast`:
-    without recorded pauses. `roles`: the bus for each role. A line without an address goes to the drive that was
-    selected when the macro began, or by a `/use` in it.
+    stops those that it started, executes its `on_early_end` lines, and is reported. `times` None: until it is ended.
+    `fast`: without recorded pauses. `roles`: the bus for each role. A line without an address goes to the drive that
+    was selected when the macro began, or by a `/use` in it.
     """
     played = read_macro(macro, values, session.macros)
     if session.latched:
@@ -141,7 +142,7 @@ async def play(
             ending(execution, watcher.ended),
         ):
             playing = await execution.play(played, dict(played.values), times, fast, roles)
-    rounds = f"{playing.rounds} round{'s' * (playing.rounds != 1)}" + ", ended by /quit" * session.quitting
+    rounds = counted(playing.rounds, "round") + ", ended by /quit" * session.quitting
     session.notify(f"macro {name}: {rounds} played in {session.now() - begun:.1f} s", outcome=True)
     watcher.ended(Ending(name, playing.rounds))
     execution.check_verified()
@@ -175,10 +176,10 @@ class _Aftermath:
         self._execution = execution
         self._session = execution.session
         self._left = list(execution.unfinished)
-        """The macros whose `on_stop` lines are not executed yet, the innermost first."""
+        """The macros whose `on_early_end` lines are not executed yet, the innermost first."""
 
     async def run(self, ended: Ended) -> None:
-        """Stop, report, execute `on_stop`, read where the drives stand. A stop of everything cuts it short."""
+        """Stop, report, execute `on_early_end`, read where the drives stand. A stop of everything cuts it short."""
         halts = self._session.automations.end()
         self._execution.is_over = True
         found: tuple[Standing, ...] = ()
@@ -243,11 +244,11 @@ class _Aftermath:
 
     def _drop(self) -> None:
         for each in self._left:
-            if lines := [node.line.text for node in each.played.on_stop]:
+            if lines := [node.line.text for node in each.played.on_early_end]:
                 self._session.dropped.append(each.playing.name)
                 hint = "type them if the machine needs them"
                 self._warn(
-                    f"macro {each.playing.name}: on_stop is not executed after a stop: {' · '.join(lines)}; {hint}"
+                    f"macro {each.playing.name}: on_early_end is not executed after a stop: {' · '.join(lines)}; {hint}"
                 )
         self._left.clear()
 
@@ -255,10 +256,14 @@ class _Aftermath:
         """Execute each line of a macro, whatever became of the one before it."""
         automations = self._session.automations
         macro, failed = each.played.macro, False
-        why = "" if macro.on_stop_moves else f"on_stop of macro {macro.name} would start it, and on_stop_moves is false"
+        why = (
+            ""
+            if macro.on_early_end_moves
+            else f"on_early_end of macro {macro.name} would start it, and on_early_end_moves is false"
+        )
         frame = replace(each.frame, values=dict(each.frame.names), pace=None)
         with cast(each.roles), automations.still(why):
-            for node in each.played.on_stop:
+            for node in each.played.on_early_end:
                 try:
                     await self._execution.block([node], frame)
                 except FAILURES as failure:

@@ -22,7 +22,7 @@ class ScriptLine:
     macro: str = ""
     """The macro that it is a line of."""
     step: int = 0
-    """Its step in the macro; 0 for an `on_stop` line."""
+    """Its step in the macro; 0 for an `on_early_end` line."""
     after: float = 0.0
     """The seconds after the start of the line before, with recorded timing."""
 
@@ -32,7 +32,7 @@ class ScriptLine:
         place = f"{self.file}:{self.number}" if self.file else ""
         if not self.macro:
             return place
-        step = f"step {self.step}" if self.step else "on_stop"
+        step = f"step {self.step}" if self.step else "on_early_end"
         return f"macro {self.macro}, {step}" + (f" ({place})" if place else "")
 
     @property
@@ -101,7 +101,7 @@ class MacroScript:
 
     macro: Macro
     body: Sequence[Node]
-    on_stop: Sequence[Node]
+    on_early_end: Sequence[Node]
     """Each of them is executed, whatever became of the one before it."""
     values: Mapping[str, str]
     """The values that it takes."""
@@ -118,7 +118,7 @@ def lines_of(body: Sequence[Node]) -> Iterator[ScriptLine]:
         elif isinstance(node, CallFile):
             yield from lines_of(node.script.body)
         elif isinstance(node, CallMacro):
-            yield from lines_of((*node.played.body, *node.played.on_stop))
+            yield from lines_of((*node.played.body, *node.played.on_early_end))
 
 
 @dataclass(frozen=True)

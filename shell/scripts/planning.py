@@ -50,7 +50,7 @@ def macro_claims(workspace: Workspace, played: MacroScript, roles: Mapping[str, 
     """The drives that a macro moves, as far as its lines show it.
 
     Raises Diagnostic for a line of a bus that is not open, for a role without a bus in what it calls, and for an
-    `on_stop` line that may not move.
+    `on_early_end` line that may not move.
     """
     planning = _Planning(workspace)
     with cast(roles):
@@ -75,9 +75,9 @@ class _Planning:
         """The lines of a macro that can start a drive, each with that drive; then those of its end."""
         values = Values(played.values)
         yield from self.block(played.body, values)
-        for line, drive in self.block(played.on_stop, values):
-            if not (played.macro.on_stop_moves or only_ends(drive, _text_of(line, values))):
-                hint = "on_stop_moves = true in its file lets it"
+        for line, drive in self.block(played.on_early_end, values):
+            if not (played.macro.on_early_end_moves or only_ends(drive, _text_of(line, values))):
+                hint = "on_early_end_moves = true in its file lets it"
                 raise Diagnostic(f"{drive.shown}: {line.text} can start motion", line.where, hint)
             yield line, drive
 

@@ -7,6 +7,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from multidrop.dialects import Diagnostic, DriveError
+from multidrop.dialects.text import counted
 from multidrop.drives.drive import Check, Drive
 from multidrop.shell.events import By
 from multidrop.shell.line_syntax import join_target, pinned, split_target
@@ -122,7 +123,9 @@ async def ask(session: Session, word: Word, by: By, place: Place | None = None, 
     await session.path.guard(drive, line, by)
     printed = await drive.send(line, check)
     if len(printed) != 1:
-        raise DriveError(f"{session.display_name(drive)}: {line} printed {len(printed)} lines; a value is one")
+        raise DriveError(
+            f"{session.display_name(drive)}: {line} printed {counted(len(printed), 'line')}; a value is one"
+        )
     return value_of(printed[0])
 
 

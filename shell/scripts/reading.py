@@ -37,8 +37,8 @@ def steps_of(macro: Macro, macros: MacroStore | None) -> tuple[list[ScriptLine],
         ScriptLine(*at("line", number), plain(step.line).strip(), macro.name, number, step.after)
         for number, step in enumerate(macro.steps, 1)
     ]
-    on_stop = [ScriptLine(*at("on_stop", 0), plain(line).strip(), macro.name) for line in macro.on_stop]
-    return steps, on_stop
+    on_early_end = [ScriptLine(*at("on_early_end", 0), plain(line).strip(), macro.name) for line in macro.on_early_end]
+    return steps, on_early_end
 
 
 def _places(macro: Macro, macros: MacroStore | None) -> Callable[[str, int], tuple[str, int]]:
@@ -157,9 +157,9 @@ class _Reader:
         if self._too_many():
             return MacroScript(macro, (), (), {})
         chain = (*chain, Link(f"macro {macro.name}", macro.name))
-        steps, on_stop = steps_of(macro, self.macros)
+        steps, on_early_end = steps_of(macro, self.macros)
         body = _Checker(self, steps, values, chain)
-        ending = _Checker(self, on_stop, values, chain)
+        ending = _Checker(self, on_early_end, values, chain)
         checked = MacroScript(macro, body.script(), ending.script(), _stood_in(values))
         if problems := [*body.problems, *ending.problems]:
             raise WrongScript(problems)

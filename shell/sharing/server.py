@@ -15,6 +15,7 @@ from functools import partial
 from typing import Any, cast
 
 from multidrop.dialects import Diagnostic, StopPiece
+from multidrop.dialects.text import counted
 from multidrop.shell import configuration
 from multidrop.shell.connect.opening import OpenedPort, open_port
 from multidrop.shell.connect.reconnect import FIRST, next_pause
@@ -179,9 +180,8 @@ class SharedPort:
                 self._connections[action.client].say_goodbye(action.farewell)
             elif isinstance(action, Write):
                 if self._transport.pending > AHEAD:
-                    ahead = (
-                        f"it wrote {AHEAD} bytes more than the line has taken; {len(action.data)} bytes were dropped"
-                    )
+                    lost = counted(len(action.data), "byte")
+                    ahead = f"it wrote {AHEAD} bytes more than the line has taken; {lost} dropped"
                     self._do(self._exchange.close(action.client, "dropped", ahead))
                     continue
                 self._purged = 0

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from multidrop.dialects.text import visible
+from multidrop.dialects.text import counted, visible
 from multidrop.shell.sharing.client import Client, Input, Request
 from multidrop.shell.sharing.stop_bytes import ENDS, HalfLine, OwedStop, StopBytes
 from multidrop.transports.telnet import FLOW, FLOW_IN, GROUPS, NEEDED, PURGE_RECEIVED, Control, Setting, group_of
@@ -244,7 +244,11 @@ class Exchange:
         if others:
             before, rest = before.strip(ENDS), rest.strip(ENDS)
         elif lost := len(data) - len(stop) - len(rest):
-            self._say(client, "unsent", f"{lost} bytes that came with a stop were dropped")
+            self._say(
+                client,
+                "unsent",
+                f"{counted(lost, 'byte that came with a stop was', 'bytes that came with a stop were')} dropped",
+            )
             before = b""
         return [each for each in (before, rest) if each]
 
@@ -276,7 +280,8 @@ class Exchange:
             self._line.dropped()
         for number, data in waited.items():
             if data:
-                self._say(number, "unsent", f"{len(data)} bytes that came before a stop were dropped")
+                unsent = counted(len(data), "byte that came before a stop was", "bytes that came before a stop were")
+                self._say(number, "unsent", f"{unsent} dropped")
 
     def _work(self, client: int, now: float) -> None:
         """Work off a few requests and writes of a client: the others are read after that."""
@@ -323,7 +328,13 @@ class Exchange:
         if count:
             self._line.dropped()
             who = self.clients[self.writer].name if self.writer is not None else ""
-            self._actions.append(Say(who, "unsent", f"{count} bytes that had not left were dropped"))
+            self._actions.append(
+                Say(
+                    who,
+                    "unsent",
+                    f"{counted(count, 'byte that had not left was', 'bytes that had not left were')} dropped",
+                )
+            )
         return self._done()
 
     # Settings

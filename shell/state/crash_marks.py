@@ -38,7 +38,7 @@ def playing(state: Path, ports: Iterable[str], macro: str, begun: datetime) -> I
     """Keep a mark on each port while a macro plays."""
     text = (
         f"macro {macro}, begun at {begun:%Y-%m-%d %H:%M:%S}, was cut off with its session; nothing stopped its drives: "
-        "they may still move, and on_stop was not executed"
+        "they may still move, and on_early_end was not executed"
     )
     with contextlib.ExitStack() as marks:
         for port in ports:

@@ -19,6 +19,7 @@ from enum import Enum
 from functools import partial
 from typing import TextIO
 
+from multidrop.dialects.text import counted
 from multidrop.shell.threads import CHUNK, LIMIT, BoundedWriter, Loss
 
 if sys.platform == "win32":
@@ -195,8 +196,8 @@ def _notice(stream: TextIO, errors: BoundedWriter | None) -> Callable[[Loss], by
 
     def notice(loss: Loss) -> bytes:
         if on_terminal:
-            are = "line is" if loss.count == 1 else "lines are"
-            return f"{loss.count} {are} missing here: the terminal did not take them\n".encode()
+            lines = counted(loss.count, "line is", "lines are")
+            return f"{lines} missing here: the terminal did not take them\n".encode()
         text = f"{loss}: the output is not read\n".encode()
         if errors is None:
             return text

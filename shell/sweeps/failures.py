@@ -13,6 +13,7 @@ import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 
+from multidrop.dialects.text import counted
 from multidrop.shell.sweeps.plan import Plan
 from multidrop.shell.sweeps.trial import DIED, Case, Result
 from multidrop.shell.sweeps.variation import SEED, Value, Values, simpler, spelled
@@ -147,4 +148,4 @@ def rows(plan: Plan, groups: Sequence[Group], failed: int) -> Iterator[str]:
             group = groups[number - 1]
             yield f"{' ' * widths[0]}  {command(plan, group.world, group.failed)}"
     if more := failed - sum(len(each.numbers) for each in groups):
-        yield f"and {more} further failed cases; --json lists all"
+        yield f"and {counted(more, 'further failed case')}; --json lists all"

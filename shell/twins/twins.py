@@ -189,5 +189,5 @@ class Twins:
         units = self._in_units(drive, event.axis, steps)
         text = f"{name}: {steps} steps{units} from its twin since {when} (limit {event.limit})"
         place = self._workspace.qualified_address(bus.at(event.address))
-        hint = f"/twin on {place} sets it anew".replace("  ", " ")
+        hint = f"/twin on {place} sets it again".replace("  ", " ")
         self._workspace.notify(f"{text}: {', '.join(event.causes)}; {hint}", bus=bus.name, warning=True)

@@ -6,6 +6,7 @@ import shlex
 from dataclasses import replace
 
 from multidrop.dialects import Diagnostic, Stopped
+from multidrop.dialects.text import counted
 from multidrop.macros import FIRST_PAGE, KEYS, Macro, check_name, parse_macro
 from multidrop.macros.recorder import Offer, with_waits
 from multidrop.macros.store import listed
@@ -168,17 +169,17 @@ async def _offer(workspace: Workspace, macro: Macro, found: list[Offer]) -> None
     changes = "; ".join(offer.text for offer in found)
     if await workspace.questions.agrees(f"macro {macro.name}: put waits in place of pauses: {changes}"):
         store.save(with_waits(macro, found), saved)
-        workspace.notify(f"macro {macro.name}: {len(found)} {'pause' if len(found) == 1 else 'pauses'} replaced")
+        workspace.notify(f"macro {macro.name}: {counted(len(found), 'pause')} replaced")
         return
     for offer in found:
         workspace.notify(f"macro {macro.name}: {offer.text} would fit; /macro edit {macro.name} changes it")
 
 
 def _in_place_of(before: bytes, macro: Macro) -> Macro:
-    """The macro with the key, the note and the on_stop lines of the one before it, if that one can be read."""
+    """The macro with the key, the note and the on_early_end lines of the one before it, if that one can be read."""
     try:
         old = parse_macro(before.decode("utf-8-sig", "replace"))
     except Diagnostic:
         return macro
     kept = replace(macro, key=old.key, page=old.page, note=old.note)
-    return replace(kept, on_stop=old.on_stop, on_stop_moves=old.on_stop_moves)
+    return replace(kept, on_early_end=old.on_early_end, on_early_end_moves=old.on_early_end_moves)

@@ -9,6 +9,7 @@ from math import inf
 from multidrop.dialects import Diagnostic, Inexpressible
 from multidrop.dialects.families import program_language_of
 from multidrop.dialects.program_files import errors
+from multidrop.dialects.text import counted
 from multidrop.drives.drive import Drive
 from multidrop.shell import new_file, program_listing
 from multidrop.shell.line_syntax import split_target
@@ -100,7 +101,7 @@ async def check(call: Call) -> None:
         call.session.notify(each.line_for(file), warning=True)
     if not checked.right:
         count = len(errors(checked.problems))
-        raise Inexpressible(f"{file}: {count} error{'' if count == 1 else 's'} for {product}")
+        raise Inexpressible(f"{file}: {counted(count, 'error')} for {product}")
     call.session.output(f"{file}: {checked.facts}")
 
 

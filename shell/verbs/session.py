@@ -38,7 +38,7 @@ async def resume(call: Call) -> None:
     if dropped := call.session.dropped:
         names = ", ".join(dict.fromkeys(dropped))
         call.session.notify(
-            f"on_stop of {names} was not executed and will not be; type its lines if needed", warning=True
+            f"on_early_end of {names} was not executed and will not be; type its lines if needed", warning=True
         )
         dropped.clear()
 

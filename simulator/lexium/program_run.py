@@ -24,7 +24,7 @@ from multidrop.dialects.mcode.manual.help import remedy
 from multidrop.dialects.mcode.manual.program_file import ProgramLine
 from multidrop.dialects.mcode.manual.statements import size_of
 from multidrop.dialects.program_files import Problem, errors
-from multidrop.dialects.text import whole
+from multidrop.dialects.text import counted, whole
 from multidrop.simulator.cell.spec import DriveSpec
 from multidrop.simulator.lexium.device import MCodeDevice
 from multidrop.simulator.lexium.state.errors import CRLF, Failure, Fault
@@ -46,7 +46,6 @@ from multidrop.simulator.program_run import (
     Value,
     Values,
     break_point,
-    counted,
     next_look,
 )
 from multidrop.simulator.world import World

@@ -18,7 +18,7 @@ from multidrop.dialects.files import SourceLine, split_lines
 from multidrop.dialects.pmx.manual import program_file, script_compiler
 from multidrop.dialects.pmx.manual.script_parser import PROGRAMS, VARIABLES
 from multidrop.dialects.pmx.manual.table import lookup
-from multidrop.dialects.text import whole
+from multidrop.dialects.text import counted, whole
 from multidrop.simulator.cell.spec import DriveSpec
 from multidrop.simulator.pmx.device import PmxDevice
 from multidrop.simulator.program_run import (
@@ -37,7 +37,6 @@ from multidrop.simulator.program_run import (
     Value,
     Values,
     break_point,
-    counted,
     next_look,
 )
 
@@ -299,7 +298,7 @@ class ProgramRun:
             moving=moving,
             given_up=running and until is None,
             stuck=running and stuck,
-            counts=f"X {x}, Y {y}, {counted(self._moves, 'motion')}, {lines} compiled lines, {failed}",
+            counts=f"X {x}, Y {y}, {counted(self._moves, 'motion')}, {counted(lines, 'compiled line')}, {failed}",
             turning="a motor still turns; WAITX or WAITY before END waits for it" if moving and ended == "END" else "",
         )
 

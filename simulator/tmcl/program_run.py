@@ -14,7 +14,7 @@ from typing import Any
 
 from multidrop.dialects import Diagnostic
 from multidrop.dialects.files import split_lines
-from multidrop.dialects.text import whole
+from multidrop.dialects.text import counted, whole
 from multidrop.dialects.tmcl.manual import program_file
 from multidrop.dialects.tmcl.manual.commands import Axis, Call, Command, Search, Status
 from multidrop.dialects.tmcl.manual.instructions import Word
@@ -33,7 +33,6 @@ from multidrop.simulator.program_run import (
     Summary,
     Values,
     break_point,
-    counted,
     next_look,
 )
 from multidrop.simulator.tmcl.module import TmclModule, worlds_of

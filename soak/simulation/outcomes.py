@@ -171,7 +171,7 @@ def _half(world: World) -> Iterator[str | Granted]:
     told = history.told
     typed = {(each.line, each.text) for each in history.commands.values()}
     typed |= {(line, text) for line, _, text in told.repeated} | {(each.line, each.text) for each in told.stored}
-    typed |= {(line, text) for run in told.runs.values() for line, _, text in (*run.texts, *run.on_stop)}
+    typed |= {(line, text) for run in told.runs.values() for line, _, text in (*run.texts, *run.on_early_end)}
     for each in history.executed:
         if not NUMBERED.fullmatch(each.text) or (each.line, each.text) in typed:
             continue

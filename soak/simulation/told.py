@@ -34,7 +34,7 @@ class Run:
     """What it may send."""
     moves: dict[Line, None] = field(default_factory=dict)
     """Those of them that start motion."""
-    on_stop: dict[Line, None] = field(default_factory=dict)
+    on_early_end: dict[Line, None] = field(default_factory=dict)
     """What it may send after its early end."""
     download: Download | None = None
     began: float = -1.0

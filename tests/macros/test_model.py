@@ -10,8 +10,8 @@ from multidrop.dialects.errors import Diagnostic
 from multidrop.macros import Macro, Parameter, Step, check, checked_values, escape, fill, filled, missing, value_names
 
 
-def macro(*lines: str, on_stop: tuple[str, ...] = ()) -> Macro:
-    return Macro("m", tuple(Step(0.0, line) for line in lines), on_stop=on_stop)
+def macro(*lines: str, on_early_end: tuple[str, ...] = ()) -> Macro:
+    return Macro("m", tuple(Step(0.0, line) for line in lines), on_early_end=on_early_end)
 
 
 @pytest.mark.parametrize(
@@ -53,7 +53,7 @@ def test_a_wrong_type_is_told_with_its_step(line: str, says: str) -> None:
 
 
 def test_a_plain_name_has_the_type_of_another_line() -> None:
-    found = macro("VM {n}", "MR {n:int=7}", "{{n:x}}", on_stop=("MA {n} {m}",)).parameters
+    found = macro("VM {n}", "MR {n:int=7}", "{{n:x}}", on_early_end=("MA {n} {m}",)).parameters
     assert found == (Parameter("n", "int", 7), Parameter("m"))
 
 

@@ -64,8 +64,11 @@ def test_any_line_survives_the_file(steps: list[Step], note: str) -> None:
         (GOOD.replace('"a"', '"a b"'), "invalid macro name 'a b'"),
         (
             "colour = 1\n" + GOOD,
-            "unknown key 'colour'; valid keys: name, key, page, note, recorded, roles, on_stop, on_stop_moves, step",
+            "unknown key 'colour'; valid keys: name, key, page, note, recorded, roles, on_early_end, "
+            "on_early_end_moves, step",
         ),
+        ("on_stop = ['S']\non_early_end = ['S']\n" + GOOD, "x.toml:1: on_stop is the old name of on_early_end"),
+        ("on_stop = [1]\n" + GOOD, "x.toml:1: on_early_end must be texts"),
         ("key = 'F1'\n" + GOOD, "invalid key 'F1'"),
         (GOOD + "delay = 1\n", "step 1: unknown key 'delay'; valid keys: after, line, drive, replies"),
         (GOOD.replace("0\n", '"0"\n'), "step 1: after must be a number"),
@@ -342,3 +345,10 @@ def test_every_key_with_two_macros_is_named(store: MacroStore) -> None:
         "a and b are both on F5, which plays none of them",
         "c and d and e are all on F12, which plays none of them",
     ]
+
+
+def test_a_file_of_version_0_1_0_with_on_stop_means_the_same() -> None:
+    before = 'name = "a"\non_stop = ["SL 0"]\non_stop_moves = true\n[[step]]\nafter = 0\nline = "PR P"\n'
+    found = parse_macro(before, "x.toml")
+    assert (found.on_early_end, found.on_early_end_moves) == (("SL 0",), True)
+    assert parse_macro(format_macro(found)) == found and "on_early_end_moves = true" in format_macro(found)

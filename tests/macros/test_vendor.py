@@ -95,7 +95,7 @@ def test_what_has_no_counterpart_is_told_with_its_place(text: str, says: str) ->
         (Macro("f2", (Step(0, "A ; b"),)), "has no counterpart"),
         (Macro("f2", (Step(0, "MR {n}"),)), "a value has no counterpart"),
         (Macro("f2", (Step(0, "MR 1"),), roles=("a",)), "a role has no counterpart"),
-        (Macro("f2", (Step(0, "MR 1"),), on_stop=("H",)), "on_stop has no counterpart"),
+        (Macro("f2", (Step(0, "MR 1"),), on_early_end=("H",)), "on_early_end has no counterpart"),
         (Macro("f2", (Step(0.0001, "MR 1"),)), "a pause of 0.0001 s has no counterpart"),
         (Macro("f2", (Step(0.001, "1"),)), "a pause of 1 ms before a digit"),
         (Macro("f2", (Step(0, "/play f3"), Step(0, "5"))), "a line that begins with a digit after ^f"),

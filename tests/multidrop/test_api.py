@@ -140,7 +140,7 @@ async def test_the_normal_end_leaves_a_move_alone_and_an_exception_stops_it(url:
                 raise KeyError
         assert moving(watcher) == set()
     assert [each.message for each in caplog.records if each.levelno >= logging.WARNING] == [
-        "stopped eth: eth reads velocity 0"
+        "stopped eth: velocity 0 was read from eth"
     ]
 
 
@@ -182,7 +182,7 @@ def test_the_end_of_the_loop_stops_and_says_so(url: str, caplog: Any) -> None:
 
     with pytest.raises(SystemExit), asyncio.Runner(loop_factory=VirtualLoop) as runner:
         runner.run(work())
-    assert caplog.messages[0] == "stopped a: all 2 read velocity 0"
+    assert caplog.messages[0] == "stopped a: velocity 0 was read from both"
 
 
 async def test_what_the_stop_did_not_reach_is_said(url: str, caplog: Any) -> None:
@@ -204,7 +204,7 @@ async def test_a_stop_ends_calls_and_refuses_commands_until_resume(url: str) -> 
         with pytest.raises(Stopped):
             await waiting
         report = await stop
-        assert report.at_rest and str(report) == "all 4 read velocity 0"
+        assert report.at_rest and str(report) == "velocity 0 was read from all 4"
         with pytest.raises(Stopped, match="/resume"):
             await a.move(1)
         assert await a.velocity() == 0 and await a.read("MV") == 0
@@ -220,7 +220,7 @@ async def test_a_stop_without_await_is_repeated_and_confirmed_before_the_end(url
     async with connect_async(f"{url}#eth") as session:
         await session.drive().move(FAR)
         session.stop()
-    assert caplog.messages[-1] == "stop: eth reads velocity 0"
+    assert caplog.messages[-1] == "stop: velocity 0 was read from eth"
 
 
 async def test_an_interruption_stops_and_the_session_goes_on(url: str) -> None:
@@ -270,7 +270,7 @@ async def test_a_script_runs_and_its_failure_names_the_line(url: str, tmp_path: 
 
 
 MACRO = """name = "go"
-on_stop = ["@a R1=5"]
+on_early_end = ["@a R1=5"]
 [[step]]
 after = 0.0
 line = "@a SL 1000"

@@ -50,7 +50,7 @@ async def test_what_cannot_be_is_refused_and_nothing_moves(saved: tuple[str, str
         with pytest.raises(TypeError):
             await a.move(12.5)
         for number in (float("nan"), float("inf")):
-            with pytest.raises(Diagnostic, match="is no quantity"):
+            with pytest.raises(Diagnostic, match="not a quantity"):
                 await a.move(number, "mm")
         with pytest.raises(Diagnostic, match="after rounding"):
             await a.move(1e-12, "mm")

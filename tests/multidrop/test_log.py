@@ -209,7 +209,7 @@ BAD = judgeable(entry("stop", "stop", "", ""), entry("sent", "bPR P\n"))
 
 def test_judge_says_what_held_on_standard_error(log, done):
     log.write_bytes(b"".join(map(line_of, GOOD)))
-    assert done("judge", log) == (0, [], [f"{log}: all 7 rules held (0 commands, 1 stops)"])
+    assert done("judge", log) == (0, [], [f"{log}: all 7 rules held (0 commands, 1 stop)"])
 
 
 def test_judge_prints_a_line_a_breach_also_as_json(log, done):
@@ -217,7 +217,7 @@ def test_judge_prints_a_line_a_breach_also_as_json(log, done):
     said = r"'bPR P\n' was sent before the stop"
     code, lines, err = done("judge", log)
     assert (code, lines) == (1, [f"{log}:4: 2026-11-22 12:41:06.020 first: {said}"])
-    assert err == [f"{log}: 1 breaches (0 commands, 1 stops)"]
+    assert err == [f"{log}: 1 breach (0 commands, 1 stop)"]
     code, [line], _ = done("judge", log, "--json")
     assert json.loads(line) == {"rule": "first", "time": AT.isoformat(), "where": f"{log}:4", "text": said}
     assert code == 1

@@ -14,7 +14,7 @@ from tests.support.until import PATIENCE
 
 SHUTTLE = """name = "shuttle"
 roles = ["gantry"]
-on_stop = ["@gantry:a PR 77"]
+on_early_end = ["@gantry:a PR 77"]
 
 [[step]]
 after = 30.0
@@ -112,7 +112,7 @@ def test_a_lost_connection_is_exit_3_and_the_place_is_named(multidrop: Command, 
 # -- Processes
 
 RUN = """name = "go"
-on_stop = ["@b PR 77"]
+on_early_end = ["@b PR 77"]
 [[step]]
 line = "@a SL 5000"
 [[step]]
@@ -137,7 +137,7 @@ def test_a_signal_stops_the_drives_runs_on_stop_and_is_130_with_no_terminal(shop
     playing.send_signal(signal.SIGTERM)
     out, err = playing.communicate(timeout=PATIENCE)
     assert (playing.returncode, out) == (130, "77\n")
-    assert "macro go, step 3 of 3, round 1: ended early" in err and "a stands at " in err
+    assert "macro go, step 3 of 3, round 1: ended early" in err and "a is at rest at " in err
     assert shop.standing() == (0, "0\n0\n", "")
 
 

@@ -49,9 +49,13 @@ def test_a_program_has_the_session_and_the_values(run: Any) -> None:
         ("a.send('VM=5')", 1, "job.py:3: a refused 'VM=5': error 23: VM must be above VI (lower VI or raise VM first)"),
         ("session.drive('z')", 2, "job.py:3: session.drive: no drive z; found: a, b"),
         ("session.send('/sim unplug press')\na.position", 3, "job.py:4: "),
-        ("session.stop()\na.move(1)", 4, "stop: all 2 read velocity 0"),
-        ("session.stop()", 0, "stop: all 2 read velocity 0"),
-        ("session.stopped_by_person = True\nsession.stop()\nsession.resume()", 4, "stop: all 2 read velocity 0"),
+        ("session.stop()\na.move(1)", 4, "stop: velocity 0 was read from both"),
+        ("session.stop()", 0, "stop: velocity 0 was read from both"),
+        (
+            "session.stopped_by_person = True\nsession.stop()\nsession.resume()",
+            4,
+            "stop: velocity 0 was read from both",
+        ),
         ("import sys\nsys.exit(7)", 7, ""),
         ("raise SystemExit('not today')", 1, "not today"),
         ("raise KeyboardInterrupt", 130, "interrupted"),
@@ -67,7 +71,7 @@ def test_an_uncaught_exception_shows_the_frames_of_the_program_only(run: Any) ->
     done = run("def turn():\n    a.move(1.5)\na.send('SL 1000')\nturn()")
     assert done.returncode == 1
     assert done.stderr.splitlines()[:2] == [
-        "stopped a: all 2 read velocity 0",
+        "stopped a: velocity 0 was read from both",
         "stopped as well, because the stop of their line has no name: b",
     ]
     assert done.stderr.count('  File "') == 2 == done.stderr.count('  File "job.py"')
@@ -125,7 +129,7 @@ def test_a_signal_interrupts_the_program_and_stops_what_it_moved(run: Any, name:
         f"try:\n    os.kill(os.getpid(), {number:d})\n    time.sleep(60)\nfinally:\n    print('finally')"
     )
     assert done.returncode == 130 and done.stdout == "finally\n"
-    assert done.stderr.splitlines()[0] == "stopped a: all 2 read velocity 0"
+    assert done.stderr.splitlines()[0] == "stopped a: velocity 0 was read from both"
     assert done.stderr.splitlines()[-1] == "interrupted"
     assert signal.getsignal(number) is before
 
@@ -141,7 +145,7 @@ def test_a_program_that_swallows_a_signal_is_interrupted_all_the_same_and_leaves
     kill = f"os.kill(os.getpid(), {signal.SIGTERM:d})"
     done = run(f"import os\na.send('SL 1000')\ntry:\n    {kill}\nexcept BaseException:\n    print(a.moving)")
     assert (done.returncode, done.stdout) == (130, "True\n")
-    assert done.stderr.splitlines()[0] == "stopped a: all 2 read velocity 0"
+    assert done.stderr.splitlines()[0] == "stopped a: velocity 0 was read from both"
     assert done.stderr.splitlines()[-1] == "interrupted"
 
 
@@ -165,7 +169,7 @@ def in_one_file(shop: Any, *command: str) -> str:
         ("1 / 0", "Traceback"),
         ("session.send('VM=5')", "job.py:3: b refused"),
         ("raise SystemExit('not today')", "not today"),
-        ("session.stop()", "stop: b reads velocity 0"),
+        ("session.stop()", "stop: velocity 0 was read from b"),
         pytest.param("import os; os.kill(os.getpid(), 15)", "interrupted", marks=POSIX),
     ],
 )
@@ -182,7 +186,7 @@ def test_what_a_plain_program_printed_comes_before_a_warning_and_its_traceback(s
         f"import multidrop\nwith multidrop.connect({shop.urls['press']!r}) as session:\n    {text}"
     )
     written = in_one_file(shop, "plain.py")
-    assert written.startswith("turns. stopped b: b reads velocity 0\nTraceback")
+    assert written.startswith("turns. stopped b: velocity 0 was read from b\nTraceback")
 
 
 @pytest.mark.process
@@ -197,7 +201,7 @@ def test_the_stop_key_ends_a_program_that_does_not_look(shop: Any) -> None:
     terminal.expect_exact("the terminal belongs to the stop key here")
     terminal.expect_exact("moves")
     terminal.send("\x18")
-    terminal.expect_exact("stop: b reads velocity 0")
+    terminal.expect_exact("stop: velocity 0 was read from b")
     terminal.wait()
     assert terminal.exitstatus == 4 and shop.velocity() == 0
 
@@ -218,4 +222,4 @@ def test_a_plain_program_that_crashes_leaves_nothing_moving(shop: Any) -> None:
         timeout=PATIENCE,
     )
     assert done.returncode == 1 and "ZeroDivisionError" in done.stderr
-    assert done.stderr.endswith("stopped b: b reads velocity 0\n") and shop.velocity() == 0
+    assert done.stderr.endswith("stopped b: velocity 0 was read from b\n") and shop.velocity() == 0

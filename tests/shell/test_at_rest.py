@@ -95,8 +95,8 @@ async def test_a_module_that_reads_velocity_0_in_motion_is_at_rest_in_one_place_
         assert len(samples) > 10 and all(each.velocity > 0 for each in samples[1:]), "rows say that it moves"
         await asyncio.sleep(2.0)
         (found,) = await standings(shop.session, [module])
-        assert found.text.startswith("1 reads velocity 0, but not twice at one position")
+        assert found.text.startswith("1 had velocity 0 once, but not twice at one position")
         await shop.session.run("/wait stopped")
         assert await module.send("GAP 1, 0") == ("200000",)
         (found,) = await standings(shop.session, [module])
-        assert found.text == "1 stands at 200000"
+        assert found.text == "1 is at rest at 200000"

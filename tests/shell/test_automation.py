@@ -78,7 +78,7 @@ async def test_whatever_ends_it_early_stops_what_it_started_and_nothing_else(run
         assert shop.moving() == {"gantry:d", "stages:01"}
         assert not shop.session.latched
         assert [text for text in shop.warned() if text.startswith("stopped ")] == [
-            "stopped press:a, gantry:c, eth, stages:00: all 5 read velocity 0",
+            "stopped press:a, gantry:c, eth, stages:00: velocity 0 was read from all 5",
             "stopped as well, because the stop of their line has no name: press:b",
         ]
         await shop.session.run("@gantry:c SL 100", By.SCRIPT)
@@ -114,7 +114,7 @@ async def test_a_stop_without_a_name_says_what_else_it_stopped(shop):
         await script(shop.session, GO["press:a"], GO["gantry:c"], "/sleep 1", "/wait stopped 1")
     assert shop.moving() == {"gantry:d"}
     assert shop.warned()[-2:] == [
-        "stopped press:a, gantry:c: all 3 read velocity 0",
+        "stopped press:a, gantry:c: velocity 0 was read from all 3",
         "stopped as well, because the stop of their line has no name: press:b",
     ]
 
@@ -123,7 +123,7 @@ async def test_a_line_to_all_is_all(shop):
     with pytest.raises(DriveError):
         await script(shop.session, "@press:* SL 50000", "@stages:* JX+", "/sleep 1", "/wait stopped 1")
     assert shop.moving() == set()
-    assert shop.warned()[-1] == "stopped press, stages: all 4 read velocity 0"
+    assert shop.warned()[-1] == "stopped press, stages: velocity 0 was read from all 4"
 
 
 async def test_a_program_counts_when_it_is_executed_and_not_when_it_is_stored(tmp_path, shop):
@@ -148,7 +148,7 @@ async def test_what_could_not_be_reached_is_named(shop):
             await shop.session.run("@press:a PR P")
     assert shop.moving() == {"press:a"}
     assert shop.warned()[-2:] == [
-        "stopped gantry:c: gantry:c reads velocity 0",
+        "stopped gantry:c: velocity 0 was read from gantry:c",
         "press: stop not sent (lost): a started 2 s ago and not read since - use the E-stop",
     ]
 
@@ -171,7 +171,7 @@ async def test_a_macro_within_a_script_belongs_to_it(shop):
         await script(shop.session, GO["gantry:c"], "/play m")
     assert shop.moving() == set()
     assert [text for text in shop.warned() if text.startswith("stopped ")] == [
-        "stopped gantry:c, press:b: all 3 read velocity 0",
+        "stopped gantry:c, press:b: velocity 0 was read from all 3",
         "stopped as well, because the stop of their line has no name: press:a",
     ]
 

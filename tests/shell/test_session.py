@@ -385,7 +385,7 @@ async def agreed():
 @pytest.mark.parametrize("by", [By.OPERATOR, By.MACRO])
 @pytest.mark.parametrize("word", ["exit", "quit", "help", "?"])
 async def test_a_bare_word_of_a_script_or_a_pipe_is_refused_and_goes_to_no_drive(press, word, by):
-    with pytest.raises(Diagnostic, match="is no command of a drive, nothing was sent"):
+    with pytest.raises(Diagnostic, match="not a command of a drive: .*; nothing was sent"):
         await press.session.run(word, by)
     assert (press.done, press.heard(Sent)) == ([], [])
 

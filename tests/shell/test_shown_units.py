@@ -113,7 +113,7 @@ async def test_where_a_drive_stands_has_its_place_in_units(tmp_path: Path) -> No
         await shop.session.run("@a MR {10 mm}")
         await shop.session.run("/wait stopped")
         one, other = await standings(shop.session, drives, shop.session.units)
-        assert (one.text, other.text) == ("a stands at 102400 (10 mm)", "b stands at 0")
+        assert (one.text, other.text) == ("a is at rest at 102400 (10 mm)", "b is at rest at 0")
         assert one.fact == {"position": 102400, "velocity": 0, "quantity": 10.0, "unit": "mm"}
         assert other.fact == {"position": 0, "velocity": 0}
 

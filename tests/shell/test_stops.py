@@ -123,8 +123,8 @@ async def test_stopped_is_said_when_every_drive_was_read_at_velocity_0_and_not_b
         seen.add(stop_report.words(shop.session.tally()))
         standing = {each.name for each in shop.session.tally().of(Fate.STANDING)}
         assert not standing & {name.replace("eth:!", "eth") for name in shop.moving()}
-    assert stop_report.words(shop.session.tally()) == "all 5 read velocity 0" and len(seen) > 2
-    assert stop_report.headline(shop.session.tally()).startswith("■ STOPPED   all 5 read velocity 0")
+    assert stop_report.words(shop.session.tally()) == "velocity 0 was read from all 5" and len(seen) > 2
+    assert stop_report.headline(shop.session.tally()).startswith("■ STOPPED   velocity 0 was read from all 5")
 
 
 async def test_a_lost_bus_is_named_with_how_its_drives_were_last_seen(tmp_path):
@@ -142,7 +142,7 @@ async def test_a_lost_bus_is_named_with_how_its_drives_were_last_seen(tmp_path):
             "d last seen standing 4 s ago - use the E-stop"
         ) in shop.warned()
         tally = shop.session.tally()
-        assert stop_report.words(tally) == "1 stands, 2 NOT REACHED: line (lost) - use the E-stop"
+        assert stop_report.words(tally) == "1 at rest, 2 NOT REACHED: line (lost) - use the E-stop"
         assert "STOPPED" not in stop_report.headline(tally)
         assert "Ctrl+X: stop not sent to every drive; macros and scripts wait for /resume" in shop.told()
         assert shop.moving() == {"line:c"}
@@ -155,7 +155,7 @@ async def test_a_bus_that_is_lost_before_its_stop_was_seen_to_work_is_not_known(
         shop.world("/sim unplug line")
         await asyncio.sleep(2.0)
         tally = shop.session.tally()
-        assert stop_report.words(tally) == "1 stands, 1 NOT KNOWN: line:c (lost) - use the E-stop"
+        assert stop_report.words(tally) == "1 at rest, 1 NOT KNOWN: line:c (lost) - use the E-stop"
         with pytest.raises(TransportLost):
             await shop.session.run("@line:c PR P")
 
@@ -166,7 +166,7 @@ async def test_a_silent_drive_and_one_in_program_mode_are_not_known(tmp_path):
         shop.world("/sim power c off")
         shop.session.stop()
         await asyncio.sleep(20.0)
-        assert stop_report.words(shop.session.tally()) == "1 stands, 2 NOT KNOWN: b, c - use the E-stop"
+        assert stop_report.words(shop.session.tally()) == "1 at rest, 2 NOT KNOWN: b, c - use the E-stop"
 
 
 async def test_what_an_operator_starts_behind_a_stop_is_not_said_to_stand(tmp_path):
@@ -176,7 +176,7 @@ async def test_what_an_operator_starts_behind_a_stop_is_not_said_to_stand(tmp_pa
         await shop.session.run("@b PR P")
         assert shop.session.tally().stand
         await shop.session.run("@b SL 5000")
-        assert stop_report.words(shop.session.tally()) == "1 stands, 1 started again: b"
+        assert stop_report.words(shop.session.tally()) == "1 at rest, 1 started again: b"
         assert "STOPPED" not in stop_report.headline(shop.session.tally())
 
 
@@ -189,7 +189,7 @@ async def test_a_drive_that_begins_to_move_by_itself_behind_a_stop_is_told(tmp_p
         placed.device.execute("SL 5000", shop.floor.now())
         await asyncio.sleep(1.0)
         await shop.session.selected.motion()
-        assert stop_report.words(shop.session.tally()) == "1 MOVES: a"
+        assert stop_report.words(shop.session.tally()) == "1 STILL MOVING: a"
 
 
 @pytest.mark.parametrize(
@@ -232,14 +232,14 @@ async def test_a_program_that_a_stop_does_not_end_is_named_in_every_report_of_it
         shop.session.stop()
         await asyncio.sleep(10.0)
         tally = shop.session.tally()
-        assert stop_report.words(tally) == "1 stands, 1 RUNS A PROGRAM: a - use the E-stop"
+        assert stop_report.words(tally) == "1 at rest, 1 STILL RUNNING A PROGRAM: a - use the E-stop"
         assert "STOPPED" not in stop_report.headline(tally) and stop_report.headline(tally, 60).endswith("E-stop")
         assert any(text.endswith("STILL RUNNING after 3 stops: a; cut the power") for text in shop.warned())
         drive = shop.session.buses["press"].drives["a"]
         halt = shop.session.buses["press"].stop([drive])
         await asyncio.sleep(10.0)
         assert outcome(shop.session, [halt])[0].startswith("stop sent to a: ")
-        assert "1 RUNS A PROGRAM: a" in outcome(shop.session, [halt])[0]
+        assert "1 STILL RUNNING A PROGRAM: a" in outcome(shop.session, [halt])[0]
 
 
 async def test_resume_tells_what_is_known(tmp_path):
@@ -247,7 +247,7 @@ async def test_resume_tells_what_is_known(tmp_path):
         shop.session.stop()
         await asyncio.sleep(2.0)
         await shop.session.run("/resume")
-        assert shop.told()[-1] == "macros and scripts may run again; all 2 read velocity 0"
+        assert shop.told()[-1] == "macros and scripts may run again; velocity 0 was read from both"
         await shop.session.run("/resume")
         assert shop.told()[-1] == "macros and scripts may run again"
 

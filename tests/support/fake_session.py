@@ -38,6 +38,8 @@ from multidrop.shell.units import Axis, Units
 from multidrop.transports import TransportLost, Unreachable
 from multidrop.tui.app import MultidropApp
 from multidrop.tui.assist import Assist, StartEntry
+from multidrop.tui.screens.dialogs import Over
+from multidrop.tui.screens.page import Framed
 from multidrop.tui.widgets.theme import Signs
 
 
@@ -501,8 +503,8 @@ def painted(screen: Any) -> list[Any]:
 
 
 def toasts(app: MultidropApp) -> list[str]:
-    """The notes that are shown over the screen."""
-    return [str(each.message) for each in app._notifications]
+    """The notes that are shown on the screen, that in front first."""
+    return [each.told for each in reversed(app.screen_stack) if isinstance(each, Over | Framed) and each.told]
 
 
 def readable(pilot: Pilot[int]) -> None:

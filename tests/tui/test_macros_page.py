@@ -117,7 +117,7 @@ async def test_traffic_can_be_paused_looked_back_and_shown_with_polls() -> None:
         assert "aPR 59·" in page.lines("traffic").plain and "61 50 52 20 35 39 0A" in page.lines("traffic").plain
         await pilot.press("space")
         await emit(pilot, OnBus("press", Traffic(session.time, True, b"aMR 5\n")))
-        assert "aMR 5" not in page.lines("traffic").plain and "1 pieces came" in page.lines("heading").plain
+        assert "aMR 5" not in page.lines("traffic").plain and "1 piece came" in page.lines("heading").plain
         await press(pilot, "home", "f")
         assert "aPR 0\\n" in page.lines("traffic").plain and "61 50" not in page.lines("traffic").plain
         await press(pilot, "end")

@@ -15,6 +15,7 @@ from multidrop.macros import Macro, Step
 from multidrop.shell.macro_arguments import value_fields
 from multidrop.tui.screens.dialogs import Form, GoOn
 from tests.support.fake_session import FakeSession, demo_session, make_app, on_screen, press, readable, settle
+from tests.support.real_screen import until
 
 pytestmark = pytest.mark.tui
 WHAT = "a: CP erases every program and every user variable"
@@ -95,7 +96,7 @@ def test_snapshot_of_a_question(snap_compare: Callable[..., bool]) -> None:
     assert snap_compare(app, terminal_size=(80, 24), run_before=act)
 
 
-async def test_the_lines_that_lead_to_the_question_are_in_it_and_can_be_read_to_their_end() -> None:
+async def test_the_box_holds_the_question_alone_and_covers_none_of_the_lines_that_lead_to_it() -> None:
     async with on_screen() as (pilot, app, session):
         app.show_line("/params restore kept.toml", ">")
         for number in range(20):
@@ -103,18 +104,20 @@ async def test_the_lines_that_lead_to_the_question_are_in_it_and_can_be_read_to_
         assert session.front.ask is not None
         answer = asyncio.ensure_future(session.front.ask(WHAT))
         await settle(pilot)
-        assert isinstance(app.screen, GoOn) and app.screen.before == [f"a: Q{number}=1" for number in range(20)]
         readable(pilot)
-        box, lines = app.screen.query_one(".box"), app.screen.query_one(".before")
-        assert box.region.bottom <= 24 and app.screen.query_one(".keys").region.bottom < box.region.bottom
-        assert lines.size.height == 6 and lines.scroll_y == 0
-        await press(pilot, "pagedown", "pagedown", "pagedown")
-        assert lines.scroll_y == 14 and not answer.done()
+        box, transcript = app.screen.query_one(".box"), app.main.transcript
+        assert len(box.children) == 3 and box.region.bottom <= transcript.region.y
+        assert transcript.plain.splitlines()[-1].endswith("a: Q19=1")
+        await press(pilot, *["pageup"] * 6)
+        assert "/params restore kept.toml" in transcript.plain and not answer.done()
+        height = transcript.size.height
         await pilot.press("y")
         assert await answer is True
+        await settle(pilot)
+        assert transcript.size.height > height, "the rows of the box are the transcript's again"
 
 
-async def test_a_low_screen_shows_the_answers_first() -> None:
+async def test_a_low_screen_shows_the_answers_and_the_input_line() -> None:
     async with on_screen(width=60, height=15) as (pilot, app, session):
         app.show_line("a: Q1=1", "")
         assert session.front.ask is not None
@@ -122,6 +125,29 @@ async def test_a_low_screen_shows_the_answers_first() -> None:
         await settle(pilot)
         assert app.screen.query_one(".keys").region.bottom < app.screen.query_one(".box").region.bottom <= 15
         answer.cancel()
+
+
+async def test_a_key_that_was_too_early_is_told_in_the_box() -> None:
+    async with asked() as (pilot, _, answer):
+        assert isinstance(pilot.app.screen, GoOn) and pilot.app.screen.told == ""
+        await press(pilot, "y")
+        assert "these keys were dropped" in str(pilot.app.screen.query_one(".keys").render()) and not answer.done()
+        assert "these keys were dropped" not in pilot.app.main.transcript.plain  # type: ignore[attr-defined]
+        readable(pilot)
+        await pilot.press("f2")
+        assert str(pilot.app.screen.query_one(".keys").render()).startswith("Answer the question first: y or n")
+
+
+async def test_a_note_takes_rows_of_its_own_and_gives_them_back() -> None:
+    async with on_screen() as (pilot, app, _):
+        await settle(pilot)
+        before = [app.main.entry.region, app.main.lines("status").region]
+        app.notify("word " * 30, timeout=0.5)
+        await settle(pilot)
+        told = app.main.lines("told")
+        assert told.region.height == 2 and told.region.y == app.main.transcript.region.bottom
+        assert [app.main.entry.region, app.main.lines("status").region] == before
+        await until(pilot, lambda: not app.main.lines("told").display)
 
 
 # A form

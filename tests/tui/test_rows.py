@@ -20,6 +20,7 @@ from multidrop.tui.readout import Readout, State
 from multidrop.tui.screen_model import ScreenModel
 from multidrop.tui.widgets.bars import STOP, Footer, banner_row, footer_row
 from multidrop.tui.widgets.lines import Lines, width_of
+from multidrop.tui.widgets.theme import Signs, shown_as
 from tests.support.fake_session import FakeDrive, demo_session, emit, on_screen, press
 from tests.support.panel_rows import plain
 
@@ -83,7 +84,7 @@ def test_columns_do_not_jump_when_values_change() -> None:
 def test_an_old_value_is_dim_and_says_its_age() -> None:
     drive = glance("a", (1.0, 512_000, 100), selected=True)
     fresh, old = (narrow_rows(view(drive, now=now), 80)[0] for now in (1.1, 4.0))
-    assert ("▶ moving" in plain(fresh), "▶ moved 3 s " in plain(old)) == (True, True)
+    assert ("▶ moving" in plain(fresh), "▶ 3 s ago " in plain(old)) == (True, True)
     assert [role for text, role in fresh if "512000" in text] == ["strong"]
     assert [role for text, role in old if "512000" in text] == ["dim"]
 
@@ -132,22 +133,22 @@ GONE = [(UNREACHED, f"line:{name}") for name in "abc"]
 
 
 def test_the_banner_says_stopped_only_when_every_drive_was_read_at_velocity_0() -> None:
-    stood = "■ STOPPED   all 9 read velocity 0       /resume lets macros run"
+    stood = "■ STOPPED   velocity 0 was read from all 9       /resume lets macros run"
     assert plain(banner_row(tally(*NINE), "", 100)).strip() == stood
     for fate in set(Fate) - {STANDING}:
         assert "STOPPED" not in plain(banner_row(tally(*NINE, (fate, "eth:x")), "", 100))
 
 
 def test_the_banner_names_what_is_not_known_and_what_was_not_reached() -> None:
-    whole = "✗ STOP SENT 12:41:09   9 stand   1 NOT KNOWN: noisy   3 NOT REACHED: line (lost) - use the E-stop"
+    whole = "‼ STOP SENT 12:41:09   9 at rest   1 NOT KNOWN: noisy   3 NOT REACHED: line (lost) - use the E-stop"
     known = tally(*NINE, (UNKNOWN, "noisy"), *GONE)
     assert plain(banner_row(known, "line: gone", 120)).strip() == whole
     assert plain(banner_row(known, "", 80)).strip() == (
-        "✗ STOP SENT   1 NOT KNOWN: noisy   3 NOT REACHED: line (lost) - use the E-stop"
+        "‼ STOP SENT   1 NOT KNOWN: noisy   3 NOT REACHED: line (lost) - use the E-stop"
     )
-    assert "1 MOVES: press:x" in plain(banner_row(tally(*NINE, (MOVING, "press:x")), "", 80))
+    assert "1 STILL MOVING: press:x" in plain(banner_row(tally(*NINE, (MOVING, "press:x")), "", 80))
     vain = plain(banner_row(tally(*NINE, (MOVING, "press:x"), vain=True), "", 80))
-    assert vain.strip().endswith("1 MOVES: press:x - use the E-stop")
+    assert vain.strip().endswith("1 STILL MOVING: press:x - use the E-stop")
 
 
 @given(
@@ -163,9 +164,25 @@ def test_no_banner_of_60_columns_or_more_loses_the_emergency_stop(
 
 def test_the_banner_tells_a_lost_bus_in_front_of_drives_that_stood() -> None:
     assert plain(banner_row(None, "gone", 80)).strip() == "✗ LOST - gone"
-    assert plain(banner_row(tally(*NINE), "gone", 80)).strip() == "✗ LOST - gone; before that all 9 read velocity 0"
-    assert "STOPPED" not in plain(banner_row(tally(*NINE), "gone", 80))
+    before = plain(banner_row(tally(*NINE), "gone", 80))
+    assert before.strip() == "✗ LOST - gone; before that velocity 0 was read from all 9" and "STOPPED" not in before
     assert banner_row(None, "", 80) == ()
+
+
+def test_no_banner_is_cut_before_its_advice() -> None:
+    loss = plain(banner_row(tally(*NINE), "/dev/ttyUSB0: " + "unplugged " * 20 + "; trying again", 80))
+    assert loss.rstrip().endswith("…; trying again") and len(loss) == 80
+    one = plain(banner_row(tally((STANDING, "a-line-with-a-very-long-name-indeed")), "", 60))
+    assert one.strip() == "■ STOPPED   /resume lets macros run"
+
+
+def test_red_is_for_what_is_not_confirmed_and_each_alarm_has_a_sign_of_its_own() -> None:
+    assert {role for _, role in banner_row(tally(*NINE), "", 80)} == {"latched"}
+    red = [banner_row(tally(*NINE, (fate, "x")), "", 80) for fate in (UNREACHED, MOVING, Fate.RUNNING, UNKNOWN)]
+    red.append(banner_row(None, "gone", 80))
+    assert {role for row in red for _, role in row} == {"stop"}
+    assert [plain(row)[1] for row in red] == ["‼", "▶", "▷", "?", "✗"]
+    assert len({shown_as(plain(row), Signs.ASCII)[1] for row in red}) == 5
 
 
 def two_axes(width: int = 60) -> Glance:

@@ -62,11 +62,11 @@ def test_an_old_state_stays_with_its_age_until_the_next_is_read(model: ScreenMod
     readout(model).period = 1.0
     model.take(sample(1.0, 5000))
     assert readout(model).words(2.9) == "moving"
-    assert readout(model).words(4.0) == "moved 3 s ago"
+    assert readout(model).words(4.0) == "moving 3 s ago"
     assert bus_state(model.bus("press"), ["a"], False) is State.MOVING and bus_old(model.bus("press"), ["a"], 4.0)
     model.take(sample(4.1, 0))
     assert readout(model).words(4.2) == "stopped"
-    assert readout(model).words(14.0) == "stood 10 s ago"
+    assert readout(model).words(14.0) == "at rest 10 s ago"
     assert not bus_old(model.bus("press"), ["a"], 4.2)
 
 
@@ -75,7 +75,7 @@ def test_a_stop_takes_no_state_away(model: ScreenModel) -> None:
         readout(model, address).period = 2.0
         model.take(sample(1.0, velocity, address=address))
     model.stopped(2.0)
-    assert [readout(model, address).words(2.1) for address in "ab"] == ["stood 1 s ago", "moved 1 s ago"]
+    assert [readout(model, address).words(2.1) for address in "ab"] == ["at rest 1 s ago", "moving 1 s ago"]
     assert bus_state(model.bus("press"), ["a", "b"], False) is State.MOVING
 
 
@@ -100,11 +100,11 @@ def test_what_was_read_before_a_line_was_sent_is_old(model: ScreenModel) -> None
         model.take(sample(1.0, 0, address=address))
     model.take(Entered(2.0, "@b MR 5", By.OPERATOR, "press", "b"))
     assert readout(model, "a").words(2.1) == "stopped"
-    assert readout(model, "b").words(2.1) == "stood 1 s ago"
+    assert readout(model, "b").words(2.1) == "at rest 1 s ago"
     model.take(sample(2.2, 700, address="b"))
     assert readout(model, "b").words(2.3) == "moving"
     model.take(Entered(2.4, "@* SL 0", By.MACRO, "press", "*"))
-    assert readout(model, "a").words(2.5) == "stood 2 s ago"
+    assert readout(model, "a").words(2.5) == "at rest 2 s ago"
 
 
 def test_a_value_that_is_read_anew_ten_times_a_second_does_not_flicker_with_every_line(model: ScreenModel) -> None:
@@ -337,3 +337,22 @@ def test_what_is_kept_is_bounded_in_pieces_and_in_bytes() -> None:
 
 def test_other_events_are_left_to_others() -> None:
     assert TrafficStore().take(Sample(1.0, "b", 0, 0)) is False
+
+
+def test_the_gutter_has_the_name_that_a_person_gave_and_a_failure_does_not_repeat_it() -> None:
+    named = {("press", "a"): "gantry"}
+    model = ScreenModel(lambda: "press", lambda: {"press"}, named=lambda bus, address: named.get((bus, address), ""))
+    model.take(Failed(1.0, "gantry refused 'VM=-1': error 21", "press", "a"))
+    model.take(Failed(1.1, "press:gantry refused 'XX'", "press", "a"))
+    model.take(Failed(1.2, "b refused 'XX'", "press", "b"))
+    model.take(Failed(1.3, "a stop came before 'MR 1' was sent", "press", "a"))
+    model.take(Failed(1.3, "press:a: no reply", "press", "a"))
+    model.take(Printed(1.4, "press", "a", "0"))
+    assert [(each.address, each.name, each.text) for each in model.bus("press").fresh] == [
+        ("a", "gantry", "refused 'VM=-1': error 21"),
+        ("a", "gantry", "refused 'XX'"),
+        ("b", "", "refused 'XX'"),
+        ("a", "gantry", "a stop came before 'MR 1' was sent"),
+        ("a", "gantry", "no reply"),
+        ("a", "gantry", "0"),
+    ]

@@ -30,7 +30,7 @@ def told(*events: object) -> list[tuple[str, str, str]]:
 
 
 def test_a_limit_is_said_with_the_position_when_it_lights_and_not_while_it_stays() -> None:
-    assert told((2_048_000, 0), REST, LIMIT, LIMIT) == [("!", "b", "limit+ reached at 2048000; it stands")]
+    assert told((2_048_000, 0), REST, LIMIT, LIMIT) == [("!", "b", "limit+ reached at 2048000; it is at rest")]
     assert told((0, 500), REST, LIMIT) == [("!", "b", "limit+ reached at 0")]
     assert told(LIMIT) == [], "what was read first is a state, not an event"
 
@@ -61,15 +61,15 @@ def test_an_alarm_among_the_values_of_a_family_is_said() -> None:
 
 def test_silence_and_its_end_are_said_once() -> None:
     assert told((0, 0), "silent", "silent", (0, 0), (0, 0)) == [
-        ("!", "b", "does not reply to polls"),
-        (".", "b", "replies again"),
+        ("!", "b", "no reply to polls"),
+        (".", "b", "polls get a reply again"),
     ]
 
 
 def test_the_trouble_of_an_axis_is_said_when_it_changes() -> None:
     troubled = (0, 0, "x", "limit+")
     said = told((0, 0, "x"), troubled, troubled, (0, 0, "x"))
-    assert said == [("!", "b", "x: limit+"), (".", "b", "x: no more: limit+")]
+    assert said == [("!", "b", "x: limit+"), (".", "b", "x: cleared: limit+")]
 
 
 def test_the_number_of_an_error_leads_to_its_help() -> None:

@@ -119,7 +119,7 @@ async def test_after_a_stop_every_drive_is_looked_at_and_none_is_said_to_stand_u
         await emit(pilot, *a_move(session))
         assert "b clamp  ■ stopped" in app.main.lines("status").plain
         await press(pilot, "ctrl+x")
-        assert "b clamp  ■ stood 0.9 s" in app.main.lines("status").plain
+        assert "b clamp  ■ 0.9 s ago" in app.main.lines("status").plain
         assert set(session.buses["press"].telemetry.polled.values()) == {STATUS, LIVELY}
 
 
@@ -130,14 +130,14 @@ async def test_the_banner_follows_what_is_read_without_a_word_from_anybody() -> 
         session.fates = {f"press:{name}": Fate.STANDING for name in "abc"} | {"pmx:00": Fate.NOT_REACHED}
         await settle(pilot)
         assert banner(app).strip() == (
-            "✗ STOP SENT 12:41:07   3 stand   1 not read yet   1 NOT REACHED: pmx (lost) - use the E-stop"
+            "‼ STOP SENT 12:41:07   3 at rest   1 not read yet   1 NOT REACHED: pmx (lost) - use the E-stop"
         )
         session.fates |= {"eth:": Fate.STANDING, "pmx:00": Fate.STANDING}
         await settle(pilot)
         assert banner(app).strip().startswith("✗ LOST - "), "a bus is lost, though all stood before"
         session.buses["pmx"].lost = None
         await settle(pilot)
-        assert banner(app).strip().startswith("■ STOPPED   all 5 read velocity 0")
+        assert banner(app).strip().startswith("■ STOPPED   velocity 0 was read from all 5")
 
 
 DWELLS = 'program_text = """\nPG 1\nLB G1\nMR 51200\nH\nH 500\nBR G1\nE\nPG\n"""'

@@ -46,6 +46,14 @@ def test_tabs_do_not_jump_when_a_state_changes() -> None:
     assert len(places) == 1
 
 
+def test_eight_tabs_at_80_columns_keep_as_much_of_their_names_as_there_is_room_for() -> None:
+    names = ["press", "gantry", "127.0.0.1-5031", "127.0.0.1-5032", "eth", "pmx", "conveyor", "lift"]
+    tabs = [Tab(number, name, State.IDLE, number == 1) for number, name in enumerate(names, 1)]
+    assert shown(tabs, 80) == " 1 press ■  2 gant…■ 3 …5031■ 4 …5032■ 5 eth■ 6 pmx■ 7 conv…■ 8 lift■"
+    assert "2 gantry■ 3 …7.0.0.1-5031■ 4 …7.0.0.1-5032■ 5 eth■" in shown(tabs, 100)
+    assert "2 gantry ■  3 …7.0.0.1-5031 ■  4 …7.0.0.1-5032 ■  5 eth ■" in shown(tabs, 120)
+
+
 def test_thirty_two_tabs_fold_at_80_columns() -> None:
     quiet = [State.IDLE] * 32
     assert shown(tabs_of(quiet, 0), 80) == "  1 line1 ■  2-32 ■".replace("  1", " 1", 1)

@@ -7,8 +7,9 @@ import pytest
 from textual.app import App, ComposeResult
 from textual.pilot import Pilot
 
+from multidrop.shell.raw import Form
 from multidrop.tui.screen_model import KEPT, Record
-from multidrop.tui.widgets.transcript import Clocks, Transcript
+from multidrop.tui.widgets.transcript import Clocks, Transcript, rows_of
 
 pytestmark = pytest.mark.tui
 GUTTER = Clocks("clock", str).gutter
@@ -175,3 +176,20 @@ async def test_a_hundred_thousand_lines_are_taken_in_within_a_second() -> None:
             await pilot.pause()
         assert time.process_time() - began < 1.0 * 5  # CPU seconds; five times what is asked, for a slow machine
         assert (await shown(pilot, app.page))[-1].endswith("line 3399")
+
+
+async def test_raw_bytes_stand_in_columns_with_milliseconds_and_the_gutter_is_as_wide_as_a_name() -> None:
+    clocks = Clocks("clock", lambda at: "12:41:05.100")
+    sent = [Record(0.0, "", "↑", row, columns=True) for row in Form.BOTH.rows(b"PR P\r")]
+    got = [Record(0.0, "", "↓", row, columns=True) for row in Form.BOTH.rows(bytes(range(12)) + b"abc")]
+    rows = ["".join(text for text, _ in row) for each in sent + got for row in rows_of(each, None, clocks, 80)]
+    assert rows == [
+        " 12:41:05.100  ↑ PR P\\r                   50 52 20 50 0D",
+        " 12:41:05.100  ↓ \\x00\\x01\\x02\\x03\\x04\\x05 00 01 02 03 04 05",
+        " 12:41:05.100  ↓ \\x06\\x07\\x08\\t\\n\\x0babc  06 07 08 09 0A 0B 61 62 63",
+    ]
+    page = Transcript(lambda at: "12:41:05.100")
+    page.take([Record(0.0, "a", ">", "PR P", name="gantry-left")])
+    assert page.clocks.gutter == clocks.gutter + len("gantry-left") - 3
+    (row,) = page.rows_of(page.records[0], None, 60)
+    assert "".join(text for text, _ in row) == " 12:41:05  gantry-left › PR P"

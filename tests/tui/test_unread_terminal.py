@@ -58,6 +58,6 @@ def test_a_signal_stops_what_a_macro_moves_and_ends_it_though_nobody_reads(shop,
 def test_the_screen_is_whole_when_it_is_read_again(shop, stuck):
     stuck.send("\x18")
     until(lambda: shop.velocity() == 0, "the drive was not stopped")
-    shows(stuck, lambda screen: any("all 2 read velocity 0" in line for line in screen))
+    shows(stuck, lambda screen: any("velocity 0 was read from both" in line for line in screen))
     stuck.send("\x11")
     assert read_to_end(stuck) == 0

@@ -128,13 +128,12 @@ def _state_role(glance: Glance, now: float) -> str:
 
 
 def short_words(glance: Glance, axis: Readout, now: float) -> str:
-    """Sign and state in few cells, with its age where it may be outdated: `■ stood 3 s`."""
+    """Sign and state in few cells, with its age where it may be outdated: `■ 3 s ago`."""
     state = glance.state()
     if state in READ and axis.last is not None:
         state = axis.own_state
         if glance.readout.old(now):
-            word = "moved" if state is State.MOVING else "stood"
-            return fit(f"{state.sign} {word} {age(now - axis.last.at)}", STATE)
+            return fit(f"{state.sign} {age(now - axis.last.at)} ago", STATE)
     if state is State.SILENT and glance.readout.silent_since is not None:
         return fit(f"{state.sign} silent {age(now - glance.readout.silent_since)}", STATE)
     return fit(f"{state.sign} {'not read' if state is State.UNKNOWN else state.word}", STATE)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
+from multidrop.dialects.text import counted
 from multidrop.shell.events import Phase
 from multidrop.tui.panels.view import Glance, View
 from multidrop.tui.readout import Readout
@@ -94,7 +95,7 @@ def program_rows(view: View, width: int, height: int) -> list[Row]:
     read = f"read {view.session.wall(facts.read_at):%H:%M:%S}"
     if spot is None:
         return [
-            ((fit(f" {len(facts.lines)} lines, {read}", width), "dim"),),
+            ((fit(f" {counted(len(facts.lines), 'line')}, {read}", width), "dim"),),
             *listing_rows(chosen.readout, width, height - 1),
         ]
     return listing_rows(chosen.readout, width, height)

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from datetime import datetime
 
-from multidrop.shell.raw import text_of
+from multidrop.shell.raw import hex_of, parts_of, text_of
 from multidrop.tui.panels.view import View
 from multidrop.tui.screen_model import Piece
 from multidrop.tui.text import fit
@@ -38,7 +38,7 @@ def traffic_title(view: View) -> Row:
 
 
 def piece_rows(piece: Piece, wall: Wall, width: int, hex_too: bool = True) -> list[Row]:
-    """A piece as rows: time, direction, drive, then hex and text, or text alone where there is no room."""
+    """A piece as rows: time, direction, drive, then text and hex, or text alone where there is no room."""
     at = wall(piece.at)
     clock = f"{at:%H:%M:%S}.{at.microsecond // 1000:03}"
     head = f" {clock} " if width >= HEX_FROM else f" {clock[6:]} "
@@ -48,17 +48,16 @@ def piece_rows(piece: Piece, wall: Wall, width: int, hex_too: bool = True) -> li
     beside = hex_too and width >= HEX_FROM
     size = room // 4 if beside else room
     rows: list[Row] = []
-    for number, part in enumerate(_parts(piece.data, size, beside)):
+    for number, part in enumerate(parts_of(piece.data, size, len(piece.data) * 4 if beside else room)):
         start = head if not number else " " * len(head)
         where = fit(piece.address, 3) if not number else "   "
-        shown = fit(f"{part.hex(' ').upper()}", size * 3) if beside else ""
         rows.append(
             (
                 (start, "dim"),
                 (f"{sign} " if not number else "  ", role),
                 (f"{where} ", "dim"),
-                (shown, "dim"),
-                (_dots(part) if beside else text_of(part), role),
+                (fit(_dots(part), size + 1) if beside else text_of(part), role),
+                *([(hex_of(part), "dim")] if beside else []),
             )
         )
     return rows
@@ -67,17 +66,3 @@ def piece_rows(piece: Piece, wall: Wall, width: int, hex_too: bool = True) -> li
 def _dots(data: bytes) -> str:
     """Bytes as text of the same length, beside their hex: a dot for each that is not printable."""
     return "".join(chr(each) if 0x20 <= each < 0x7F else "·" for each in data)
-
-
-def _parts(data: bytes, size: int, beside: bool) -> Iterable[bytes]:
-    """Divide bytes into rows; as text alone, an escaped byte takes up to four cells."""
-    if beside:
-        return [data[at : at + size] for at in range(0, len(data), size)] or [b""]
-    parts, part = [], b""
-    for each in data:
-        longer = part + bytes([each])
-        if part and len(text_of(longer)) > size:
-            parts.append(part)
-            longer = bytes([each])
-        part = longer
-    return [*parts, part]

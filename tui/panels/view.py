@@ -16,8 +16,8 @@ from multidrop.tui.screen_model import ScreenModel
 from multidrop.tui.text import fit
 from multidrop.tui.widgets.lines import Span
 
-STATE = 17
-"""Width of a sign and its words: `■ stood 0.9 s ago`."""
+STATE = 20
+"""Width of a sign and its words: `■ at rest 12 min ago`."""
 
 
 UNREFERENCED = "~"
@@ -107,6 +107,12 @@ def figures_at(session: Session, bus: str, address: str, axis: str) -> Figures:
     if drive is None or not session.units.shown:
         return NATIVE
     return figures_of(session.units.of(drive, axis), session.units.referenced(drive, axis))
+
+
+def name_at(session: Session, bus: str, address: str) -> str:
+    """The name that a person gave to a drive; empty without one."""
+    drive = session.buses[bus].drives.get(address) if bus in session.buses else None
+    return drive.label if drive is not None else ""
 
 
 @dataclass(frozen=True)

@@ -18,6 +18,7 @@ from typing import ClassVar
 
 from textual.binding import Binding, BindingType
 
+from multidrop.dialects.text import counted
 from multidrop.dialects.values import BY, DISABLE, ENABLE, HIGH, HOME_MINUS, HOME_PLUS, LOW, STOP, TO, Control, Controls
 from multidrop.tui.key_table import bound
 from multidrop.tui.panels.drive import drive_rows, unit_of
@@ -199,8 +200,8 @@ class ControlsPage(AskingPage):
     def _readiness(self, why: str) -> Span:
         """True if the next press moves, or why not; with the presses that were dropped."""
         count = self._jog.dropped
-        presses = "1 press" if count == 1 else f"{count} presses"
-        dropped = f"; {presses} dropped ({self._jog.why})" if count else ""
+        presses = counted(count, "press", "presses")
+        dropped = f"; {presses} dropped ({'last: ' * (count > 1)}{self._jog.why})" if count else ""
         if not why:
             return f"ready{dropped}", "text" if dropped else "dim"
         return f"a press is dropped now: {why}{dropped}", "motion" if why == "it moves" else "strong"
@@ -354,13 +355,12 @@ class ControlsPage(AskingPage):
         glance, axis = chosen
         host = self.host
         state = axis_state(glance, axis)
-        if not self._jog.allows(glance.readout, axis, state, host.session.now(), idle=host.outbox.idle):
-            self.say(f"not sent: {self._jog.why}")
-            return
-        assert axis.last is not None
-        to = number if name == TO else axis.last.position + number
+        to = number if name == TO or axis.last is None else axis.last.position + number
         if not LOW <= to <= HIGH:
             self.say(f"not sent: the end of the move, {to}, is out of range")
+            return
+        if not self._jog.allows(glance.readout, axis, state, host.session.now(), idle=host.outbox.idle):
+            self.say(f"not sent: {self._jog.why}")
             return
         self._send(control.filled(by=number, to=to))
 

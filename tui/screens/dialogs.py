@@ -82,9 +82,22 @@ class Options(OptionList):
             self._taken(number)
 
 
+class Hint(Static):
+    """The last rows of a box: its keys, and before them what became of the last key."""
+
+    def __init__(self, keys: str) -> None:
+        super().__init__(keys, classes="keys", markup=False)
+        self._keys = keys
+
+    def tell(self, text: str) -> None:
+        self.update(Text.assemble((f"{text}\n" if text else "", "bold"), self._keys))
+
+
 class Over(ModalScreen[T], Generic[T]):
     """A screen over the main one, with the app's keys that work everywhere."""
 
+    told = ""
+    """What became of the last key, where the box does not show that by itself."""
     SHEET: ClassVar[str] = "box"
     BINDINGS: ClassVar[list[BindingType]] = bound("box")
 
@@ -99,6 +112,13 @@ class Over(ModalScreen[T], Generic[T]):
     def on_mount(self) -> None:
         if self.is_attached:  # else it is closed already, as the app ends
             self.mount(StopSign())
+            self.tell(self.told)
+
+    def tell(self, text: str) -> None:
+        """Tell in the box what became of a key; an empty text removes that."""
+        self.told = text
+        for each in self.query(Hint):
+            each.tell(text)
 
 
 class Dialog(Over[T], Generic[T]):
@@ -124,7 +144,7 @@ class Ask(Dialog[str]):
         with Vertical(classes="box"):
             yield Static(self.heading, classes="title", markup=False)
             yield Field(self._entered, self.value)
-            yield Static(self.hint, classes="keys", markup=False)
+            yield Hint(self.hint)
 
     def on_mount(self) -> None:
         self.set_focus(self.query_one(Field))
@@ -153,7 +173,7 @@ class Confirm(Dialog[str]):
             yield Static(self.heading, classes="title", markup=False)
             yield Static("\n".join(self.lines), classes="about", markup=False)
             yield Options([text for _, text in self.answers], self._taken)
-            yield Static(hint("answers"), classes="keys")
+            yield Hint(hint("answers"))
 
     def on_mount(self) -> None:
         self.query_one(Options).highlighted = 0
@@ -170,34 +190,26 @@ class Confirm(Dialog[str]):
         self.dismiss(self.answers[number][0])
 
 
-LOW = 22
-"""Height of a screen from which a question has room for more than its answers."""
-
-
 class GoOn(Dialog[bool]):
     """A question before a step that needs a yes: y is yes; n, Enter, Escape and a stop are no."""
 
     SHEET = "question"
     BINDINGS: ClassVar[list[BindingType]] = [*bound("question"), REFUSED]
 
-    def __init__(self, question: str, before: Sequence[str] = ()) -> None:
-        """Make the question. `before`: the lines that lead to it, which the dialog would cover."""
+    def __init__(self, question: str, look: Callable[[int], None], room: Callable[[int], None]) -> None:
+        """Make the question. `look` scrolls the transcript by pages; `room` leaves rows free above it for the box."""
         super().__init__()
-        self.question, self.before = question, before
+        self.question, self._look, self._room = question, look, room
 
     def compose(self) -> ComposeResult:
-        """Make the question and the answers. On a low screen these come before what led to them."""
-        if self.app.size.height < LOW:
-            self.before = ()
         with Vertical(classes="box"):
-            yield Static("Go on?", classes="title", markup=False)
-            if self.before:
-                with VerticalScroll(classes="before", can_focus=False):
-                    yield Static("\n".join(map(visible, self.before)), markup=False)
-            yield Static(self.question, classes="about", markup=False)
+            yield Static(visible(self.question), classes="title", markup=False)
             yield Options(["No, send nothing", "Yes, go on"], self._taken)
-            read = "PgDn read on   " if self.before else ""
-            yield Static(f"{read}{hint('question', escape='no')}", classes="keys")
+            yield Hint(hint("question", escape="no"))
+
+    def on_resize(self) -> None:
+        """Leave the rows of the box to it: the lines that lead to the question stay in view below it."""
+        self.call_after_refresh(lambda: self._room(self.query_one(".box").outer_size.height + 1))
 
     def on_mount(self) -> None:
         self.query_one(Options).highlighted = 0
@@ -210,13 +222,11 @@ class GoOn(Dialog[bool]):
         """Take an answer given as its letter."""
         self.dismiss(yes)
 
-    def action_read(self, pages: int) -> None:
-        """Scroll the lines before the question."""
-        for before in self.query(".before"):
-            before.scroll_relative(y=pages * before.size.height, animate=False)
+    def action_look(self, pages: int) -> None:
+        self._look(pages)
 
     def action_refuse(self) -> None:
-        self.notify("Answer the question first: y or n", timeout=4)
+        self.tell("Answer the question first: y or n")
 
 
 class Match(NamedTuple):
@@ -246,7 +256,7 @@ class Search(Dialog[str]):
             options = Options((), self._taken)
             options.can_focus = False
             yield options
-            yield Static(self.hint, classes="keys", markup=False)
+            yield Hint(self.hint)
 
     def on_mount(self) -> None:
         self.set_focus(self.query_one(Field))
@@ -350,10 +360,9 @@ class Form(Dialog[dict[str, str]]):
                     yield Static(f"{each.name}: {visible(each.valid)}", classes="about", markup=False)
                     yield Field(self._entered, each.default or "", id=f"value-{number}")
             yield Static("", id="wrong", markup=False)
-            yield Static(hint("form"), classes="keys")
+            yield Hint(hint("form"))
 
     def on_mount(self) -> None:
-        super().on_mount()
         needed = [number for number, each in enumerate(self.wanted) if each.default is None]
         self._go(needed[0] if needed else 0)
 
@@ -368,7 +377,7 @@ class Form(Dialog[dict[str, str]]):
         self._go((self._at + by) % len(self.wanted))
 
     def action_refuse(self) -> None:
-        self.notify("Fill in the form first, or close it with Esc", timeout=4)
+        self.tell("Fill in the form first, or close it with Esc")
 
     def _entered(self, text: str) -> None:
         if self._is_wrong(self._at):

@@ -147,6 +147,7 @@ class MainScreen(Framed):
             with Vertical(id="left"):
                 yield self._halves
                 yield self.reader
+                yield self.lines("told")
                 yield self.lines("panel")
             yield self.lines("far")
             yield self.lines("side")
@@ -199,13 +200,9 @@ class MainScreen(Framed):
         self.show_menu()
         self._fit_hint()
 
-    def show_tour(self, rows: list[Row]) -> None:
-        """Show a step of the tour; none hides it."""
-        tour = self.lines("tour")
-        if tour.display != bool(rows):
-            tour.display = bool(rows)
-        tour.styles.height = max(1, len(rows))
-        tour.put(rows)
+    def give_room(self, rows: int) -> None:
+        """Leave rows free above the transcript, for a question; of a low screen as many as there are to spare."""
+        self._halves.styles.margin = (min(rows, max(0, self.size.height - 10)), 0, 0, 0)
 
     def toggle_panel(self, name: str) -> None:
         shown = [panel.name for _, places in self.columns() for place in places for panel in place]

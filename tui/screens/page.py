@@ -28,6 +28,7 @@ from multidrop.tui.screen_model import Record, ScreenModel
 from multidrop.tui.screens.dialogs import Field
 from multidrop.tui.terminal.canvas import FrontCompositor
 from multidrop.tui.terminal.keyboard import Keyboard
+from multidrop.tui.text import at_words
 from multidrop.tui.texts import Texts
 from multidrop.tui.widgets.bars import Banner, Footer, TopLine
 from multidrop.tui.widgets.lines import Lines, Link, Row, Span, T, in_view
@@ -46,9 +47,27 @@ class Framed(Screen[None]):
         self._compositor = FrontCompositor()
         # Stored, not looked up: they are painted thirty times a second, and also while the app ends.
         self._parts: dict[str, Lines] = {"top": TopLine(id="top"), "footer": Footer(id="footer")}
+        self._parts["told"] = Lines(id="told")
+        self.told = ""
+        """The line on the last key, which is shown for a while."""
 
     def lines(self, name: str) -> Lines:
         return self._parts[name]
+
+    def tell(self, text: str) -> None:
+        """Show a line above the footer, in rows of its own; an empty one gives them back."""
+        self.told = text
+        self.show_rows(
+            "told", [((f" {row}", "strong"),) for row in at_words(text, self.size.width - 2)] if text else []
+        )
+
+    def show_rows(self, name: str, rows: list[Row]) -> None:
+        """Show a part in as many rows as it has; none hides it."""
+        part = self.lines(name)
+        if part.display != bool(rows):
+            part.display = bool(rows)
+        part.styles.height = max(1, len(rows))
+        part.put(rows)
 
 
 @dataclass
@@ -99,6 +118,7 @@ class Page(Framed):
         yield Banner()
         with Vertical(classes="page-body"):
             yield from self.content()
+        yield self.lines("told")
         yield self.lines("footer")
 
     def content(self) -> ComposeResult:

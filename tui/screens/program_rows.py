@@ -13,6 +13,7 @@ from rich.text import Text
 
 from multidrop.dialects.families import program_languages
 from multidrop.dialects.program_files import Entry, Part, Problem, errors
+from multidrop.dialects.text import counted
 from multidrop.shell.line_syntax import join_target
 from multidrop.shell.programs.edited_file import real_text
 from multidrop.shell.session import Session
@@ -49,9 +50,9 @@ class Findings:
         if self.pending:
             return "checking … ", "dim"
         if wrong:
-            return f"✗ {wrong} {'errors' if wrong > 1 else 'error'} ", "error"
+            return f"✗ {counted(wrong, 'error')} ", "error"
         if warned:
-            return f"! {warned} {'warnings' if warned > 1 else 'warning'} ", "strong"
+            return f"! {counted(warned, 'warning')} ", "strong"
         return "✓ no error ", "text"
 
 
@@ -231,15 +232,7 @@ def download_choices(text: OpenText, target: str) -> list[Choice]:
 def download_facts(text: OpenText, findings: Findings, program: ProgramFacts) -> list[str]:
     """The facts before a download: errors, and the fate of the program in the drive."""
     wrong = len(errors(findings.problems))
-    lines = (
-        [
-            f"✗ {wrong} errors: it will be refused, and nothing is sent"
-            if wrong > 1
-            else "✗ an error: it will be refused, and nothing is sent"
-        ]
-        if wrong
-        else []
-    )
+    lines = [f"✗ {counted(wrong, 'error')}: it will be refused, and nothing is sent"] if wrong else []
     if program.line is not None:
         lines.append("its program runs: it is ended first")
     return [*lines, "What the drive holds is read and saved to a backup first, then replaced."]

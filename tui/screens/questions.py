@@ -10,11 +10,14 @@ from typing import TypeVar
 from rich.text import Text
 from textual.app import App
 
+from multidrop.dialects.text import counted
 from multidrop.drives.bus import Bus
 from multidrop.shell.channel import Field
 from multidrop.shell.session import Session
 from multidrop.tui.panels.view import Glance
 from multidrop.tui.screens.dialogs import Ask, Choose, Confirm, Dialog, Form, GoOn, Match, Offer, Search, TooSmall
+from multidrop.tui.screens.main_screen import MainScreen
+from multidrop.tui.terminal.keyboard import Keyboard
 from multidrop.tui.text import visible
 from multidrop.tui.widgets.theme import THEMES, Signs
 
@@ -32,8 +35,8 @@ FOUND = 100
 class Questions:
     """Opens the dialogs of an app. Each method returns once its dialog is open and has the focus."""
 
-    def __init__(self, app: App[int], session: Session) -> None:
-        self._app, self._session = app, session
+    def __init__(self, app: App[int], session: Session, main: MainScreen, keyboard: Keyboard) -> None:
+        self._app, self._session, self._main, self._keyboard = app, session, main, keyboard
 
     async def _open(self, dialog: Dialog[T], take: Callable[[T], Awaitable[object] | None]) -> None:
         """Open a dialog; `take` is given its answer, if there is one."""
@@ -54,20 +57,24 @@ class Questions:
 
         await self._app.push_screen(Confirm(title, shown, answers), answered)
 
-    async def go_on(self, question: str, before: Sequence[str], closed: Callable[[], None]) -> bool:
-        """Ask before a step that needs a yes; return the answer. A cancellation closes the question.
-
-        `before`: the lines that lead to the question.
-        """
-        agreed: bool | None = await self._answer(GoOn(question, before), closed)
-        return bool(agreed)
+    async def go_on(self, question: str, closed: Callable[[], None]) -> bool:
+        """Ask before a step that needs a yes; return the answer. A cancellation closes the question."""
+        try:
+            box = GoOn(question, self._main.action_look, self._main.give_room)
+            agreed: bool | None = await self._answer(box, closed)
+            return bool(agreed)
+        finally:
+            self._main.give_room(0)
 
     async def fill(self, title: str, fields: Sequence[Field], closed: Callable[[], None]) -> dict[str, str] | None:
         """Ask for values; return them by name, None if the form was closed. A cancellation closes it."""
         return await self._answer(Form(title, fields), closed)
 
     async def _answer(self, screen: Dialog[T], closed: Callable[[], None]) -> T | None:
+        """Ask what nobody opened with a key; keys that were typed before it is shown are not for it."""
         app = self._app
+        self._keyboard.turn_deaf()
+        screen.told = self._keyboard.early
         given: asyncio.Future[T | None] = asyncio.get_running_loop().create_future()
 
         def answered(answer: T | None) -> None:
@@ -201,9 +208,7 @@ def leaving(
     if len(moving) > PREVIEW:
         lines.append(f"… and {len(moving) - PREVIEW} more")
     if waiting:
-        lines.insert(
-            0, f"{waiting} lines wait and would not be sent" if waiting > 1 else "a line waits and would not be sent"
-        )
+        lines.insert(0, f"{counted(waiting, 'line waits', 'lines wait')} and would not be sent")
     lines += [f"{visible(file)} is not saved; a copy is offered when it is opened again" for file in unsaved]
     answers = [("stop", "Stop all and quit"), ("stay", "Stay")]
     if session.busy:
@@ -216,7 +221,7 @@ def leaving(
 def sending(session: Session, lines: Sequence[str]) -> tuple[str, list[str], Answers]:
     """Title, preview and answers for several pasted lines."""
     drive = session.selected
-    to = f" to {drive.address or session.selected_bus}" if drive is not None else ""
+    to = f" to {drive.label or drive.address or session.selected_bus}" if drive is not None else ""
     shown = [f"  {line[:60]}" for line in lines[:PREVIEW]]
     if len(lines) > PREVIEW:
         shown.append(f"  … and {len(lines) - PREVIEW} more")

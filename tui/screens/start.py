@@ -21,7 +21,7 @@ from multidrop.shell.events import FAILURES
 from multidrop.shell.session import Session
 from multidrop.tui.assist import EDIT, Assist, StartEntry
 from multidrop.tui.key_table import bound, hint
-from multidrop.tui.screens.dialogs import Field, Options, Over
+from multidrop.tui.screens.dialogs import Field, Hint, Options, Over
 from multidrop.tui.terminal.keyboard import Keyboard
 from multidrop.tui.widgets.bars import Banner
 
@@ -75,7 +75,7 @@ class Start(Over[None]):
             options.can_focus = False
             yield options
             self.hint = hint("start").replace("Esc close", "^Q quit" if self.only else "Esc close")
-            yield Static(self.hint, classes="keys", markup=False)
+            yield Hint(self.hint)
 
     def on_mount(self) -> None:
         """Show what is known at once; add the ports when they are found."""

@@ -7,6 +7,7 @@ from typing import ClassVar
 
 from textual.binding import BindingType
 
+from multidrop.dialects.text import counted
 from multidrop.tui.key_table import bound
 from multidrop.tui.panels.traffic import piece_rows
 from multidrop.tui.panels.view import View
@@ -54,7 +55,9 @@ class TrafficPage(Page):
             if self._polls or not piece.poll:
                 rows[:0] = piece_rows(piece, view.session.wall, self.size.width, self._hex)
         part.put(rows[-height:] if height else [])
-        state = "follows the newest" if self._bottom is None else f"paused; {max(0, behind)} pieces came since"
+        state = (
+            "follows the newest" if self._bottom is None else f"paused; {counted(max(0, behind), 'piece')} came since"
+        )
         heading: Row = (
             (f" TRAFFIC {visible(self._bus)}   ", "strong"),
             (state, "dim" if self._bottom is None else "motion"),

@@ -33,6 +33,7 @@ PAUSE = 0.5
 """Seconds without a key after which keys count again, once the screen has changed under them."""
 PATIENCE = 0.25
 """Greatest time in seconds that a widget gets to handle a click."""
+EARLY = "the screen changed while you typed: these keys were dropped; keys count again after a pause"
 IMMEDIATE = frozenset({"ctrl+q", "ctrl+c", "escape"})
 """Keys that do not wait while keys are held; what was typed before them is dropped."""
 Typed = events.Key | events.Paste | events.MouseDown | events.MouseUp
@@ -98,8 +99,13 @@ class Keyboard:
         self._deaf_until = time.monotonic() + PAUSE
         self._deaf += 1
         if self._deaf == 1:
-            self._warn("the screen changed while you typed; keys count again after a pause")
+            self._warn(EARLY)
         return True
+
+    @property
+    def early(self) -> str:
+        """The words on keys that were discarded since the screen changed; empty if none were."""
+        return EARLY if self._deaf else ""
 
     # Working it off
 

@@ -1,13 +1,14 @@
 """The lines around the screen: the top line with its tabs, the red line under it, the footer with the keys.
 
-Tabs give way in steps: the words of the states, the names, then runs of neighbours without trouble fold into one
-(`4-12 ■`). The selected tab and those in trouble stay; trouble that finds no room is counted (`✗9`). In the footer the
-stop always comes first; the rest gives way from the right.
+Tabs give way in steps: the words of the states, the ends of the names, the names, then runs of neighbours without
+trouble fold into one (`4-12 ■`). The selected tab and those in trouble stay; trouble that finds no room is counted
+(`✗9`). In the footer the stop always comes first; the rest gives way from the right.
 """
 
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Callable, Container, Sequence
 from dataclasses import dataclass
 
@@ -19,24 +20,29 @@ from multidrop.tui.readout import State
 from multidrop.tui.text import fit
 from multidrop.tui.widgets.lines import Lines, Row, Span, width_of
 
+TRYING = "; trying again"
+"""The end of a reason for a loss while the bus is being tried again."""
+
 
 def banner_row(tally: Tally | None, lost: str, width: int) -> Row:
-    """The text of the banner; an empty row if there is none.
+    """The text of the banner; an empty row if there is none. It is red until every drive was read at rest.
 
     `tally` is what is known since a latched stop, `lost` the reason of a lost bus. A tally of drives that stood before
     their bus was lost is not shown in place of the loss.
     """
     if tally is not None and not (lost and tally.stand):
-        text = f" {headline(tally, width - 1)}"
-    elif lost:
-        text = f" ✗ LOST - {lost}" + (f"; before that {words(tally)}" if tally is not None else "")
-    else:
+        return ((fit(f" {headline(tally, width - 1)}", width), "latched" if tally.sure else "stop"),)
+    if not lost:
         return ()
-    return ((fit(text, width), "stop"),)
+    before = f"; before that {words(tally)}" if tally is not None else ""
+    text, advice = f" ✗ LOST - {lost.removesuffix(TRYING)}", TRYING if lost.endswith(TRYING) else ""
+    room = width - len(advice)  # a reason of any length gives way to what is done
+    text = f"{text if len(text) <= room else fit(text, room)}{advice}"
+    return ((text + fit(before, width - len(text)), "stop"),)
 
 
 class Banner(Lines):
-    """One red line that takes no room while it is empty."""
+    """One line, on a ground of its own, that takes no room while it is empty."""
 
     def __init__(self) -> None:
         super().__init__(classes="banner")
@@ -121,7 +127,9 @@ TROUBLE = frozenset({State.LOST, State.SILENT, State.TROUBLE, State.DIFFERS})
 LONGEST = 24
 """Greatest width of a name in a tab."""
 SHORT = 10
-"""The same where tabs have given way."""
+"""The same beside a tab with words."""
+LEAST = 3
+"""The same where there is no room for more."""
 
 
 @dataclass(frozen=True)
@@ -151,14 +159,39 @@ def tab_spans(tab: Tab) -> list[Span]:
     return _spans(tab, f" {tab.number} {_cut(tab.name, LONGEST)} ", f"{tab.state.sign} {tab.state.word:<6}")
 
 
-def _named(tab: Tab) -> list[Span]:
+def _named(tab: Tab, name: str = "") -> list[Span]:
     """` 1 press ▶ `."""
-    return _spans(tab, f" {tab.number} {_cut(tab.name, SHORT)} ", tab.state.sign)
+    return _spans(tab, f" {tab.number} {name or _cut(tab.name, SHORT)} ", tab.state.sign)
+
+
+def _tight(tab: Tab, name: str) -> list[Span]:
+    """` 1 press▶`; the selected tab keeps its name."""
+    return _named(tab) if tab.selected else _spans(tab, f" {tab.number} {name}", tab.state.sign, end="")
 
 
 def _small(tab: Tab) -> list[Span]:
     """` 1■`; the selected tab keeps its name."""
     return _named(tab) if tab.selected else _spans(tab, f" {tab.number}", tab.state.sign, end="")
+
+
+def _cuts(tabs: Sequence[Tab], width: int) -> list[str]:
+    """The names in `width` cells at most. Those that begin alike keep their ends, which tell them apart."""
+    begun = Counter(_cut(tab.name, width) for tab in tabs)
+    return [
+        f"…{tab.name[1 - width :]}"
+        if len(tab.name) > width and begun[_cut(tab.name, width)] > 1
+        else _cut(tab.name, width)
+        for tab in tabs
+    ]
+
+
+def _longest(tabs: Sequence[Tab], shown: Callable[[Tab, str], list[Span]], least: int, room: int) -> list[Span]:
+    """The tabs with names as long as they all fit; an empty list where names of the `least` width do not."""
+    for width in range(LONGEST, least - 1, -1):
+        spans = [span for tab, name in zip(tabs, _cuts(tabs, width), strict=True) for span in shown(tab, name)]
+        if width_of(spans) <= room:
+            return spans
+    return []
 
 
 def _cut(name: str, width: int) -> str:
@@ -221,15 +254,16 @@ def tabs_row(tabs: Sequence[Tab], room: int) -> list[Span]:
     """The tabs in `room` cells at most, as large as they fit."""
     forms: tuple[Callable[[], list[Span]], ...] = (
         lambda: _each(tabs, tab_spans),
-        lambda: _each(tabs, lambda tab: tab_spans(tab) if tab.selected else _named(tab)),
-        lambda: _each(tabs, _named),
+        lambda: _longest(tabs, lambda tab, name: tab_spans(tab) if tab.selected else _named(tab, name), SHORT, room),
+        lambda: _longest(tabs, _named, SHORT, room),
+        lambda: _longest(tabs, _tight, LEAST, room),
         lambda: _each(tabs, _small),
         lambda: _folded(tabs, lambda one, other: one.state is other.state),
         lambda: _folded(tabs, lambda one, other: True),
     )
     for form in forms:
         spans = form()
-        if width_of(spans) <= room:
+        if spans and width_of(spans) <= room:
             return spans
     return _counted(tabs, room)
 

@@ -29,7 +29,21 @@ MOST_STRIPS = 500
 """Strips that are kept."""
 SERIES = ("series1", "series2", "series3", "series4", "series5", "series6")
 """The roles of curves."""
-ROLES = ("text", "strong", "dim", "accent", "focus", "found", "motion", "error", "stop", "key", "rule", *SERIES)
+ROLES = (
+    "text",
+    "strong",
+    "dim",
+    "accent",
+    "focus",
+    "found",
+    "motion",
+    "error",
+    "stop",
+    "latched",
+    "key",
+    "rule",
+    *SERIES,
+)
 
 
 class Link(str):

@@ -16,6 +16,7 @@ from textual.geometry import Size
 from textual.reactive import Reactive
 from textual.widgets import Input
 
+from multidrop.dialects.text import counted
 from multidrop.tui.key_table import bound, hint
 from multidrop.tui.widgets.lines import Lines, Row, spread, width_of
 from multidrop.tui.widgets.transcript import Transcript
@@ -173,7 +174,7 @@ class Reader(Horizontal):
 
     def _copy(self, picked: Picked) -> None:
         """Send the picked lines to the clipboard of the terminal, which says nothing about it."""
-        text, said = "\n".join(record.text for record in picked.records), counted(picked)
+        text, said = "\n".join(record.text for record in picked.records), size_of(picked)
         if len(text) > MOST_COPIED:
             self.app.notify(f"{said}: too much for a terminal's clipboard; /save FILE writes a file", timeout=6)
             return
@@ -192,7 +193,7 @@ class Reader(Horizontal):
         if transcript.search is not None:
             self._words.put([self._found(transcript.search)])
         elif transcript.picked is not None:
-            left = ((" copy ▸ ", "accent"), (counted(transcript.picked), "strong"))
+            left = ((" copy ▸ ", "accent"), (size_of(transcript.picked), "strong"))
             room = self.size.width - width_of(left)
             keys = next((each for each in PICK_KEYS if len(each) + 1 < room), "")
             self._bar.put([spread(left, ((keys, "dim"),), self.size.width)])
@@ -207,9 +208,8 @@ class Reader(Horizontal):
         return spread((), ((counts, "strong" if count or not search.text else "error"), (keys, "dim")), room)
 
 
-def counted(picked: Picked) -> str:
+def size_of(picked: Picked) -> str:
     """`3 lines, 42 characters`."""
     records = picked.records
     characters = sum(len(record.text) for record in records) + max(0, len(records) - 1)
-    lines = "1 line" if len(records) == 1 else f"{len(records)} lines"
-    return f"{lines}, {characters} characters"
+    return f"{counted(len(records), 'line')}, {counted(characters, 'character')}"

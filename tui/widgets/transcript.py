@@ -5,12 +5,15 @@ Lines arrive at any rate: taking one only appends to a deque. Rows are styled an
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterable
 from typing import NamedTuple
 
 from rich.cells import cell_len, chop_cells
 from textual import events
 
+from multidrop.dialects.text import counted
+from multidrop.shell.raw import Form
 from multidrop.shell.roles import Filter
 from multidrop.shell.streams.event_printer import laid_out
 from multidrop.tui.screen_model import Record
@@ -23,8 +26,8 @@ MARKS = {
     "»": ("»", "strong"),
     "": (" ", "text"),
     "<": ("«", "text"),
-    "↑": ("↑", "dim"),
-    "↓": ("↓", "dim"),
+    "↑": ("↑", "strong"),
+    "↓": ("↓", "text"),
     "x": ("✗", "error"),
     ".": ("·", "dim"),
     "!": ("!", "strong"),
@@ -35,9 +38,15 @@ VERBATIM = frozenset({">", "»", "<", "", "↑", "↓"})
 """Marks of records in a drive's own language, where every space counts."""
 DATED = frozenset(">»<↑↓.!")
 """Marks of records that show the time of day; a reply follows the line that it answers."""
-ADDRESS = 3
+ADDRESS, LONGEST = 3, 12
+"""Least and greatest width of the name of a drive in cells."""
 CLOCK = 8
 """Width of a time in cells."""
+BYTES = "↑↓"
+"""Marks of bytes, which have no address: their time takes its place, and has milliseconds."""
+HEX = re.compile(r"(?:[0-9A-F]{2} )*[0-9A-F]{2}")
+HEX_AT = Form.BOTH.value[2] + 1
+"""The column of the hex beside its text."""
 
 
 class Clocks(NamedTuple):
@@ -46,11 +55,13 @@ class Clocks(NamedTuple):
     form: str
     clock: Callable[[float], str]
     start: float = 0.0
+    names: int = ADDRESS
+    """The width of the longest name of a drive so far."""
 
     @property
     def gutter(self) -> int:
-        """Width before the text in cells: time, address, sign."""
-        return ADDRESS + 4 + (0 if self.form == "off" else CLOCK + 2)
+        """Width before the text in cells: time, name, sign."""
+        return self.names + 4 + (0 if self.form == "off" else CLOCK + 2)
 
     def text(self, record: Record, before: Record | None) -> str:
         """The time of a record; `before` is the one shown above it."""
@@ -58,7 +69,9 @@ class Clocks(NamedTuple):
             return seconds(record.at - before.at, "+") if before is not None else ""
         if self.form == "off" or record.mark not in DATED:
             return ""
-        return self.clock(record.at) if self.form == "clock" else seconds(record.at - self.start)
+        if self.form == "clock":
+            return self.clock(record.at)[: None if record.mark in BYTES else CLOCK]
+        return seconds(record.at - self.start)
 
 
 def seconds(value: float, sign: str = "") -> str:
@@ -78,11 +91,16 @@ def rows_of(record: Record, before: Record | None, clocks: Clocks, width: int) -
     broken = laid_out if record.columns else chop_cells if record.mark in VERBATIM else at_words
     pieces = [text] if len(text) <= room // 2 else broken(text, room) or [""]
     time = "" if clocks.form == "off" else f"{fit(clocks.text(record, before), CLOCK)}  "
+    where = fit(record.name or record.address, clocks.names)
+    if record.mark in BYTES:
+        time, where = fit(clocks.text(record, before), len(time + where)), ""
     head: Row = (
         (f" {time}", "dim"),
-        (f"{fit(record.address, ADDRESS)} ", "accent" if record.mark in SENT else "dim"),
+        (f"{where} ", "accent" if record.mark in SENT else "dim"),
         (f"{sign} ", role),
     )
+    if record.mark in BYTES and len(text) <= room and HEX.fullmatch(text, HEX_AT):
+        return [(*head, (text[:HEX_AT], role), (text[HEX_AT:], "dim"))]
     rows: list[Row] = [(*head, (pieces[0], role), *_aside(record.help, room - cell_len(pieces[0])))]
     rows.extend(((" " * clocks.gutter, "text"), (piece, role)) for piece in pieces[1:])
     return rows
@@ -123,9 +141,6 @@ def chosen(row: Row) -> Row:
     return marked(tuple((text, "focus") for text, _ in row), "▌", "focus")
 
 
-SAID = frozenset({"", ".", "!"})
-
-
 class Transcript(Lines, can_focus=False):
     """Shows records; see the module. `times`: the form of their times, a word of `TIMES`."""
 
@@ -142,16 +157,6 @@ class Transcript(Lines, can_focus=False):
         self._made_for: object = None
         self._unshown = False
 
-    def since_typed(self) -> list[str]:
-        """Results, narration and warnings of the verb typed last; a line for a drive asks before it is sent."""
-        found: list[str] = []
-        for record in reversed(self.records):
-            if record.mark in SENT:
-                return found[::-1] if record.text.startswith("/") else []
-            if record.mark in SAID:
-                found.append(record.text)
-        return []
-
     # Taking in
 
     def extend(self, records: Iterable[Record]) -> None:
@@ -162,7 +167,8 @@ class Transcript(Lines, can_focus=False):
         """Take in records, oldest first; `show_new` shows them."""
         new = list(records)
         self.records.take(new)
-        self.clocks = self.clocks._replace(start=self.records.began)
+        names = max((len(each.name) for each in new), default=0)
+        self.clocks = self.clocks._replace(start=self.records.began, names=max(self.clocks.names, min(names, LONGEST)))
         self._unshown = self._unshown or bool(new)
 
     def show_new(self) -> None:
@@ -240,7 +246,7 @@ class Transcript(Lines, can_focus=False):
             foot = self._foot(self.size.width)
             height = self.size.height - len(foot)
             numbers, place = sight.numbers, sight.end
-            valid = (self.size.width, self.clocks.form, sight.filter)
+            valid = (self.size.width, self.clocks.form, self.clocks.names, sight.filter)
             before, self._made = self._made if self._made_for == valid else {}, {}
             self._made_for = valid
             rows: list[Row] = []
@@ -279,10 +285,10 @@ class Transcript(Lines, can_focus=False):
         sight = self.sight
         left: list[Span] = []
         if sight.filter:
-            counted = f"{len(sight.numbers)} of {len(self.records)} lines"
-            left = [(f" {sight.filter.words} ", "focus"), (f" {counted}   /filter off shows all", "dim")]
+            total = f"{len(sight.numbers)} of {counted(len(self.records), 'line')}"
+            left = [(f" {sight.filter.words} ", "focus"), (f" {total}   /filter off shows all", "dim")]
         elif sight.at_oldest and self.records.dropped:
-            left = [(f" {self.records.dropped} older lines were dropped", "dim")]
+            left = [(f" {counted(self.records.dropped, 'older line was', 'older lines were')} dropped", "dim")]
         right: list[Span] = []
         if sight.paused:
             right = [(f" PAUSED   {sight.below} new below   Ctrl+B: go on ", "focus")]

@@ -40,6 +40,7 @@ from multidrop.dialects.mcode.host.state import MCodeState, described, who
 from multidrop.dialects.mcode.manual.program_checker import slips
 from multidrop.dialects.mcode.manual.program_file import ProgramLine
 from multidrop.dialects.program_files import LOCKED, Held
+from multidrop.dialects.text import counted
 
 WHOLE = {"", "0", "1", "S"}
 """The parameters with which CP clears all programs."""
@@ -193,7 +194,7 @@ class _Memory:
             return "no line of the program is stored"
         places = ", ".join(f"{first} to {following - 1}" for first, following in self.spans)
         label = f", from label {self.label}" if self.label else ""
-        count = f"{self.lines} lines are" if self.lines > 1 else "1 line is"
+        count = counted(self.lines, "line is", "lines are")
         held = f"{count} stored (addresses {places}{label})"
         return held if self.ended == self.programs else f"{held}: the program in {who(state)} is incomplete"
 

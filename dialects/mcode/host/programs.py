@@ -37,6 +37,7 @@ from multidrop.dialects.mcode.manual.mnemonic import ETHERNET, EXPANDED
 from multidrop.dialects.mcode.manual.statements import canonical
 from multidrop.dialects.mcode.manual.table import lookup
 from multidrop.dialects.program_files import Difference, Held, Stored, first_difference
+from multidrop.dialects.text import counted
 
 # A program file and what a drive holds, compared line by line in canonical spelling.
 
@@ -244,7 +245,7 @@ def _occupied(state: MCodeState) -> Procedure[Occupied]:
     if locked == "1":
         return Occupied(errors=f"its program is locked (LK=1), so it cannot be listed; {_SUBROUTINE}")
     lines = yield from operations.listing(state, "")
-    return Occupied(errors=f"a program is stored ({len(lines)} lines); {_SUBROUTINE}" if lines else "")
+    return Occupied(errors=f"a program is stored ({counted(len(lines), 'line')}); {_SUBROUTINE}" if lines else "")
 
 
 def _masked(address: str, raw: bytes) -> str:

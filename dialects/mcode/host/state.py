@@ -161,7 +161,7 @@ class MCodeState(DriveState):
 
 
 def who(state: DriveState) -> str:
-    return state.address or "the drive"
+    return state.label or state.address or "the drive"
 
 
 def refuse_in_program(state: MCodeState, then: str = "") -> None:

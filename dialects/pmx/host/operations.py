@@ -41,7 +41,7 @@ INTEGER = r"-?\d{1,19}"
 
 
 def who(state: PmxState) -> str:
-    return state.address or "the controller"
+    return state.label or state.address or "the controller"
 
 
 def _mark(state: PmxState, request: Request, sent: bool) -> Procedure[tuple[str, ...] | None]:  # noqa: ARG001

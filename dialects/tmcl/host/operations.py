@@ -57,7 +57,7 @@ END = "133 0, 0, 0"
 
 
 def who(state: TmclState) -> str:
-    return f"module {state.address}"
+    return f"module {state.label or state.address}"
 
 
 def answered(state: TmclState, request: Request) -> Procedure[Reply]:

@@ -19,7 +19,7 @@ from multidrop.dialects.errors import Diagnostic, DriveError, Inexpressible, Ref
 from multidrop.dialects.family import Programs, Progress
 from multidrop.dialects.files import SourceLine, lines_of_text
 from multidrop.dialects.program_files import Difference, Held, Stored, first_difference
-from multidrop.dialects.text import whole
+from multidrop.dialects.text import counted, whole
 from multidrop.dialects.tmcl.host.codec import TmclState, call_of, line_in, parse_reply
 from multidrop.dialects.tmcl.host.operations import LACKS, answered, busy, moving, perform, read, store, who
 from multidrop.dialects.tmcl.manual import program_file
@@ -176,7 +176,7 @@ def _incomplete(state: TmclState, done: int, total: int) -> str:
 def _say_what_stays(state: TmclState, held: Held | None, end: int) -> None:
     rest = [line.at for line in held.lines if line.at > end] if held is not None else []
     if rest:
-        count = f"{len(rest)} lines" if len(rest) > 1 else "1 line"
+        count = counted(len(rest), "line")
         state.remark(f"{who(state)}: {count} from address {rest[0]} on stay as they were: the file does not reach them")
 
 

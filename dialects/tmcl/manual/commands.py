@@ -15,6 +15,7 @@ from enum import IntEnum
 from types import MappingProxyType
 
 from multidrop.dialects.codec import Command as TypedCommand
+from multidrop.dialects.text import counted
 
 
 class Command(IntEnum):
@@ -266,8 +267,7 @@ def _parsed(text: str) -> Call:
         hint = f"did you mean {' or '.join(near)}?" if near else f"valid: {', '.join(WORDS)}"
         raise LineError(f"no command {word!r}; {hint}")
     if len(fields) != len(row.fields):
-        count = "1 field" if len(row.fields) == 1 else f"{len(row.fields)} fields"
-        raise LineError(f"{row.word} takes {count}: {row.syntax}")
+        raise LineError(f"{row.word} takes {counted(len(row.fields), 'field')}: {row.syntax}")
     values = {}
     for name, given in zip(row.fields, fields, strict=True):
         known = row.types.get(given.upper()) if name == TYPE else None

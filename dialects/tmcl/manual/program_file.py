@@ -23,6 +23,7 @@ from typing import NamedTuple
 
 from multidrop.dialects.files import SourceLine, program_text_of, split_lines, wrong_characters
 from multidrop.dialects.program_files import Entry, Part, Problem, in_order, refuse, respelled
+from multidrop.dialects.text import counted
 from multidrop.dialects.tmcl.manual import instructions
 from multidrop.dialects.tmcl.manual.commands import Call, Command
 from multidrop.dialects.tmcl.manual.instructions import (
@@ -188,16 +189,12 @@ def _command(made: Assembled, line: Divided, word: Piece) -> Call | None:
         return None
     number, fields = row
     if len(line.fields) != len(fields):
-        what = f"{word.text} takes {'no field' if not fields else _counted(len(fields))}"
+        what = f"{word.text} takes {'no field' if not fields else counted(len(fields), 'field')}"
         made.wrong(line.number, word, what, _syntax(word.text, fields))
         return None
     values = [_value(made, line, piece, each) for piece, each in zip(line.fields, fields, strict=True)]
     known = tuple(value for value in values if value is not None)
     return call_with(number, fields, known) if len(known) == len(fields) else None
-
-
-def _counted(count: int) -> str:
-    return "1 field" if count == 1 else f"{count} fields"
 
 
 def _syntax(word: str, fields: Sequence[Field]) -> str:

@@ -205,8 +205,8 @@ def macro(world: World, rng: Random) -> None:
     if rng.random() < 0.3:
         lines.run = after = Run(name, "")
         lines.turn()
-        text += f"on_stop = {json.dumps(setting(lines))}\n"
-        run.on_stop = after.texts
+        text += f"on_early_end = {json.dumps(setting(lines))}\n"
+        run.on_early_end = after.texts
         world.history.told.repeated |= dict.fromkeys(after.texts, 1)
     for step in steps:
         text += f"[[step]]\nafter = {rng.choice((0.0, 0.0, 0.2)):.1f}\nline = {json.dumps(step)}\n"

@@ -113,7 +113,7 @@ def test_a_signal_stops_what_a_macro_started_and_not_what_an_operator_did(shop, 
     child.kill(signal.SIGTERM)
     assert read_to_end(child) == 130
     assert shop.velocity() == (0 if mine else 5000)
-    assert ("stopped b: b reads velocity 0" in child.before) is mine
+    assert ("stopped b: velocity 0 was read from b" in child.before) is mine
 
 
 DWELLS = 'program_text = """\nPG 1\nLB G1\nH 60000\nBR G1\nE\nPG\n"""'

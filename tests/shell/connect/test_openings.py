@@ -24,7 +24,7 @@ class Floor:
         self.session = Session(Settings({}, tmp_path / "c", tmp_path / "s"), self.opener)
 
     async def opener(self, connection, naming):
-        name = connection.target.removeprefix("/")
+        name = connection.target.removeprefix("/") or str(connection.port)
         takes = self.takes[name]
         self.under_way += 1
         try:
@@ -204,3 +204,14 @@ async def test_drives_that_do_not_reply_close_their_bus_only(tmp_path):
     assert failures == [(0, "no drive replies")] and floor.buses["mute"].closed
     assert list(session.buses) == ["fast"] and session.selected_bus == "fast"
     await session.close()
+
+
+async def test_lines_of_one_host_are_named_by_their_ports(tmp_path):
+    floor = Floor(tmp_path, **{"5031": 0.1, "5032": 0.2, "5033": 0.1})
+    await floor.session.open_all(["tcp://cell:5031", "tcp://cell:5032"])
+    assert list(floor.session.buses) == ["cell-5031", "cell-5032"]
+    await floor.session.open("tcp://cell:5033")
+    await floor.session.open("tcp://cell:5033", "spare")
+    await floor.session.open("tcp://cell:5033")
+    assert list(floor.session.buses)[2:] == ["cell", "spare", "cell-5033"]
+    await floor.session.close()

@@ -145,6 +145,7 @@ def test_a_wrong_saved_url_says_whose_it_is():
 def test_a_bus_is_called_after_its_port_or_host():
     assert parse("/dev/ttyUSB0").short == "ttyUSB0"
     assert parse("tcp://10.0.0.5:503").short == "10.0.0.5"
+    assert (parse("tcp://10.0.0.5:504").by_port, parse("/dev/ttyUSB0").by_port) == ("10.0.0.5-504", "")
 
 
 words = st.text(st.sampled_from("ab019:/?&=#,._-%[]@ CMsimtcp"), max_size=30)

@@ -163,7 +163,7 @@ async def test_a_stop_of_a_search_says_what_the_drives_that_replied_were_read_at
     with pytest.raises(Stopped):
         await running
     [text] = [text for text in port.told() if "the stop was sent with" in text]
-    assert "; a reads velocity 0. It was not confirmed for drives that have not replied" in text
+    assert "; velocity 0 was read from a. It was not confirmed for drives that have not replied" in text
 
 
 async def test_a_stop_with_no_drive_open_does_not_say_that_it_was_sent(tmp_path):

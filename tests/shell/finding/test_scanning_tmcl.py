@@ -210,7 +210,7 @@ async def test_a_stop_reaches_each_motor_of_what_replied_and_every_address_that_
     assert at_rest(port) == [True, True, True, False]
     assert took < 2 + 61 * 2 * 0.06 + 6
     [text] = [text for text in port.told() if "the stop was sent with" in text]
-    assert "sent with TMCL at 9600 baud" in text and "; all 3 read velocity 0. It was not confirmed" in text
+    assert "sent with TMCL at 9600 baud" in text and "; velocity 0 was read from all 3. It was not confirmed" in text
     assert port.session.buses == {}
 
 
@@ -243,7 +243,7 @@ async def test_a_module_that_replies_to_the_stop_only_gets_the_whole_stop_and_is
         await running
     assert [each["address"] for each in found] == ["1"] and at_rest(port) == [True, True]
     [text] = [text for text in port.told() if "the stop was sent with" in text]
-    assert "; all 2 read velocity 0. It was not confirmed" in text
+    assert "; velocity 0 was read from both. It was not confirmed" in text
 
 
 async def test_a_second_stop_key_does_not_end_the_first_stop(tmp_path):

@@ -145,7 +145,7 @@ async def test_keys_are_in_pages(session: Session) -> None:
     await run(session, "/macro copy m n", "/key F3 n --page 2")
     assert [session.macros.load(name).place for name in "mn"] == ["F3", "F3 (page 2)"]
     assert session.macros.pages() == ["1", "2"]
-    assert await run(session, "/key F3 off --page 2") == ["F3 of page 2 plays nothing, n no more"]
+    assert await run(session, "/key F3 off --page 2") == ["F3 of page 2 plays nothing; no longer on it: n"]
     assert session.macros.load("m").key == "F3"
     with pytest.raises(Diagnostic, match="invalid page 'a b'"):
         await session.run('/key F3 n --page "a b"')

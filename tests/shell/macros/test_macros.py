@@ -101,7 +101,7 @@ async def test_a_key_is_put_into_the_file_and_its_remarks_stay(session: Session,
     before = path.read_text()
     assert await run(session, "/key f4 m") == ["F4 plays m"]
     assert path.read_text() == before.replace("'F3'", '"F4"')
-    assert await run(session, "/key F4 off") == ["F4 plays nothing, m no more"]
+    assert await run(session, "/key F4 off") == ["F4 plays nothing; no longer on it: m"]
     assert path.read_text() == before.replace("'F3'", '""')
 
 
@@ -109,11 +109,11 @@ async def test_a_key_with_two_macros_is_named_and_can_be_freed(session: Session,
     put(folder, "a", "F5"), put(folder, "b", "F5"), put(folder, "c")
     told = await run(session, "/macros")
     assert told[-1] == "a and b are both on F5, which plays none of them"
-    assert await run(session, "/key F5 b") == ["F5 plays b, a no more"]
+    assert await run(session, "/key F5 b") == ["F5 plays b; no longer on it: a"]
     put(folder, "a", "F5")
-    assert await run(session, "/key F5 c") == ["F5 plays c, a and b no more"]
+    assert await run(session, "/key F5 c") == ["F5 plays c; no longer on it: a, b"]
     put(folder, "a", "F5")
-    assert await run(session, "/key F5 off") == ["F5 plays nothing, a and c no more"]
+    assert await run(session, "/key F5 off") == ["F5 plays nothing; no longer on it: a, c"]
     with pytest.raises(Diagnostic, match="nothing is on F5"):
         await session.run("/key F5 off")
 

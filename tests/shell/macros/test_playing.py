@@ -33,7 +33,9 @@ async def test_a_step_starts_its_time_after_the_start_of_the_one_before_or_at_it
 
 
 async def test_rounds_are_counted_and_begin_with_the_same_values(shop: Shop) -> None:
-    macro = Macro("m", (Step(0, "/set n {start:int} + 1"), Step(0, "/print {n} {start}")), on_stop=("/print never",))
+    macro = Macro(
+        "m", (Step(0, "/set n {start:int} + 1"), Step(0, "/print {n} {start}")), on_early_end=("/print never",)
+    )
     await shop.play(macro, {"start": "4"}, times=3)
     assert shop.printed() == ["5 4"] * 3
     assert [(each.round, each.line.step) for each in shop.results] == [(1, 2), (2, 2), (3, 2)]
@@ -169,7 +171,7 @@ async def test_a_called_macro_begins_with_the_selection_of_its_caller(shop: Shop
 
 async def test_a_script_that_calls_a_macro_is_checked_with_its_roles_and_its_end(tmp_path: Path, shop: Shop) -> None:
     shop.save("line", "@line:c PR P", roles=("line",))
-    shop.save("back", "@press:b PR P", on_stop=("@press:b MA 0",))
+    shop.save("back", "@press:b PR P", on_early_end=("@press:b MA 0",))
     for name, said in (("line", "no bus for the role line"), ("back", "b: @press:b MA 0 can start motion")):
         (tmp_path / "s.txt").write_text(f"@press:a MR 7000\n/call {name}\n")
         script = read_script(str(tmp_path / "s.txt"), {}, shop.session.macros)
@@ -233,7 +235,9 @@ def test_any_lines_are_checked_without_another_failure_than_a_line_for_a_person(
             return Macro(name, (Step(0, "/play m"),) if name == "other" else (Step(0, "PR {n:int,5..7}"),))
 
     with contextlib.suppress(Diagnostic):
-        read_macro(Macro("m", tuple(Step(0, line) for line in lines), on_stop=tuple(lines)), {}, Store(Path("gone")))
+        read_macro(
+            Macro("m", tuple(Step(0, line) for line in lines), on_early_end=tuple(lines)), {}, Store(Path("gone"))
+        )
 
 
 async def test_what_a_person_prints_meanwhile_is_no_answer_to_the_macro(shop: Shop) -> None:

@@ -47,8 +47,8 @@ async def test_a_failure_names_macro_step_and_file_and_the_report_what_was_sent_
         "  step 5: @b QQ 1 -> FAILED: b refused 'QQ 1': error 60: unknown command (check the spelling; /help NAME "
         "explains a word)",
     ]
-    assert shop.warned()[6].startswith("stopped press:a, press:b: all 2 read velocity 0")
-    assert shop.warned()[-1].startswith("press:a stands at 500; press:b stands at ")
+    assert shop.warned()[6].startswith("stopped press:a, press:b: velocity 0 was read from both")
+    assert shop.warned()[-1].startswith("press:a is at rest at 500; press:b is at rest at ")
     assert shop.moving() == set() and not shop.session.latched
     assert b"9000" not in shop.written("press")
     (ending,) = shop.endings
@@ -57,8 +57,8 @@ async def test_a_failure_names_macro_step_and_file_and_the_report_what_was_sent_
 
 
 async def test_the_failure_in_a_called_macro_names_both_and_stops_what_either_moved(shop: Shop) -> None:
-    shop.save("inner", "@gantry:c SL 100", "/assert 1 == 2", on_stop=("/print inner",))
-    macro = shop.save("outer", "@press:a SL 100", "/play inner", on_stop=("/print outer",))
+    shop.save("inner", "@gantry:c SL 100", "/assert 1 == 2", on_early_end=("/print inner",))
+    macro = shop.save("outer", "@press:a SL 100", "/play inner", on_early_end=("/print outer",))
     with pytest.raises(DriveError) as caught:
         await shop.play(macro)
     assert short([report(caught.value)], shop) == [
@@ -69,50 +69,54 @@ async def test_the_failure_in_a_called_macro_names_both_and_stops_what_either_mo
     assert shop.endings[0].at == "macro outer, step 2 of 2: macro inner, step 2 of 2"
 
 
-# -- on_stop
+# -- on_early_end
 
 
 async def test_on_stop_runs_after_a_failure_each_line_whatever_became_of_the_one_before(shop: Shop) -> None:
     after = ("@a VM=-1", "@a PR {n}", "/if 1", "/print yes", "/end")
-    macro = shop.save("m", "@a PR {n:int=7}", "/assert 1 == 2", on_stop=after)
+    macro = shop.save("m", "@a PR {n:int=7}", "/assert 1 == 2", on_early_end=after)
     with pytest.raises(DriveError, match="/assert 1 == 2"):
         await shop.play(macro)
     assert shop.printed() == ["7", "7", "yes"]
-    assert any(each.startswith("macro m, on_stop (m.toml:5): a refused 'VM=-1'") for each in short(shop.warned(), shop))
+    assert any(
+        each.startswith("macro m, on_early_end (m.toml:5): a refused 'VM=-1'") for each in short(shop.warned(), shop)
+    )
 
 
 @pytest.mark.parametrize("moves", [True, False])
-async def test_on_stop_moves_only_where_the_file_says_so(moves: bool, shop: Shop) -> None:
+async def test_on_early_end_moves_only_where_the_file_says_so(moves: bool, shop: Shop) -> None:
     after = ("@press:a MA 0", "/wait stopped")
-    macro = shop.save("m", "@press:a MA 5000", "/sleep 1", "XX 1", on_stop=after, on_stop_moves=moves)
+    macro = shop.save("m", "@press:a MA 5000", "/sleep 1", "XX 1", on_early_end=after, on_early_end_moves=moves)
     if moves:
         with pytest.raises(Refused):
             await shop.play(macro)
-        assert shop.warned()[-1].startswith("press:a stands at 0")
+        assert shop.warned()[-1].startswith("press:a is at rest at 0")
         return
-    with pytest.raises(Diagnostic, match=r"a: @press:a MA 0 can start motion; on_stop_moves = true in its file") as no:
+    with pytest.raises(
+        Diagnostic, match=r"a: @press:a MA 0 can start motion; on_early_end_moves = true in its file"
+    ) as no:
         await shop.play(macro)
-    assert no.value.where.startswith("macro m, on_stop (") and shop.written("press") == b""
+    assert no.value.where.startswith("macro m, on_early_end (") and shop.written("press") == b""
 
 
 async def test_on_stop_that_is_seen_to_move_only_then_is_refused_then(shop: Shop) -> None:
-    macro = shop.save("m", "XX 1", on_stop=("/use gantry", "MA 7000", "PR P"))
+    macro = shop.save("m", "XX 1", on_early_end=("/use gantry", "MA 7000", "PR P"))
     with pytest.raises(Refused):
         await shop.play(macro)
-    assert "on_stop of macro m would start it, and on_stop_moves is false" in "".join(shop.warned())
+    assert "on_early_end of macro m would start it, and on_early_end_moves is false" in "".join(shop.warned())
     assert b"7000" not in shop.written("gantry") and shop.printed() == ["0"]
 
 
 async def test_a_velocity_of_0_is_no_motion(shop: Shop) -> None:
-    macro = shop.save("m", "VM=-1", on_stop=("@press:a SL 0", "/use b", "SL 0", "SL {v:int=0}", "@press:a PR 5"))
+    macro = shop.save("m", "VM=-1", on_early_end=("@press:a SL 0", "/use b", "SL 0", "SL {v:int=0}", "@press:a PR 5"))
     with pytest.raises(Refused):
         await shop.play(macro)
-    assert shop.printed() == ["5"] and "on_stop_moves" not in "".join(shop.warned())
+    assert shop.printed() == ["5"] and "on_early_end_moves" not in "".join(shop.warned())
 
 
-async def test_what_on_stop_moves_goes_on_unless_a_line_of_it_fails(shop: Shop) -> None:
+async def test_what_on_early_end_moves_goes_on_unless_a_line_of_it_fails(shop: Shop) -> None:
     for after, moving in (("@press:a SL 100",), {"press:a"}), (("@press:a SL 100", "XX 2"), set()):
-        macro = shop.save(f"m{len(after)}", "XX 1", on_stop=after, on_stop_moves=True)
+        macro = shop.save(f"m{len(after)}", "XX 1", on_early_end=after, on_early_end_moves=True)
         with pytest.raises(Refused):
             await shop.play(macro)
         assert shop.moving() == moving
@@ -122,7 +126,7 @@ async def test_what_on_stop_moves_goes_on_unless_a_line_of_it_fails(shop: Shop) 
 
 
 async def test_after_the_stop_key_on_stop_is_not_executed_then_or_later_and_that_is_said(shop: Shop) -> None:
-    shop.save("m", "@press:a SL 900", "/sleep 9", on_stop=("@press:a PR 77",))
+    shop.save("m", "@press:a SL 900", "/sleep 9", on_early_end=("@press:a PR 77",))
     playing = asyncio.create_task(shop.session.run("/play m"))
     await asyncio.sleep(1)
     shop.session.stop("Ctrl+X")
@@ -130,11 +134,11 @@ async def test_after_the_stop_key_on_stop_is_not_executed_then_or_later_and_that
         await playing
     assert shop.moving() == set()
     assert "macro m, step 2 of 2: stopped; its last lines:" in shop.warned()
-    dropped = "macro m: on_stop is not executed after a stop: @press:a PR 77; type them if the machine needs them"
+    dropped = "macro m: on_early_end is not executed after a stop: @press:a PR 77; type them if the machine needs them"
     assert dropped in shop.warned()
-    assert shop.warned()[-1].startswith("press:a stands at ")
+    assert shop.warned()[-1].startswith("press:a is at rest at ")
     await shop.session.run("/resume")
-    assert shop.warned()[-1] == "on_stop of m was not executed and will not be; type its lines if needed"
+    assert shop.warned()[-1] == "on_early_end of m was not executed and will not be; type its lines if needed"
     await asyncio.sleep(9)
     assert b"77" not in shop.written("press")
     await shop.session.run("/resume")
@@ -144,7 +148,7 @@ async def test_after_the_stop_key_on_stop_is_not_executed_then_or_later_and_that
 @pytest.mark.parametrize("ended", ["interrupt", "/play stop"])
 async def test_ended_by_a_person_it_stops_its_drives_and_on_stop_is_executed(ended: str, shop: Shop) -> None:
     await shop.session.run("@gantry:c SL 50")
-    shop.save("m", "@press:a SL 900", "/sleep 9", on_stop=("@press:a PR 77",))
+    shop.save("m", "@press:a SL 900", "/sleep 9", on_early_end=("@press:a PR 77",))
     playing = asyncio.create_task(shop.session.run("/play m"))
     await asyncio.sleep(1)
     if ended == "interrupt":
@@ -162,7 +166,7 @@ async def test_on_stop_is_executed_when_a_person_quits(shop: Shop) -> None:
         "m",
         "@press:a SL 900",
         "/sleep 9",
-        on_stop=("@press:a PR 77", "/sleep 3", "/repeat 2", "@press:a PR 78", "/end"),
+        on_early_end=("@press:a PR 77", "/sleep 3", "/repeat 2", "@press:a PR 78", "/end"),
     )
     shop.session.start("/play m")
     await asyncio.sleep(1)
@@ -175,7 +179,7 @@ async def test_on_stop_is_executed_when_a_person_quits(shop: Shop) -> None:
 
 
 async def test_a_stop_before_on_stop_drops_it_and_says_so(shop: Shop) -> None:
-    shop.save("m", "@press:a SL 900", "/sleep 1", "XX 1", on_stop=("@press:a PR 77",))
+    shop.save("m", "@press:a SL 900", "/sleep 1", "XX 1", on_early_end=("@press:a PR 77",))
     playing = asyncio.create_task(shop.session.run("/play m"))
     while not any("ended early" in text for text in shop.warned()):
         await asyncio.sleep(0.001)
@@ -183,7 +187,7 @@ async def test_a_stop_before_on_stop_drops_it_and_says_so(shop: Shop) -> None:
     with pytest.raises(Stopped):
         await playing
     assert shop.moving() == set() and shop.printed() == []
-    assert any(text.startswith("macro m: on_stop is not executed after a stop") for text in shop.warned())
+    assert any(text.startswith("macro m: on_early_end is not executed after a stop") for text in shop.warned())
     with pytest.raises(Stopped, match="/resume"):
         await shop.play(shop.session.macros.load("m"))
     assert len(shop.endings) == 0 and shop.printed() == []
@@ -191,7 +195,7 @@ async def test_a_stop_before_on_stop_drops_it_and_says_so(shop: Shop) -> None:
 
 async def test_a_stop_ends_on_stop_and_what_it_moved(shop: Shop) -> None:
     after = ("@press:a SL 500", "/sleep 9", "@press:a PR 77")
-    shop.save("m", "XX 1", on_stop=after, on_stop_moves=True)
+    shop.save("m", "XX 1", on_early_end=after, on_early_end_moves=True)
     playing = asyncio.create_task(shop.session.run("/play m"))
     await asyncio.sleep(3)
     assert shop.moving() == {"press:a"}
@@ -199,11 +203,11 @@ async def test_a_stop_ends_on_stop_and_what_it_moved(shop: Shop) -> None:
     with pytest.raises(Stopped):
         await playing
     assert shop.moving() == set() and shop.printed() == []
-    assert any(text.startswith("macro m: on_stop is not executed after a stop") for text in shop.warned())
+    assert any(text.startswith("macro m: on_early_end is not executed after a stop") for text in shop.warned())
 
 
 async def test_a_second_interruption_ends_on_stop_and_stops_what_it_moved(shop: Shop) -> None:
-    shop.save("m", "/sleep 5", on_stop=("@press:a SL 500", "/sleep 9", "@press:a PR 77"), on_stop_moves=True)
+    shop.save("m", "/sleep 5", on_early_end=("@press:a SL 500", "/sleep 9", "@press:a PR 77"), on_early_end_moves=True)
     playing = asyncio.create_task(shop.session.run("/play m"))
     await asyncio.sleep(1)
     shop.session.interrupt()
@@ -219,7 +223,7 @@ async def test_a_second_interruption_ends_on_stop_and_stops_what_it_moved(shop: 
 async def test_a_lost_connection_ends_it_and_on_stop_reaches_the_other_line(shop: Shop) -> None:
     after = ("@gantry:c PR 1", "@press:a PR 2")
     lines = ("@gantry:c SL 50", "@press:a SL 70", "/sleep 0.6", "@gantry:c PR P")
-    shop.save("m", *lines, on_stop=after)
+    shop.save("m", *lines, on_early_end=after)
     playing = asyncio.create_task(shop.session.run("/play m"))
     await asyncio.sleep(0.5)
     shop.world("/sim unplug gantry")
@@ -227,7 +231,7 @@ async def test_a_lost_connection_ends_it_and_on_stop_reaches_the_other_line(shop
         await playing
     assert short(caught.value.__notes__, shop) == ["macro m, step 4 (m.toml:24)"]
     assert shop.moving() == {"gantry:c"} and shop.printed() == ["2"]
-    assert "gantry:c not known (the connection is lost); press:a stands at " in shop.warned()[-1]
+    assert "gantry:c not known (the connection is lost); press:a is at rest at " in shop.warned()[-1]
     assert any("gantry: stop not sent" in text and "E-stop" in text for text in shop.warned())
 
 
@@ -237,7 +241,7 @@ async def test_a_connection_that_is_lost_while_no_line_uses_it_ends_it_at_once(
 ) -> None:
     async with Shop(tmp_path, reconnect=reconnect) as shop:
         lines = ("@press:a SL 70", "@gantry:c PR P", "/sleep 1000")
-        macro = shop.save("m", *lines, on_stop=("@press:a PR 2",))
+        macro = shop.save("m", *lines, on_early_end=("@press:a PR 2",))
         (tmp_path / "s.txt").write_text("\n".join(lines))
         script = read_script(str(tmp_path / "s.txt"), {})
         work = shop.play(macro) if kind == "macro" else run_script(shop.session, script)
@@ -268,7 +272,7 @@ async def test_nothing_is_asked_of_a_drive_to_which_nothing_was_sent(shop: Shop)
 
 
 async def test_a_script_that_plays_a_macro_runs_its_on_stop_and_reports_both(tmp_path: Path, shop: Shop) -> None:
-    shop.save("m", "@press:a SL 100", "/assert 1 == 2", on_stop=("/print after",))
+    shop.save("m", "@press:a SL 100", "/assert 1 == 2", on_early_end=("/print after",))
     (tmp_path / "s.txt").write_text("@gantry:c SL 100\n/play m\n")
     script = read_script(str(tmp_path / "s.txt"), {}, shop.session.macros)
     with pytest.raises(DriveError) as caught:
@@ -291,7 +295,7 @@ async def test_the_json_of_a_macro_names_macro_step_and_round_and_its_end(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     async with Shop(tmp_path) as shop:
-        macro = shop.save("m", "@press:a PR 1", '/expect "2" 0', on_stop=("/print x",))
+        macro = shop.save("m", "@press:a PR 1", '/expect "2" 0', on_early_end=("/print x",))
         told = Report("macro m", as_json=True, junit=str(tmp_path / "r.xml"))
         with pytest.raises(DriveError):
             await play(shop.session, macro, {}, times=None, watcher=told)

@@ -151,12 +151,12 @@ async def test_replace_keeps_key_page_note_and_on_stop(session: Session) -> None
     await session.open(f"{url(session)}#press")
     session.macros.folder.mkdir()
     (session.macros.folder / "m.toml").write_text(
-        'name = "m"\nkey = "F3"\npage = 2\nnote = "n"\non_stop = ["@a MA 0"]\non_stop_moves = true\n'
+        'name = "m"\nkey = "F3"\npage = 2\nnote = "n"\non_stop = ["@a MA 0"]\non_early_end_moves = true\n'
         '[[step]]\nline = "x"\n'
     )
     await typed(session, "/record m --replace", "PR P", "/record stop")
     macro = session.macros.load("m")
-    assert (macro.place, macro.note, macro.on_stop, macro.on_stop_moves, macro.lines) == (
+    assert (macro.place, macro.note, macro.on_early_end, macro.on_early_end_moves, macro.lines) == (
         "F3 (page 2)",
         "n",
         ("@a MA 0",),

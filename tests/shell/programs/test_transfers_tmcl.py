@@ -53,7 +53,7 @@ async def test_a_running_program_is_ended_and_its_motor_stopped_before_the_downl
         await asyncio.sleep(0.3)
         (tmp_path / "p.tmc").write_text("STOP\n")
         told = await load(shop, tmp_path)
-        assert "1: its program ran and was ended" in told and told[-1] == "1: verified, 1 lines"
+        assert "1: its program ran and was ended" in told and told[-1] == "1: verified, 1 line"
         await shop.session.run("@1 GAP 3, 0")
         assert shop.printed()[-1] == "0"
 

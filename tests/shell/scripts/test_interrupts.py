@@ -75,7 +75,7 @@ def test_a_signal_in_a_script_stops_what_it_moved(shop, number):
     assert shop.standing()[1] != "0\n0\n"
     script.send_signal(number)
     _, err = script.communicate(timeout=PATIENCE)
-    assert (script.returncode, err) == (130, "interrupted; stopped a, b: all 2 read velocity 0\n")
+    assert (script.returncode, err) == (130, "interrupted; stopped a, b: velocity 0 was read from both\n")
     assert shop.standing() == (0, "0\n0\n", "")
 
 
@@ -90,7 +90,7 @@ def test_a_log_swallows_no_signal(shop):
     assert len(open_) == 2 < len(masks), "the threads that wait for the signal, and no other"
     script.send_signal(signal.SIGPIPE)
     _, err = script.communicate(timeout=PATIENCE)
-    assert (script.returncode, err) == (130, "interrupted; stopped a, b: all 2 read velocity 0\n")
+    assert (script.returncode, err) == (130, "interrupted; stopped a, b: velocity 0 was read from both\n")
 
 
 def test_a_terminal_that_hangs_up_stops_what_the_script_moved(shop):
@@ -105,7 +105,7 @@ def test_the_stop_key_on_the_terminal_of_a_script_is_exit_4(shop):
     child = shop.terminal("run", shop.script(RUNAWAY), "--on", shop.url)
     child.expect("1234")
     child.send("\x18")
-    child.expect("stop: all 2 read velocity 0")
+    child.expect("stop: velocity 0 was read from both")
     child.expect("script.txt:4: stopped before it was done")
     assert read_to_end(child) == 4
     assert shop.standing() == (0, "0\n0\n", "")
@@ -190,7 +190,10 @@ def test_a_refusal_in_a_script_stops_what_it_started_says_so_and_keeps_its_exit_
     _, err = script.communicate(timeout=PATIENCE)
     others = "stopped as well, because the stop of their line has no name: a"
     assert script.returncode == 1
-    assert err.splitlines()[:2] == ["stopped b: all 2 read velocity 0", others] and "script.txt:2: b refused" in err
+    assert (
+        err.splitlines()[:2] == ["stopped b: velocity 0 was read from both", others]
+        and "script.txt:2: b refused" in err
+    )
     assert shop.standing() == (0, "0\n0\n", "")
 
 
@@ -198,7 +201,7 @@ def test_a_send_that_succeeds_leaves_its_drive_moving_and_one_that_fails_does_no
     shop.turn()
     assert shop.standing()[1] == "100000\n0\n"
     code, _, err = shop.send("@a PR P", "@a XX")
-    assert (code, err.splitlines()[0]) == (1, "stopped a: all 2 read velocity 0")
+    assert (code, err.splitlines()[0]) == (1, "stopped a: velocity 0 was read from both")
     assert shop.standing()[1] == "0\n0\n"
 
 
@@ -215,7 +218,7 @@ def test_an_interrupted_reader_stops_nothing(shop):
 def test_a_piped_shell_that_is_refused_stops_what_it_started(shop):
     piped = shop.start("shell", shop.url)
     _, err = piped.communicate("@b SL 5000\n@b XX\n", timeout=PATIENCE)
-    assert piped.returncode == 1 and err.startswith("stopped b: all 2 read velocity 0\n")
+    assert piped.returncode == 1 and err.startswith("stopped b: velocity 0 was read from both\n")
     assert shop.standing() == (0, "0\n0\n", "")
 
 

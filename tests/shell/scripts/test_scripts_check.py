@@ -52,7 +52,7 @@ def check(tmp_path, monkeypatch):
 @pytest.mark.parametrize("word", ["exit", "quit", "help", "?", " Help"])
 def test_a_bare_word_is_refused_before_the_first_line_is_sent(check, word):
     found = check(f"MR 100\n{word}\n")
-    assert len(found) == 1 and found[0].startswith("s.txt:2: ") and "is no command of a drive" in found[0]
+    assert len(found) == 1 and found[0].startswith("s.txt:2: ") and "not a command of a drive" in found[0]
     assert check(f"@a {word}\n") == check(f"PG 1\n{word}\nPG\n") == check(f"/raw on\n{word}\n") == []
 
 

@@ -84,7 +84,7 @@ async def test_a_command_from_elsewhere_is_named_first(tmp_path: Path) -> None:
         (warning,) = cell.warned()
         assert re.fullmatch(
             r"a: \d+ steps from its twin since \d\d:\d\d:\d\d\.\d \(limit \d+\): a command not seen here, "
-            r"settings changed; /twin on a sets it anew",
+            r"settings changed; /twin on a sets it again",
             warning,
         )
         await run(cell, "SL 0", "/wait stopped", "/twin on a", "/sleep 1")
