@@ -18,7 +18,6 @@ from collections.abc import Callable, Coroutine, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from multidrop.dialects.text import counted
 from multidrop.shell.line_syntax import Place, pinned
 from multidrop.shell.prompt.line_queue import BURST, LEAVING, Line
 from multidrop.shell.session import Session
@@ -196,4 +195,4 @@ def them(lines: Sequence[object]) -> str:
 def not_sent(lines: Sequence[str]) -> str:
     """`3 lines were not sent: MR 1 · MR 2 · MR 3`."""
     named = " · ".join(line[:40] for line in lines[:NAMED]) + (" …" if len(lines) > NAMED else "")
-    return f"{counted(len(lines), 'line was', 'lines were')} not sent: {named}"
+    return f"{len(lines)} lines were not sent: {named}" if len(lines) > 1 else f"not sent: {named}"

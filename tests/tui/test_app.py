@@ -219,7 +219,7 @@ async def test_the_selector_chooses_a_drive_of_any_bus() -> None:
         assert session.selected is not None
         assert session.selected.address == "b"
         await settle(pilot)
-        assert app.main.lines("label").plain == " press:b ▸ "
+        assert app.main.lines("label").plain == " press:clamp ▸ "
         await pilot.press("alt+2")
         assert app.main.lines("label").plain == " eth ▸ "
         del session.buses["press"], session.buses["pmx"]

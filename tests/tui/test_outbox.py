@@ -151,7 +151,7 @@ async def test_a_verb_is_held_where_it_would_be_for_another_drive() -> None:
     await asyncio.sleep(5)
     assert box.sent == ["press:a MR 1"]
     assert box.told == [
-        "another drive was selected than press:a; 2 lines were not sent: /list · MR 2; /unsent offers them again"
+        "another drive was selected than press:gantry; 2 lines were not sent: /list · MR 2; /unsent offers them again"
     ]
 
 

@@ -132,9 +132,9 @@ async def test_the_other_half_shows_one_drive_and_a_key_types_to_it(size: tuple[
         assert above is (size[0] == 80)
         await emit(pilot, Printed(session.time, "press", "b", "4711"), Printed(session.time, "press", "a", "4712"))
         assert "4711" in beside.transcript.plain and "4712" not in beside.transcript.plain
-        assert app.main.lines("label").plain == " press:a ▸ "
+        assert app.main.lines("label").plain == " press:gantry ▸ "
         await press(pilot, *SPLIT)
-        assert app.main.lines("label").plain == " press:b ▸ " and (beside.bus, beside.address) == ("press", "a")
+        assert app.main.lines("label").plain == " press:clamp ▸ " and (beside.bus, beside.address) == ("press", "a")
         await press(pilot, *"PR P", "enter")
         assert session.sent == ["press:b PR P"]
 

@@ -69,7 +69,7 @@ async def test_tab_in_a_search_shows_only_what_was_found() -> None:
         await begun(pilot, session)
         await press(pilot, "ctrl+f", *"vm", "tab")
         shown = [row for row in plain(app).split("\n") if row.strip()]
-        assert [row[17:] for row in shown[:-1]] == ["VM=600000"]
+        assert [row[20:] for row in shown[:-1]] == ["VM=600000"]
         assert 'only "vm"' in shown[-1] and "/filter off" in shown[-1]
         assert app.focused is app.main.entry
 
@@ -164,7 +164,7 @@ async def test_times_are_those_that_were_asked_for_on_every_page() -> None:
         shelf.set_times("start")
         assert [row[:9].strip() for row in plain(app).split("\n")[:3]] == ["0.000", "0.400", "4.000"]
         shelf.set_times("off")
-        assert plain(app).startswith(" a   › VM=600000")
+        assert plain(app).startswith(" gantry › VM=600000")
         assert app.main.page("eth").clocks.form == "off"
 
 
