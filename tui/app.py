@@ -46,7 +46,7 @@ from multidrop.tui.presenter import Presenter
 from multidrop.tui.screen_model import Record, ScreenModel
 from multidrop.tui.screens.dialogs import LEAST, Over, TooSmall
 from multidrop.tui.screens.main_screen import MainScreen
-from multidrop.tui.screens.page import Framed, Page
+from multidrop.tui.screens.page import Framed, Page, show_rows
 from multidrop.tui.screens.questions import Questions
 from multidrop.tui.screens.start import Opener, Start
 from multidrop.tui.session_hooks import Hooks
@@ -339,7 +339,7 @@ class MultidropApp(App[int]):
         page = next((each for each in self.screen_stack if isinstance(each, Page) and each.is_running), None)
         self.presenter.paint(self.main, self.session.now(), panels, page)
         if panels:
-            self.main.show_rows("tour", self.tour.rows(self.size.width) if self.tour.on else [])
+            show_rows(self.main.lines("tour"), self.tour.rows(self.size.width) if self.tour.on else [])
             self.typist.show_hint()
             self._raise_banner()
         return True

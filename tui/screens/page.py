@@ -61,13 +61,13 @@ class Framed(Screen[None]):
             "told", [((f" {row}", "strong"),) for row in at_words(text, self.size.width - 2)] if text else []
         )
 
-    def show_rows(self, name: str, rows: list[Row]) -> None:
-        """Show a part in as many rows as it has; none hides it."""
-        part = self.lines(name)
-        if part.display != bool(rows):
-            part.display = bool(rows)
-        part.styles.height = max(1, len(rows))
-        part.put(rows)
+
+def show_rows(part: Lines, rows: list[Row]) -> None:
+    """Show a part in as many rows as it has; none hides it."""
+    if part.display != bool(rows):
+        part.display = bool(rows)
+    part.styles.height = max(1, len(rows))
+    part.put(rows)
 
 
 @dataclass
