@@ -57,9 +57,8 @@ class Framed(Screen[None]):
     def tell(self, text: str) -> None:
         """Show a line above the footer, in rows of its own; an empty one gives them back."""
         self.told = text
-        self.show_rows(
-            "told", [((f" {row}", "strong"),) for row in at_words(text, self.size.width - 2)] if text else []
-        )
+        rows: list[Row] = [((f" {row}", "strong"),) for row in at_words(text, self.size.width - 2)] if text else []
+        show_rows(self.lines("told"), rows)
 
 
 def show_rows(part: Lines, rows: list[Row]) -> None:
