@@ -30,11 +30,13 @@ from multidrop.shell.events import (
 )
 from multidrop.shell.roles import Series
 from multidrop.shell.stop_report import Found
-from multidrop.shell.watching.host import Calls, Gate, Watcher
 from multidrop.shell.watching.wire import Dropped, Heard, Item, Now, line
 from multidrop.tui.app import MultidropApp
 from multidrop.tui.figures import Figures
 from multidrop.tui.screen_model import Record
+
+if sys.platform != "win32":
+    from multidrop.shell.watching.host import Calls, Gate, Watcher
 
 assert sys.platform != "win32"
 

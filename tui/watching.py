@@ -30,14 +30,16 @@ from multidrop.shell.openings import Failed as OpeningFailed
 from multidrop.shell.playing import Playing
 from multidrop.shell.session import Session
 from multidrop.shell.stop_report import Found, Tally
-from multidrop.shell.watching.join import Connection, Stops
 from multidrop.shell.watching.wire import Dropped, Garbled, Heard, Item, Items, Now
 from multidrop.transports import Lost, Received, Transport, TransportLost
 from multidrop.tui.app import MultidropApp
 from multidrop.tui.assist import Assist
 from multidrop.tui.figures import NATIVE, Figures
 from multidrop.tui.screen_model import Record, ScreenModel
-from multidrop.tui.sharing import ON_BUS, TYPES, Shared, SharedBus, SharedDrive
+
+if sys.platform != "win32":
+    from multidrop.shell.watching.join import Connection, Stops
+    from multidrop.tui.sharing import ON_BUS, TYPES, Shared, SharedBus, SharedDrive
 
 assert sys.platform != "win32"
 

@@ -15,7 +15,6 @@ from pathlib import Path
 from typing import Protocol
 
 from multidrop.dialects import Diagnostic
-from multidrop.shell.watching.host import peer
 from multidrop.shell.watching.wire import (
     LONGEST_GREETING,
     STOP,
@@ -27,7 +26,10 @@ from multidrop.shell.watching.wire import (
 )
 from multidrop.transports import Unreachable
 from multidrop.transports.ssh import RELAY, FarPort
-from multidrop.transports.ssh_session import OPENING, SshSession, reason
+
+if sys.platform != "win32":
+    from multidrop.shell.watching.host import peer
+    from multidrop.transports.ssh_session import OPENING, SshSession, reason
 
 assert sys.platform != "win32"
 
