@@ -42,7 +42,7 @@ def _amount(number: float, unit: str) -> int | str:
         return operator.index(number)  # type: ignore[arg-type]
     text = f"{{{model.written(number)} {unit}}}"
     if QUANTITY.fullmatch(text) is None:
-        raise Diagnostic(f"{number} {unit} is no quantity", "", 'valid: as in move(12.5, "mm")')
+        raise Diagnostic(f"not a quantity: {number} {unit}", "", 'valid: as in move(12.5, "mm")')
     return text
 
 
