@@ -9,7 +9,7 @@ WORKERS := $(shell $(PYTHON) -c 'import os; print((os.cpu_count() or 1) + 1)')
 PYTEST = $(BIN)/python -m pytest --dist worksteal -n $(WORKERS)
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
 
-.PHONY: demo test quick nightly check format lint types types-here types-darwin types-win32 contracts measured coverage bench readme shipped pictures docs package release fuzz soak simulate snapshots windows clean
+.PHONY: demo test quick nightly check format lint types types-here types-darwin types-win32 contracts measured unmeasured coverage bench readme shipped pictures docs package release fuzz soak simulate snapshots windows clean
 
 demo: $(VENV)/.run
 	$(BIN)/multidrop demo
@@ -56,6 +56,11 @@ contracts: $(VENV)/.dev
 # Each test runs once: one that fails on a busy machine is a defect (docs/decisions/0050).
 measured: $(VENV)/.dev
 	$(PYTEST) --cov --cov-report=
+
+# Choose anew the tests that coverage leaves out, once `make check` has become slow: it takes half an hour.
+unmeasured: $(VENV)/.dev
+	$(PYTEST) --measure-all --cov --cov-report= --cov-context=test --durations=0 > $(VENV)/durations.txt
+	$(BIN)/python -m tests.support.choose_measured .coverage $(VENV)/durations.txt
 
 coverage: measured
 	$(BIN)/coverage report

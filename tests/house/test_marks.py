@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import re
+from collections import Counter
 from itertools import product
 
 import pytest
 
-from tests.support.marks import is_taken, places
+from tests.support.choose_measured import choose
+from tests.support.marks import UNMEASURED, is_taken, places
 from tests.support.paths import ROOT
 from tests.support.tools import PROMISED, tool
 
@@ -49,3 +51,24 @@ def test_ci_installs_every_tool_of_the_tests_and_hides_nothing_by_a_setting_of_p
     assert not [text for text in texts if "skipif(shutil.which" in text or "skipif(not shutil.which" in text]
     assert f"export {PROMISED}=1" in ci
     assert "unset" in ci and "${!PYTHON@}" in ci
+
+
+def test_each_test_that_coverage_leaves_out_is_there() -> None:
+    gone = []
+    for name in UNMEASURED.read_text(encoding="utf-8").split():
+        file, _, function = name.partition("::")
+        path = ROOT / file
+        if not path.is_file() or f"def {function}(" not in path.read_text(encoding="utf-8"):
+            gone.append(name)
+    assert gone == [], "take them out of tests/support/unmeasured.txt"
+
+
+def test_the_cheapest_tests_that_show_most_are_measured() -> None:
+    times = Counter({"cheap": 0.1, "long": 9.0, "longer": 10.0, "alone": 8.0})
+    shown = {
+        "cheap": {(1, 1, 2)},
+        "long": {(1, n, n + 1) for n in range(300)},
+        "longer": {(1, n, n + 1) for n in range(300)},
+        "alone": {(2, n, n + 1) for n in range(300)},
+    }
+    assert choose(times, shown) == ["longer"]

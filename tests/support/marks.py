@@ -33,13 +33,17 @@ REPEATING = ("wide", "nightly", "slow", "hypothesis")
 """Markers of products of parameters, floods and generated cases, which go the same ways again. Coverage is not measured
 in them: measuring makes the product two to three times slower. So the share that is measured is a lower bound."""
 
+UNMEASURED = Path(__file__).with_name("unmeasured.txt")
+"""Test functions that take long and go the ways of cheaper ones (`tests.support.choose_measured`)."""
+
 _running: list[pytest.Item] = []
 """The test that runs, its fixtures included."""
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    """Add `--nightly`."""
+    """Add `--nightly` and `--measure-all`."""
     parser.addoption("--nightly", action="store_true", help="run the whole of every product of parameters")
+    parser.addoption("--measure-all", action="store_true", help="measure coverage in the first case of every test")
 
 
 def pytest_configure() -> None:
@@ -170,19 +174,21 @@ def nightly(pytestconfig: pytest.Config) -> bool:
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     """Leave out what only the nightly run takes, and spread what waits."""
     _leave_out(config, items)
-    for item in _repeating(items):
+    unmeasured = set() if config.getoption("measure_all") else set(UNMEASURED.read_text().split())
+    for item in _repeating(items, unmeasured):
         item.add_marker("no_cover")
     items[:] = _spread(items)
 
 
-def _repeating(items: list[pytest.Item]) -> Iterator[pytest.Item]:
-    """The tests that go ways of others again: those marked so, and the cases of a test but its first one."""
+def _repeating(items: list[pytest.Item], unmeasured: set[str]) -> Iterator[pytest.Item]:
+    """The tests that go ways of others again: those marked or listed so, and the cases of a test but its first one."""
     cases: dict[str, list[pytest.Item]] = {}
     for item in items:
-        if any(item.get_closest_marker(name) for name in REPEATING):
+        function = item.nodeid.partition("[")[0]
+        if function in unmeasured or any(item.get_closest_marker(name) for name in REPEATING):
             yield item
         else:
-            cases.setdefault(item.nodeid.partition("[")[0], []).append(item)
+            cases.setdefault(function, []).append(item)
     for each in cases.values():
         yield from each[1:]
 
