@@ -75,7 +75,7 @@ async def test_on_a_bad_line_a_checksum_keeps_every_number_right_and_every_succe
         f'seed = 3\n[[bus]]\nname = "w"\n[bus.faults]\n{faults}\n' + drive("a", em, ck) + drive("b", em, ck), "a,b"
     )
     chance, numbers, taken = random.Random(5), 0, 0
-    lines = 200 if nightly else 80
+    lines = 200 if nightly else 50
     for _ in range(lines):
         name, number = chance.choice("ab"), chance.randint(-(2**31), 2**31 - 1)
         held = bad.devices[name].memory.values
@@ -97,7 +97,7 @@ async def test_garbage_is_a_failure_that_is_told_and_nothing_else(desk, em, ck, 
     bad = desk()
     faults = "[bus.faults]\nflip = 8e-3\ndrop = 4e-3\n"
     await bad.open(f'[[bus]]\nname = "w"\n{faults}' + drive("a", em, ck) + drive("b", em, ck), "a,b")
-    for _ in range(60 if nightly else 25):
+    for _ in range(60 if nightly else 12):
         for line in ("@a PR P", "@b VM=500000", "@a PR AL", "@b PR ZZ", "@b PR IS"):
             await bad.run(line)  # raises nothing but what a person is told
     await bad.session.close()

@@ -206,7 +206,7 @@ async def test_nothing_but_the_lines_of_a_download_goes_to_its_module(session):
     assert not bus.drives["1"].programming and await say(session, "@slide:1 GAP 3, 0") == ["0"]
 
 
-@pytest.mark.parametrize("after", range(0, 40, 3))
+@pytest.mark.parametrize("after", [pytest.param(n, marks=[pytest.mark.nightly] * (n % 4 > 0)) for n in range(0, 40, 3)])
 async def test_the_reply_to_a_poll_that_a_stop_cuts_off_is_no_line(session, after):
     polled = session.buses["slide"].telemetry.subscribe(["1", "7"], 0.001)
     await asyncio.sleep(0.5 + after / 1000)
