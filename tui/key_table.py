@@ -141,16 +141,22 @@ SHEETS: dict[str, Sheet] = {
     "plot": Sheet(
         "plots",
         "The curves of the selected drive, or of those that you choose. The picture runs with the time, and Space "
-        "holds it while the drives go on. The cursor reads the values of one moment. /plot names what is "
-        "plotted, and writes it to a file or to rerun.",
+        "holds it while the drives go on. Two cursors read values and differences. A trigger stops the "
+        "picture around the moment at which a curve crosses a level. /plot names what is plotted, and writes it "
+        "to a file or to rerun.",
         {
             "Time and values": (
                 Key("space", "pause", "hold the picture, or let it run", "hold"),
                 Key("left / right", "cursor(-1) / cursor(1)", "the cursor", "cursor"),
                 Key("pageup / pagedown", "cursor(-20) / cursor(20)", "the cursor in larger steps"),
+                Key("x", "other", "the second cursor here; then change between the two", "cursor 2"),
                 Key("plus,equals_sign / minus", "shorter(1) / shorter(-1)", "a shorter time, a longer one", "time"),
                 Key("up / down", "closer(1) / closer(-1)", "magnify the values, or show more of them", "values"),
-                Key("0", "automatic", "all of it again, as it runs", "reset"),
+                Key("0", "automatic", "all of it again, as it runs, without a trigger", "reset"),
+            ),
+            "Trigger": (
+                Key("g", "trigger", "stand at each edge: type curve, rise or fall, level, share before it", "trigger"),
+                Key("j", "single", "stand at the next edge only; again: wait for one more", "single"),
             ),
             "What is plotted": (
                 Key("1..9", "drive({})", "a drive of the line by its number, or not", "drive"),
@@ -161,6 +167,7 @@ SHEETS: dict[str, Sheet] = {
                 Key("s", "apart", "charts of its own for each drive, or all in one", "split"),
             ),
             "Elsewhere": (
+                Key("ctrl+s", "save", "save what is visible: type a name that ends in .csv or .rrd", "save"),
                 Key("o", "stream", "serve the plot for rerun, or end that", "rerun"),
                 Key("c", "copy", "copy the command of your desk for rerun", "copy"),
                 Key("ctrl+g", "beside", "the plot beside the transcript, or not", "plots"),

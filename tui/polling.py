@@ -15,6 +15,8 @@ from multidrop.drives.bus import Bus
 from multidrop.drives.telemetry import Subscription, Telemetry, Value
 from multidrop.shell.roles import Series
 from multidrop.shell.session import Session
+from multidrop.tui.curves.samples import PREDICTED as MEASURED
+from multidrop.tui.curves.trigger import State
 from multidrop.tui.screen_model import ScreenModel
 
 PLOT = 0.02
@@ -57,7 +59,7 @@ class Polling:
         """Subscribe to what is shown, and end all other subscriptions. `wants`: as panels name it."""
         if session.watching:
             return
-        chosen = plotted(session) if "plot" in wants else []
+        chosen = [*(plotted(session) if "plot" in wants else []), *_awaited(session, model)]
         drives = _drives(session, model, chosen, PLOT if "samples" in wants else REST) if self.on else {}
         watches = _watches(session) if self.on and "conditions" in wants else {}
         values = _values(session, chosen) if self.on else {}
@@ -112,6 +114,16 @@ def moved_lately(session: Session, model: ScreenModel, since: float) -> Sequence
         for address in bus.drives
         if model.bus(bus.name).readout(address).moved_at >= since
     ]
+
+
+def _awaited(session: Session, model: ScreenModel) -> list[Series]:
+    """What a trigger waits for: it is read as what is plotted, also while another page is shown."""
+    trigger = model.look.trigger
+    if trigger.setting is None or trigger.state in (State.OFF, State.HELD):
+        return []
+    bus, address, _, word = trigger.setting.quantity
+    there = bus in session.buses and address in session.buses[bus].drives
+    return [Series(bus, address, "" if word in MEASURED else word)] if there else []
 
 
 def _open(session: Session) -> list[Bus]:

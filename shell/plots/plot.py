@@ -217,6 +217,28 @@ class Plot:
         self._sink.let_go()
 
 
+async def write(target: PlotTarget, batch: Batch) -> None:
+    """Write samples into a new file. Raises Diagnostic, and then there is no file, or what came before."""
+    if target.file is None or target.file.exists():
+        what = "is there already" if target.file is not None else "is not a file"
+        raise Diagnostic(f"{target.text} {what}", hint="use another name")
+
+    def work() -> None:
+        sink = _sink(target)
+        try:
+            sink.send(batch)
+            sink.close()
+        except SinkBroken as error:
+            sink.abandon()
+            sink.let_go()
+            raise Diagnostic(str(error)) from None
+
+    try:
+        await in_thread(work, FILE_TIMEOUT)
+    except TimeoutError:
+        raise Diagnostic(f"cannot write {target.text}: it does not respond") from None
+
+
 def _sink(target: PlotTarget) -> Sink | TableSink:
     return TableSink(target) if target.file is not None and target.file.suffix in TABLES else Sink(target)
 

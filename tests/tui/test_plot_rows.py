@@ -3,17 +3,24 @@
 from __future__ import annotations
 
 import math
+import sys
+from pathlib import Path
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from multidrop.dialects import Diagnostic
 from multidrop.drives.events import Lost, Sample, Valued
 from multidrop.shell.events import By, OnBus
 from multidrop.shell.roles import Series
 from multidrop.transports import TransportLost
 from multidrop.tui.curves.raster import ASCII
-from multidrop.tui.panels.plot import cursor_row, plot_rows, plot_title
+from multidrop.tui.curves.samples import Quantity
+from multidrop.tui.curves.trigger import State
+from multidrop.tui.panels.plot import plot_rows, plot_title
+from multidrop.tui.panels.plot_tools import cursor_rows, parse_trigger, typed_trigger
+from multidrop.tui.screens.dialogs import Field
 from multidrop.tui.screens.plot_page import PlotPage
 from multidrop.tui.widgets.lines import width_of
 from tests.support.fake_session import FakeBus, FakeDrive, FakeSession, a_move, demo_session, on_screen, press, settle
@@ -115,8 +122,27 @@ def test_the_cursor_shows_the_values_there(session: FakeSession) -> None:
     look.move_cursor(-20, session.now(), 50)
     rows = plot_rows(shown, 60, 20)
     assert sum("strong" in {role for _, role in row} for row in rows) > 10
-    assert "12:40:58.66" in plain(cursor_row(shown, 60)) and "a gantry position " in plain(cursor_row(shown, 60))
-    assert "not known" not in plain(cursor_row(shown, 60))
+    text = plain(*cursor_rows(shown, 60, 4))
+    assert "12:40:58.66" in text and "a gantry position " in text and "not known" not in text
+
+
+def test_two_cursors_show_their_differences(session: FakeSession) -> None:
+    moves = [OnBus("press", Sample(session.time - 12 + n / 20, "a", 100 * n, 2000 + n)) for n in range(240)]
+    shown = view(session, *moves)
+    look = shown.model.look
+    plot_rows(shown, 60, 20)
+    look.move_cursor(-10, session.now(), 50)
+    look.change_cursor(session.now(), 50)
+    assert look.other == look.cursor
+    look.move_cursor(-10, session.now(), 50)
+    plot_rows(shown, 60, 20)
+    text = plain(*cursor_rows(shown, 60, 6))
+    assert "dt -4.167 s" in text and "1/dt 0.24 Hz" in text and "velocity 2158 to 2075 (-83)" in text
+    cells = [row for row in plot_rows(shown, 60, 20) if "┊" in plain(row) and "│" in plain(row)[11:]]
+    assert len(cells) > 5, "both are drawn"
+    look.change_cursor(session.now(), 50)
+    assert "dt +4.167 s" in plain(*cursor_rows(shown, 60, 6)), "keys move the other one"
+    assert "1/dt" not in plain(*cursor_rows(shown, 60, 6)) or look.cursor != look.other
 
 
 def test_a_lost_line_leaves_a_gap(session: FakeSession) -> None:
@@ -228,3 +254,136 @@ async def test_a_refused_line_of_the_page_is_seen_on_the_page(session: FakeSessi
         assert "✗ cannot serve at 127.0.0.1:9876" in app.screen.lines("below").plain
         await press(pilot, "a")
         assert "cannot" not in app.screen.lines("below").plain
+
+
+# Trigger, single shot, and saving
+
+
+def run_up(session: FakeSession, begin: float) -> list[OnBus]:
+    """Drive a stands, and from one second on its velocity rises by 1000 a second."""
+    return [OnBus("press", Sample(begin + n / 20, "a", n, max(0, 50 * (n - 20)))) for n in range(100)]
+
+
+@pytest.mark.tui
+async def test_a_trigger_holds_the_picture_around_the_edge_and_space_waits_for_the_next_one() -> None:
+    async with on_screen() as (pilot, app, session):
+        session.emit(*rest("a", 5, session))
+        await press(pilot, "ctrl+g", "g")
+        field = app.focused
+        assert isinstance(field, Field) and field.value.startswith("a velocity rise ")
+        field.value = "a velocity rise 1000 25%"
+        await press(pilot, "enter")
+        look = app.model.look
+        assert look.trigger.state is State.ARMED and look.paused_at is None
+        assert "armed a velocity rise 1000 25%" in app.screen.lines("heading").plain
+        assert session.buses["press"].telemetry.polled["a"] == 0.02
+        session.emit(*run_up(session, session.time))
+        session.time += 5
+        app.model.changed = True
+        await settle(pilot)
+        assert look.trigger.state is State.TRIGGERED and look.trigger.at == pytest.approx(session.time - 3, abs=0.06)
+        assert look.paused_at == pytest.approx(look.trigger.at + 15)
+        assert "╵edge" in app.screen.lines("charts").plain and "▸" in app.screen.lines("charts").plain
+        session.time += 30
+        app.model.changed = True
+        await settle(pilot)
+        assert look.trigger.state.value == "held"
+        await press(pilot, "escape")
+        assert app.screen is app.main and look.paused_at is None, "the panel runs"
+        await press(pilot, "ctrl+g")
+        assert "held a velocity" in app.screen.lines("heading").plain
+        await press(pilot, "j")
+        assert look.trigger.single and look.trigger.state.value == "armed"
+        await press(pilot, "0")
+        assert look.trigger.state.value == "off" and "velocity rise" not in app.screen.lines("heading").plain
+
+
+@pytest.mark.tui
+@pytest.mark.parametrize("keys", ["g", "j", "ctrl+s", "x", "g enter", "g enter x left x"])
+async def test_the_stop_goes_first_whatever_the_page_of_plots_waits_for(keys: str) -> None:
+    async with on_screen() as (pilot, app, session):
+        session.emit(*wave("a", session))
+        await press(pilot, "ctrl+g", *keys.split())
+        assert isinstance(app.focused, Field) == (keys in ("g", "j", "ctrl+s"))
+        await press(pilot, "ctrl+x")
+        assert session.stops == 1 and isinstance(app.screen, PlotPage)
+        assert not isinstance(app.focused, Field), "what was begun before a stop is not used"
+
+
+@pytest.mark.parametrize(
+    ("text", "why"),
+    [
+        ("", "no trigger ''; valid: CURVE rise|fall LEVEL [SHARE%], as a velocity rise "),
+        ("a velocity rise", "no trigger 'a velocity rise'; valid: "),
+        ("a velocity up 5", "no trigger"),
+        ("a velocity rise nan", "no trigger"),
+        ("a velocity rise 5 120%", "no trigger"),
+        ("a velocity rise 5 20% 7", "no trigger"),
+        ("q velocity rise 5", "no plotted curve is 'q velocity'; plotted: a velocity, a position"),
+        ("a rise 5", "several curves are 'a'; plotted: a velocity, a position"),
+        ("rise 5", "several curves are 'without a name'; plotted: a velocity, a position"),
+    ],
+)
+def test_a_wrong_trigger_has_one_line(session: FakeSession, text: str, why: str) -> None:
+    with pytest.raises(Diagnostic) as failure:
+        parse_trigger(view(session, *wave("a", session)), text)
+    assert str(failure.value).startswith(why)
+
+
+def test_a_trigger_is_typed_in_the_unit_that_is_shown_and_shown_as_it_was_typed(session: FakeSession) -> None:
+    shown = view(session, *wave("a", session))
+    assert typed_trigger(shown).startswith("a velocity rise ")
+    setting = parse_trigger(shown, "press:a position fall -100 50%")
+    assert setting == (Quantity("press", "a", "", "position"), -100, False, 0.5)
+    shown.model.look.arm(setting, False, shown.model.traces)
+    assert typed_trigger(shown) == "a position fall -100 50%"
+
+
+@pytest.mark.tui
+async def test_what_is_visible_is_saved_as_a_table_and_nothing_is_overwritten(tmp_path: Path) -> None:
+    async with on_screen() as (pilot, app, session):
+        session.emit(*rest("a", 5, session), *wave("b", session))
+        session.plotted = (Series("press", "b"),)
+        await press(pilot, "ctrl+g", "minus", "plus", "plus", "plus", "ctrl+s")  # the last 5 s
+        file = tmp_path / "seen.csv"
+        for expected in ("196 values of 2 curves are in", "is there already; use another name"):
+            if not isinstance(app.focused, Field):
+                await press(pilot, "ctrl+s")
+            assert isinstance(app.focused, Field)
+            app.focused.value = str(file)
+            await press(pilot, "enter")
+            await app.workers.wait_for_complete()
+            await settle(pilot)
+            below = app.screen.lines("below").plain
+            assert expected in below, below
+        rows = file.read_text().splitlines()
+        assert len(rows) == 197 and rows[0].startswith("time,elapsed,bus,drive,axis,name,value,unit,text")
+        assert {row.split(",")[5] for row in rows[1:]} == {"position", "velocity"}
+        assert all(0 <= float(row.split(",")[1]) <= 5.6 for row in rows[1:])
+
+
+@pytest.mark.tui
+@pytest.mark.parametrize(
+    ("name", "why"),
+    [
+        ("seen.txt", "✗ no plot file 'seen.txt'; valid: a name that ends in"),
+        ("nowhere/seen.csv", "✗ no folder nowhere"),
+        ("rerun+http://desk:9876/proxy", "is not a file"),
+        ("seen.rrd", "✗ plots need rerun, which is not installed"),
+    ],
+)
+async def test_what_cannot_be_saved_has_one_line(
+    name: str, why: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setitem(sys.modules, "rerun", None)
+    async with on_screen() as (pilot, app, session):
+        session.emit(*wave("a", session))
+        await press(pilot, "ctrl+g", "ctrl+s")
+        assert isinstance(app.focused, Field)
+        app.focused.value = name
+        await press(pilot, "enter")
+        await app.workers.wait_for_complete()
+        await settle(pilot)
+        assert why in app.screen.lines("below").plain
+        assert not list(tmp_path.iterdir())

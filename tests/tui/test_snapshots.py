@@ -17,6 +17,8 @@ from multidrop.shell.events import Bytes, OnBus, Phase, Printed, ProgramRead, Pr
 from multidrop.shell.prompt.complete import Completion
 from multidrop.shell.roles import Filter, Series
 from multidrop.transports import TransportLost
+from multidrop.tui.curves.samples import Quantity
+from multidrop.tui.curves.trigger import Setting
 from multidrop.tui.screens.program import ProgramPage
 from multidrop.tui.widgets.theme import Signs
 from tests.support.fake_session import (
@@ -251,6 +253,7 @@ def test_snapshot_of_the_names_of_a_drive(snap_compare: Compare) -> None:
 # The page of plots, and a drive beside its twin
 
 WAYS = {"several": (), "cursor": ("space", *["left"] * 12), "split": ("s", "minus", "minus")}
+WAYS["two"] = (*WAYS["cursor"], "x", *["left"] * 20)
 
 
 def several(session: FakeSession) -> None:
@@ -278,9 +281,10 @@ def plotted(prepare: Callable[[FakeSession], None], *keys: str, signs: Signs = S
     return act
 
 
-@pytest.mark.parametrize(
-    ("way", "size"), [("several", "80x24"), ("several", "120x40"), ("cursor", "80x24"), ("split", "120x40")]
-)
+PLOTS = [("several", "80x24"), ("several", "120x40"), ("cursor", "80x24"), ("split", "120x40"), ("two", "120x40")]
+
+
+@pytest.mark.parametrize(("way", "size"), PLOTS)
 def test_plots(snap_compare: Compare, way: str, size: str) -> None:
     assert drawn(snap_compare, size, plotted(several, "ctrl+g", *WAYS[way]))
 
@@ -288,6 +292,20 @@ def test_plots(snap_compare: Compare, way: str, size: str) -> None:
 @pytest.mark.parametrize(("size", "keys"), [("80x24", ()), ("120x40", ()), ("120x40", ("ctrl+g",))])
 def test_a_drive_that_stalls_beside_its_twin(snap_compare: Compare, size: str, keys: tuple[str, ...]) -> None:
     assert drawn(snap_compare, size, plotted(stalled, *keys))
+
+
+@pytest.mark.parametrize(("size", "signs"), [("120x40", Signs.FULL), ("80x24", Signs.ASCII)])
+def test_a_trigger_that_holds_the_picture(snap_compare: Compare, size: str, signs: Signs) -> None:
+    async def act(pilot: Pilot[int], session: FakeSession) -> None:
+        await plotted(lambda _: None, "ctrl+g", signs=signs)(pilot, session)
+        model = pilot.app.model  # type: ignore[attr-defined]
+        setting = Setting(Quantity("press", "a", "", "velocity"), 300_000, True, 0.25)
+        model.look.arm(setting, True, model.traces)
+        several(session)
+        session.time += 20
+        model.changed = True
+
+    assert drawn(snap_compare, size, act, "multidrop-ansi" if signs is Signs.ASCII else "multidrop-dark")
 
 
 def test_plots_in_ascii(snap_compare: Compare) -> None:

@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 from multidrop.tui.curves.raster import BRAILLE, Curve, Frame, Ink, Raster, Run, Scale, magnified, steady
 from multidrop.tui.curves.samples import Columns, Quantity, Traces
+from multidrop.tui.curves.trigger import Setting, State, Trigger
 
 
 class Window(NamedTuple):
@@ -130,6 +131,9 @@ class Look:
         """The time at the right edge while paused."""
         self.cursor: float | None = None
         """The time of the cursor; only while paused."""
+        self.other: float | None = None
+        """The time of the second cursor, which stands."""
+        self.trigger, self._taken = Trigger(), 0
         self.zoom = 1
         """The magnification of the values."""
         self.apart = False
@@ -163,7 +167,36 @@ class Look:
             self.go_on()
 
     def go_on(self) -> None:
-        self.paused_at = self.cursor = None
+        self.paused_at = self.cursor = self.other = None
+
+    def arm(self, setting: Setting, single: bool, traces: Traces) -> None:
+        """Let the trigger wait for the next edge; the picture runs until then."""
+        trace = traces.get(setting.quantity)
+        self._taken = trace.count if trace is not None else 0
+        self.trigger.arm(setting, single)
+        self.go_on()
+
+    def follow(self, traces: Traces, now: float) -> None:
+        """Show the picture of the trigger, with the new samples; it does not change while it has a cursor."""
+        trigger, held = self.trigger, self.paused_at is not None and not self.trigger.stands
+        if trigger.state is State.OFF or trigger.setting is None or held or self.cursor is not None:
+            return
+        trace = traces.get(trigger.setting.quantity)
+        trigger.take(trace.since(self._taken) if trace is not None else (), self.span, now)
+        self._taken = trace.count if trace is not None else 0
+        self.paused_at = trigger.end(self.span) if trigger.stands else None
+
+    @property
+    def zero(self) -> float | None:
+        """The time of the trigger, while its picture is shown."""
+        return self.trigger.at if self.trigger.stands and self.paused_at is not None else None
+
+    def change_cursor(self, now: float, width: int) -> None:
+        """Set the first cursor, then the second one where it is; then change between the two."""
+        if self.cursor is None:
+            self.move_cursor(0, now, width)
+        else:
+            self.other, self.cursor = self.cursor, self.cursor if self.other is None else self.other
 
     def shorter(self, by: int) -> None:
         """Show `by` steps less time."""

@@ -11,7 +11,8 @@ from math import floor
 from typing import NamedTuple
 
 from multidrop.tui.curves.chart import Chart, Extent, Look, Window
-from multidrop.tui.curves.raster import CURSOR, EMPTY, TWINS, Scale, ticks, with_cursor
+from multidrop.tui.curves.raster import CURSOR, EMPTY, TWINS, Scale, row_of, ticks, with_cursor
+from multidrop.tui.curves.trigger import State
 from multidrop.tui.panels.plotted import PLOTTED, Group, Line, groups, role_of
 from multidrop.tui.panels.view import View
 from multidrop.tui.text import age, fit, short
@@ -50,14 +51,22 @@ def chart_rows(view: View, shown: Shown, window: Window, height: int) -> list[Ro
     lines = [(line.quantity, line.stroke, _own_scale(line, scale)) for line in shown.moving]
     drawn = shown.chart.draw(lines, window, height, scale, look.ink)
     marks = ticks(scale, height)
-    cursor = None if look.cursor is None else int(look.cursor // window.dot) // window.wide - window.first
+    cursors = [
+        (int(at // window.dot) // window.wide - window.first, sign)
+        for at, sign in ((look.other, "┊"), (look.cursor, "│"))
+        if at is not None
+    ]
+    setting, level = look.trigger.setting, -1
+    if look.trigger.state is not State.OFF and setting is not None:
+        plotted = [line.conversion.value(setting.level) for line in shown.moving if line.quantity == setting.quantity]
+        level = next((row_of(each, scale, height) for each in plotted if scale.low <= each <= scale.high), -1)
     in_units = any(line.figures.unit for line in shown.moving)
     rows: list[Row] = []
     for y, runs in enumerate(drawn):
-        if cursor is not None:
-            runs = with_cursor(runs, cursor, "│")
+        for at, sign in cursors:
+            runs = with_cursor(runs, at, sign)
         label = short(marks[y], scale.step, prefixes=not in_units) if y in marks else ""
-        tick = "│" if y not in marks else "┤" if marks[y] else "┼"
+        tick = "▸" if y == level else "│" if y not in marks else "┤" if marks[y] else "┼"
         rows.append(
             (
                 (f"{label:>{AXIS - 2}} ", "dim"),
@@ -93,8 +102,8 @@ def time_row(view: View, window: Window) -> Row:
     """The times below the charts, in even steps: seconds before now; of a picture that stands, the time of day."""
     look = view.model.look
     end = view.now if look.paused_at is None else look.paused_at
-    base = end
-    if look.paused_at is not None:
+    base = end if look.zero is None else look.zero
+    if look.paused_at is not None and look.zero is None:
         wall = view.session.wall(end)
         base -= (wall.hour * 3600 + wall.minute * 60 + wall.second + wall.microsecond / 1e6) % window.step
     cells, every = [" "] * (AXIS + window.columns), round(window.step / window.cell)
@@ -111,32 +120,13 @@ def time_row(view: View, window: Window) -> Row:
 
 
 def _time_words(view: View, base: float, n: int, step: float) -> str:
-    if view.model.look.paused_at is not None:
+    look, side = view.model.look, "+" if view.model.look.zero is not None else ""
+    if look.paused_at is not None and look.zero is None:
         text = f"{view.session.wall(base + n * step + 1e-6):%H:%M:%S.%f}"
         return text[:-7] if step >= 1 else text[:-5]
     if n == 0:
-        return "now"
-    return f"{n * step / 60:.3g} min" if step >= 60 else f"{n * step:.3g} s"
-
-
-def cursor_row(view: View, width: int) -> Row:
-    at = view.model.look.cursor
-    if at is None:
-        return ()
-    clock = f"{view.session.wall(at):%H:%M:%S.%f}"[:-4]
-    row: list[Span] = [(f" {clock} ", "strong"), (f" {at - view.now:.2f} s  ", "dim")]
-    charts = view.model.look.charts
-    for group in groups(view):
-        chart = charts.get((group.word, group.key, columns_of(width)))
-        for line in group.lines if chart is not None else ():
-            value = None if chart is None else chart.value_at(line.quantity, at)
-            name = f"{line.shown} {group.word} "
-            row += [
-                (name, role_of(line.number)),
-                ("not known" if value is None else line.text(value), "strong"),
-                ("  ", "text"),
-            ]
-    return tuple(row)
+        return "edge" if side else "now"
+    return f"{n * step / 60:{side}.3g} min" if step >= 60 else f"{n * step:{side}.3g} s"
 
 
 REST = 2.0
@@ -204,7 +194,9 @@ def _value_span(view: View, shown: Shown, line: Line) -> Span:
 
 def _span_words(look: Look) -> str:
     span = f"{look.span:.0f} s" if look.span < 120 else f"{look.span / 60:.0f} min"
-    return f"last {span} " if look.paused_at is None else f"{span}, paused "
+    if look.paused_at is None:
+        return f"last {span} "
+    return f"{span} " if look.zero is not None else f"{span}, paused "
 
 
 def rate_words(view: View) -> str:

@@ -60,6 +60,13 @@ class Line(NamedTuple):
             return f"{round(value, figures.decimals) + 0.0:.{figures.decimals}f} {self.unit}"
         return digits(int(value)) if value == int(value) else f"{value:.3f}"
 
+    def apart(self, difference: float) -> str:
+        """A difference of two plotted values."""
+        figures, value = self.figures, self.conversion.gain * difference
+        if figures.unit and self.unit:
+            return f"{round(value, figures.decimals) + 0.0:+.{figures.decimals}f} {self.unit}"
+        return f"{int(value):+}" if value == int(value) else f"{value:+.3f}"
+
     def extent(self, plotted: Extent) -> Extent:
         """A plotted extent in the unit that is shown."""
         return Extent(*sorted(map(self.conversion.value, plotted)))

@@ -6,49 +6,72 @@ from typing import ClassVar
 
 from textual.binding import BindingType
 
+from multidrop.dialects import Diagnostic
+from multidrop.shell.plots.plot import write
+from multidrop.shell.plots.request import PlotTarget, parse_target
+from multidrop.shell.plots.rerun_calls import Batch
 from multidrop.shell.roles import DIFFERENCE
 from multidrop.tui.curves.chart import Look
 from multidrop.tui.key_table import bound
-from multidrop.tui.panels.plot import columns_of, cursor_row, plot_rows, plot_title
+from multidrop.tui.panels.plot import columns_of, plot_rows, plot_title
+from multidrop.tui.panels.plot_tools import (
+    FORM,
+    cursor_rows,
+    parse_trigger,
+    trigger_row,
+    typed_trigger,
+    visible,
+)
 from multidrop.tui.panels.plotted import PLOTTED
 from multidrop.tui.panels.view import View
 from multidrop.tui.polling import plotted
-from multidrop.tui.screens.page import Host, Page
+from multidrop.tui.screens.page import AskingPage, Begun, Host
 from multidrop.tui.widgets.lines import Row
 
 PORT = 9876
 """The port at which viewers of rerun connect by default."""
 
 
-class PlotPage(Page):
+class PlotPage(AskingPage):
     """Plots. Keys change how a person looks at them; what is plotted changes by lines that a person could type."""
 
+    AUTO_FOCUS = ""
     SHEET = "plot"
     BINDINGS: ClassVar[list[BindingType]] = bound("plot")
     WANTS = frozenset({"motion", "plot", "samples"})
-    PARTS = {"heading": None, "charts": "1fr", "below": None}
+    PARTS = {"heading": None, "charts": "1fr", "below": "auto", "asked": None}
+    FIELD = "asked"
 
     def __init__(self, host: Host) -> None:
         super().__init__(host)
         self._columns = 1
+        self._asked: Begun | None = None
 
     @property
     def _look(self) -> Look:
         return self.host.model.look
 
+    @property
+    def _view(self) -> View:
+        """What is plotted now: a key may come before the page is painted first."""
+        return View(self.host.session, self.host.model, [], self.host.session.now(), True)
+
     def show(self, view: View) -> None:
+        if self._asked is not None and self.overtaken(self._asked):
+            self._close("a stop or another drive came in between: it was not used")
+        self._look.follow(view.model.traces, view.now)
         charts = self.lines("charts")
         size = charts.size
         self._columns = max(1, columns_of(size.width))
         _, *about = plot_title(view)
-        self.lines("heading").put([((" PLOTS   ", "strong"), *about)])
+        self.lines("heading").put([((" PLOTS   ", "strong"), *about, *trigger_row(view))])
         charts.put(plot_rows(view, size.width, size.height))
-        self.lines("below").put([self._below(view)])
+        most = max(2, self.size.height // 5)
+        said: list[Row] = [((f" {self.said[0]}", self.said[1]),)] if self.said[0] else []
+        self.lines("below").put([*cursor_rows(view, size.width, most), *said] or [self._below(view)])
 
     def _below(self, view: View) -> Row:
-        """The values at the cursor; without it, the last failure, or how to see what rerun shows."""
-        if self._look.cursor is not None:
-            return cursor_row(view, self.size.width)
+        """The last failure, or how to see what rerun shows."""
         if self.host.model.trouble:
             return ((f" ✗ {self.host.model.trouble}", "error"),)
         served = [each for each in view.session.plots if each.desk]
@@ -65,10 +88,74 @@ class PlotPage(Page):
     def _type(self, line: str) -> None:
         """Send a line as if a person had typed it; its failure is shown below the charts."""
         self.host.model.trouble = ""
+        self.say("", "dim")
         self.host.outbox.type(line)
 
     def action_pause(self) -> None:
-        self._look.pause(self.host.session.now())
+        """Hold the picture, or let it run; from one that a trigger holds, wait for the next edge."""
+        trigger = self._look.trigger
+        if trigger.stands and trigger.setting is not None:
+            self._look.arm(trigger.setting, trigger.single, self.host.model.traces)
+        else:
+            self._look.pause(self.host.session.now())
+
+    def action_other(self) -> None:
+        self._look.change_cursor(self.host.session.now(), self._columns)
+
+    # What is typed: a trigger, or the name of a file
+
+    def action_trigger(self) -> None:
+        self._asked = self.begin("trigger")
+        self.ask_for(typed_trigger(self._view), FORM)
+        self.say(f"trigger: {FORM}; SHARE of the picture comes before the edge", "dim")
+
+    def action_single(self) -> None:
+        """Wait for one edge with the trigger that is set; without one, ask for it."""
+        trigger = self._look.trigger
+        if trigger.setting is not None:
+            self._look.arm(trigger.setting, True, self.host.model.traces)
+            return
+        self.action_trigger()
+        self._asked = self.begin("single")
+
+    def action_save(self) -> None:
+        self._asked = self.begin("save")
+        self.ask_for("", "FILE.csv or FILE.rrd")
+        self.say("save what is visible: FILE.csv or FILE.rrd", "dim")
+
+    def typed(self, text: str) -> None:
+        asked, view = self._asked, self._view
+        if asked is None or self.overtaken(asked):
+            self._close("it was not used")
+            return
+        try:
+            if asked.kind == "save":
+                target, batch = parse_target(text, None), visible(view, self.lines("charts").size.width)
+                self.app.run_worker(self._save(target, batch))
+                self._close(f"saving {target.text} ...")
+            else:
+                self._look.arm(parse_trigger(view, text), asked.kind == "single", view.model.traces)
+                self._close("")
+        except Diagnostic as failure:
+            self.say(f"✗ {failure}", "error")
+
+    async def _save(self, target: PlotTarget, batch: Batch) -> None:
+        """Write the file; the outcome is on the page, and in the transcript also if the page was left."""
+        try:
+            await write(target, batch)
+        except Diagnostic as failure:
+            self.say(f"✗ {failure}", "error")
+            self.host.show_line(str(failure), "x")
+        else:
+            said = f"{sum(map(len, batch.curves.values()))} values of {len(batch.curves)} curves are in {target.text}"
+            self.say(said)
+            self.host.show_line(said, ".")
+        self.host.frames.wake()
+
+    def _close(self, said: str) -> None:
+        self._asked = None
+        self.end_asking()
+        self.say(said, "dim")
 
     def action_cursor(self, columns: int) -> None:
         """Move the cursor; that pauses."""
@@ -83,6 +170,7 @@ class PlotPage(Page):
 
     def action_automatic(self) -> None:
         self._look.automatic()
+        self._look.trigger.disarm()
         self._look.go_on()
 
     async def action_beside(self) -> None:
@@ -147,8 +235,12 @@ class PlotPage(Page):
         self._look.go_on()
 
     def action_leave(self) -> None:
-        """Remove the cursor and go on; then leave."""
-        if self._look.cursor is not None or self._look.paused_at is not None:
-            self._look.go_on()
+        """Close the line; remove the cursors and go on; then leave. A trigger stays."""
+        look = self._look
+        if self._asked is not None:
+            self._close("")
+            return
+        if look.cursor is not None or (look.paused_at is not None and not look.trigger.stands):
+            look.go_on()
             return
         super().action_leave()
