@@ -310,6 +310,19 @@ async def test_the_stop_goes_first_whatever_the_page_of_plots_waits_for(keys: st
         assert not isinstance(app.focused, Field), "what was begun before a stop is not used"
 
 
+@pytest.mark.tui
+async def test_the_rows_of_two_cursors_have_room_of_their_own() -> None:
+    async with on_screen() as (pilot, app, session):
+        session.emit(*wave("a", session), *wave("b", session))
+        await press(pilot, "ctrl+g", "a", "space", "left", "x", *["left"] * 9)
+        await settle(pilot)
+        below = app.screen.lines("below")
+        assert below.size.height == len(below.rows) > 1 and "dt -" in below.plain
+        await press(pilot, "escape")
+        await settle(pilot)
+        assert below.size.height == 1
+
+
 @pytest.mark.parametrize(
     ("text", "why"),
     [

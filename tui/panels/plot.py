@@ -178,9 +178,9 @@ def _head(view: View, shown: Shown, width: int) -> list[Row]:
 
 
 def _value_span(view: View, shown: Shown, line: Line) -> Span:
-    """The last value of a line, or that at the cursor, as wide as any in its picture: so nothing jumps."""
+    """The last value of a line, or that at the cursor or the edge, as wide as any in its picture: so nothing jumps."""
     look, trace = view.model.look, view.model.traces.get(line.quantity)
-    at = look.cursor if look.cursor is not None else look.paused_at
+    at = next((each for each in (look.cursor, look.zero, look.paused_at) if each is not None), None)
     if at is not None:
         value = shown.chart.value_at(line.quantity, at)
     else:

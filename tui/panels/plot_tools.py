@@ -85,8 +85,8 @@ def trigger_row(view: View) -> Row:
     once = ", once" if trigger.single else ""
     line = next((each for each in _lines(view) if each.quantity == setting.quantity), None)
     if line is None:
-        return ((f"{trigger.state.value}{once} ", "accent"), (f"by {setting.quantity.word}, not plotted now", "dim"))
-    return ((f"{trigger.state.value}{once} ", "accent"), (typed_trigger(view), "dim"))
+        return ((f" {trigger.state.value}{once} ", "accent"), (f"by {setting.quantity.word}, not plotted now", "dim"))
+    return ((f" {trigger.state.value}{once} ", "accent"), (typed_trigger(view), "dim"))
 
 
 def cursor_rows(view: View, width: int, most: int) -> list[Row]:

@@ -39,7 +39,7 @@ class PlotPage(AskingPage):
     SHEET = "plot"
     BINDINGS: ClassVar[list[BindingType]] = bound("plot")
     WANTS = frozenset({"motion", "plot", "samples"})
-    PARTS = {"heading": None, "charts": "1fr", "below": "auto", "asked": None}
+    PARTS = {"heading": None, "charts": "1fr", "below": None, "asked": None}
     FIELD = "asked"
 
     def __init__(self, host: Host) -> None:
@@ -68,7 +68,9 @@ class PlotPage(AskingPage):
         charts.put(plot_rows(view, size.width, size.height))
         most = max(2, self.size.height // 5)
         said: list[Row] = [((f" {self.said[0]}", self.said[1]),)] if self.said[0] else []
-        self.lines("below").put([*cursor_rows(view, size.width, most), *said] or [self._below(view)])
+        below = [*cursor_rows(view, size.width, most), *said] or [self._below(view)]
+        self.lines("below").styles.height = len(below)
+        self.lines("below").put(below)
 
     def _below(self, view: View) -> Row:
         """The last failure, or how to see what rerun shows."""
