@@ -59,7 +59,7 @@ class Polling:
         """Subscribe to what is shown, and end all other subscriptions. `wants`: as panels name it."""
         if session.watching:
             return
-        chosen = [*(plotted(session) if "plot" in wants else []), *_awaited(session, model)]
+        chosen = list(dict.fromkeys([*(plotted(session) if "plot" in wants else []), *_awaited(session, model)]))
         drives = _drives(session, model, chosen, PLOT if "samples" in wants else REST) if self.on else {}
         watches = _watches(session) if self.on and "conditions" in wants else {}
         values = _values(session, chosen) if self.on else {}

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import os
 from collections.abc import Callable, Iterator, Sequence
 from datetime import datetime
 from functools import partial
@@ -219,7 +220,7 @@ class Plot:
 
 async def write(target: PlotTarget, batch: Batch) -> None:
     """Write samples into a new file. Raises Diagnostic, and then there is no file, or what came before."""
-    if target.file is None or target.file.exists():
+    if target.file is None or os.path.exists(target.file):
         what = "is there already" if target.file is not None else "is not a file"
         raise Diagnostic(f"{target.text} {what}", hint="use another name")
 

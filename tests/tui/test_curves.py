@@ -27,6 +27,7 @@ from multidrop.tui.curves.raster import (
     with_cursor,
 )
 from multidrop.tui.curves.samples import KEPT, MOST, Columns, Quantity, Trace, Traces
+from multidrop.tui.panels.plotted import role_of
 
 values = st.floats(-2.2e9, 2.2e9, allow_nan=False)
 times = st.floats(0, 30)
@@ -123,6 +124,15 @@ def test_two_series_differ_by_dashes_in_braille_and_by_marks_in_ascii() -> None:
     ]
     assert len(set(pictures)) == 6
     assert len({ASCII.sample(number) for number in range(6)}) == 6
+
+
+def test_twelve_curves_differ_by_colour_or_dashes_and_in_ascii_by_marks() -> None:
+    line = trace(*((n / 10, 1) for n in range(100)))
+    columns = Columns(line, 0.125, 0)
+    columns.update(0)
+    frame = Frame(0, 20, 1, Scale(0, 2, 1), BRAILLE)
+    pictures = {(role_of(n), Raster().draw([Curve(columns, n)], frame)[0][0][0]) for n in range(12)}
+    assert len(pictures) == len({ASCII.sample(n) for n in range(12)}) == 12
 
 
 def test_the_cursor_hides_no_curve() -> None:

@@ -17,12 +17,15 @@ from typing import NamedTuple
 
 from multidrop.tui.curves.samples import Column, Columns
 
-MARKS = "*+ox#%"
+MARKS = "*+ox#%@&=$svzw"
 """The ASCII mark of each series."""
 PATTERNS = ((1, 1), (2, 1), (4, 2), (4, 1), (6, 4), (8, 6))
-"""For each series, the period of its dashes in columns of dots, and the length of a dash."""
+"""The period of the dashes of each series in columns of dots, and the length of a dash.
 
-TWINS = len(PATTERNS)
+Each round of the colours begins one further.
+"""
+
+TWINS = len(PATTERNS) ** 2
 """The number of a series and this is that of its twin, whose line is of single dots."""
 TWIN_MARKS = ".,:;'~"
 """The ASCII mark of each twin."""
@@ -52,7 +55,7 @@ class Ink:
         """
         if series >= TWINS and self.glyphs:
             return [y for y in range(top, bottom + 1) if (x + 2 * y) % SPARSE in self.shown]
-        period, length = PATTERNS[series % len(PATTERNS)]
+        period, length = PATTERNS[(series + series // len(PATTERNS)) % len(PATTERNS)]
         shown = not self.glyphs or x % period < length or bottom - top >= self.tall
         return range(top, bottom + 1) if shown else range(0)
 

@@ -16,7 +16,7 @@ from multidrop.tui.curves.trigger import State
 from multidrop.tui.panels.plotted import PLOTTED, Group, Line, groups, role_of
 from multidrop.tui.panels.view import View
 from multidrop.tui.text import age, fit, short
-from multidrop.tui.widgets.lines import SERIES, Row, Span, beside, width_of
+from multidrop.tui.widgets.lines import Row, Span, beside, width_of
 
 AXIS = 10
 """Width of the axis of values in cells: label, space, tick."""
@@ -24,7 +24,7 @@ LEAST = {"velocity": 100.0, "position": 10.0}
 """The least width of a scale."""
 WIDE, HEADS = 64, 3
 """Width of a plot from which a legend may have several rows, and the most of them."""
-_ROLES = {EMPTY: "text", CURSOR: "strong", **{n: SERIES[n % TWINS] for n in range(2 * TWINS)}}
+_ROLES = {EMPTY: "text", CURSOR: "strong", **{n: role_of(n) for n in range(2 * TWINS)}}
 """The role of a cell by its owner."""
 
 

@@ -139,7 +139,7 @@ def groups(view: View) -> list[Group]:
     for each_drawn in drawn:
         bus, address, word = each_drawn
         for axis in _axes(view, each_drawn):
-            number = numbers[bus, address, axis] % len(SERIES)
+            number = numbers[bus, address, axis] % TWINS
             drive = view.session.buses[bus].drives[address]
             where = ":".join(filter(None, (bus if several or not address else "", address)))
             name = " ".join(filter(None, (where, drive.label, axis)))
@@ -173,4 +173,4 @@ def _unit(view: View, bus: str, address: str, axis: str, quantity: str) -> tuple
 
 
 def role_of(number: int) -> str:
-    return SERIES[number]
+    return SERIES[number % len(SERIES)]

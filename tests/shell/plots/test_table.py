@@ -12,9 +12,11 @@ import pytest
 from multidrop.dialects import Diagnostic
 from multidrop.drives.events import Sample, Valued
 from multidrop.shell.plots import table
-from multidrop.shell.plots.plot import Plot
+from multidrop.shell.plots.plot import Plot, write
 from multidrop.shell.plots.request import PlotTarget
+from multidrop.shell.plots.rerun_calls import Batch, Curve
 from multidrop.shell.plots.table import COLUMNS
+from tests.support.plot_file import contents
 
 ENDINGS = ["csv", "parquet"]
 
@@ -144,3 +146,21 @@ async def test_a_disk_that_takes_no_more_ends_the_plot_with_one_line(
     monkeypatch.undo()
     await plotted(path)
     assert len(rows(path)) == 5
+
+
+@pytest.mark.parametrize("ending", ["csv", "rrd"])
+async def test_samples_are_written_into_a_new_file_at_once(ending: str, tmp_path: Path) -> None:
+    if ending == "rrd":
+        pytest.importorskip("rerun")
+    path = tmp_path / f"seen.{ending}"
+    points = [(0.0, 1.8e9, 5.0), (0.5, 1.8e9 + 0.5, 6.0)]
+    batch = Batch({Curve("press", "b", "", word): points for word in ("position", "velocity")})
+    await write(PlotTarget(file=path), batch)
+    if ending == "csv":
+        assert [row["value"] for row in rows(path)] == ["5", "5", "6", "6"]
+    else:
+        assert contents(path)["/press/b/position"]["Scalars:scalars"] == [[5.0], [6.0]]
+    before = path.read_bytes()
+    with pytest.raises(Diagnostic, match="is there already; use another name"):
+        await write(PlotTarget(file=path), batch)
+    assert path.read_bytes() == before and list(tmp_path.iterdir()) == [path]
