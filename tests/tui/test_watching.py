@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import sys
 import tempfile
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
@@ -19,18 +18,16 @@ from multidrop.shell.configuration import Settings
 from multidrop.shell.roles import Series
 from multidrop.shell.secrets import without_secrets
 from multidrop.shell.stop_report import Found, headline
+from multidrop.shell.watching.join import Connection, joined
+from multidrop.shell.watching.wire import Dropped, Item, line
 from multidrop.tui.app import MultidropApp
 from multidrop.tui.curves.samples import Quantity
 from multidrop.tui.screen_model import Record
+from multidrop.tui.sharing import Feed, Shared, SharedBus, SharedDrive, sharing
+from multidrop.tui.watching import watch
 from tests.support.fake_session import painted, readable
 from tests.support.real_screen import real_app
 from tests.support.until import PATIENCE, until
-
-if sys.platform != "win32":
-    from multidrop.shell.watching.join import Connection, joined
-    from multidrop.shell.watching.wire import Dropped, Item, line
-    from multidrop.tui.sharing import Feed, Shared, SharedBus, SharedDrive, sharing
-    from multidrop.tui.watching import watch
 
 pytestmark = [pytest.mark.tui, pytest.mark.AF_UNIX]
 

@@ -17,15 +17,12 @@ import pytest
 
 import multidrop
 from multidrop.dialects import Diagnostic
-from multidrop.shell.watching.wire import Dropped, Heard, Items, Now, greeting, line
+from multidrop.shell.watching import host as host_side
+from multidrop.shell.watching.host import MOST, WAITING, Calls, Gate, Watcher
+from multidrop.shell.watching.join import Stops, connect, joined
+from multidrop.shell.watching.wire import Dropped, Heard, Item, Items, Now, greeting, line
 from multidrop.transports import Unreachable
 from tests.support.until import PATIENCE, until
-
-if sys.platform != "win32":
-    from multidrop.shell.watching import host as host_side
-    from multidrop.shell.watching.host import MOST, WAITING, Calls, Gate, Watcher
-    from multidrop.shell.watching.join import Stops, connect, joined
-    from multidrop.shell.watching.wire import Item
 
 pytestmark = pytest.mark.AF_UNIX
 
