@@ -60,7 +60,7 @@ SHEETS: dict[str, Sheet] = {
                 Key("f1", "act.help", "help for where you are", "help", "help"),
                 Key("ctrl+p", "act.palette", "everything by name: type some letters of it", "everything", "palette"),
                 Key("ctrl+o", "act.choose_drive", "choose the drive that plain text goes to", "drive", "drive"),
-                Key("ctrl+f4", "act.units", "positions in units, or in the drives' own numbers", "", "units"),
+                Key("", "act.units", "positions in units, or in the drives' own numbers", "", "units"),
             ),
         },
         ("app",),
@@ -103,7 +103,7 @@ SHEETS: dict[str, Sheet] = {
                 Key("alt+1..9,ctrl+1..9", "act.bus_number({})", "line {}", "", "tab-{}"),
                 Key("ctrl+shift+pageup", "act.run_line('/tab left')", "this tab to the left", "", "tab-left"),
                 Key("ctrl+shift+pagedown", "act.run_line('/tab right')", "this tab to the right", "", "tab-right"),
-                Key("ctrl+f2", "act.twin", "a twin beside each drive of the line, or none", "twin", "twin"),
+                Key("", "act.twin", "a twin beside each drive of the line, or none", "twin", "twin"),
                 Key("", "act.split", "split the screen; then: type to the other half", "", "split"),
             ),
             "Macros": (

@@ -178,14 +178,14 @@ def test_velocities_in_units_of_a_chip_that_no_setting_tells_stay_as_they_are() 
     assert figures_of(Axis(scale(FIVE)), referenced=True) is NATIVE
 
 
-async def test_a_key_shows_the_drives_own_numbers_and_units_again() -> None:
+async def test_the_palette_shows_the_drives_own_numbers_and_units_again() -> None:
     session = scaled()
-    async with on_screen(session) as (pilot, _, _):
-        await press(pilot, "ctrl+f4")
+    async with on_screen(session) as (pilot, app, _):
+        app.act.units()
         assert session.lines[-1][0] == "/units off"
         session.units.shown = False
         await press(pilot, "ctrl+a")
-        await press(pilot, "ctrl+f4")
+        app.act.units()
         assert session.lines[-1][0] == "/units on"
 
 
