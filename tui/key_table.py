@@ -103,7 +103,7 @@ SHEETS: dict[str, Sheet] = {
                 Key("alt+1..9,ctrl+1..9", "act.bus_number({})", "line {}", "", "tab-{}"),
                 Key("ctrl+shift+pageup", "act.run_line('/tab left')", "this tab to the left", "", "tab-left"),
                 Key("ctrl+shift+pagedown", "act.run_line('/tab right')", "this tab to the right", "", "tab-right"),
-                Key("", "act.twin", "a twin beside each drive of the line, or none", "twin", "twin"),
+                Key("", "act.twin", "a twin beside each drive of the line, or none", "", "twin"),
                 Key("", "act.split", "split the screen; then: type to the other half", "", "split"),
             ),
             "Macros": (
@@ -160,7 +160,7 @@ SHEETS: dict[str, Sheet] = {
             ),
             "What is plotted": (
                 Key("1..9", "drive({})", "a drive of the line by its number, or not", "drive"),
-                Key("a", "all_drives", "all drives of the line", "all"),
+                Key("a", "drive(0)", "all drives of the line", "all"),
                 Key("v", "hide('velocity')", "velocity, or not", "velocity"),
                 Key("p", "hide('position')", "position, or not", "position"),
                 Key("w", "difference", "the differences from the twins, or not", "twin"),

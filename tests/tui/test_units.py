@@ -181,11 +181,13 @@ def test_velocities_in_units_of_a_chip_that_no_setting_tells_stay_as_they_are() 
 async def test_the_palette_shows_the_drives_own_numbers_and_units_again() -> None:
     session = scaled()
     async with on_screen(session) as (pilot, app, _):
-        app.act.units()
+        await app.run_action("act.units")
+        await pilot.pause()
         assert session.lines[-1][0] == "/units off"
         session.units.shown = False
         await press(pilot, "ctrl+a")
-        app.act.units()
+        await app.run_action("act.units")
+        await pilot.pause()
         assert session.lines[-1][0] == "/units on"
 
 

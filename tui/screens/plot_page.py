@@ -191,7 +191,10 @@ class PlotPage(AskingPage):
             self._look.hidden = hidden
 
     def action_drive(self, number: int) -> None:
-        """Plot a drive of the selected line, by its number in the list, or plot it no longer."""
+        """Plot a drive of the selected line, by its number in the list, or plot it no longer; 0: plot all of them."""
+        if number == 0:
+            self._type(f"/plot {self.host.session.selected_bus}:*")
+            return
         bus = self.host.session.buses.get(self.host.session.selected_bus)
         if bus is None or number > len(bus.drives):
             return
@@ -202,9 +205,6 @@ class PlotPage(AskingPage):
         texts += [] if mine else [f"{bus.name}:{address}"]
         if texts:  # one stays
             self._type(f"/plot {' '.join(texts)}")
-
-    def action_all_drives(self) -> None:
-        self._type(f"/plot {self.host.session.selected_bus}:*")
 
     def action_difference(self) -> None:
         """Plot the differences of the plotted drives from their twins, or plot them no longer."""
