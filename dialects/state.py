@@ -57,8 +57,6 @@ class DriveState:
     address: str = ""
     name: str = ""
     """The name that the drive itself bears, also where the host does not use it as the address."""
-    label: str = ""
-    """The name that a person gave it, which is shown in place of its address."""
     product: str = ""
     version: str = ""
     part: str = ""
@@ -89,6 +87,8 @@ class DriveState:
     """Warnings for a person, oldest first."""
     remarks: list[str] = field(default_factory=list)
     """Side effects of a line that a person typed, oldest first."""
+    label: str = ""
+    """The name that a person gave it, which is shown in place of its address."""
 
     # Messages for a person
 
@@ -104,6 +104,9 @@ class DriveState:
         return taken
 
     # Identity
+
+    def labelled(self, label: str) -> None:
+        self.label = label
 
     def identified(self, product: str, version: str, part: str = "") -> None:
         self.product, self.version, self.part = product, version, part or self.part

@@ -208,7 +208,7 @@ class Drive:
 
     @label.setter
     def label(self, label: str) -> None:
-        self.state.label = label
+        self.state.labelled(label)
 
     @property
     def shown(self) -> str:

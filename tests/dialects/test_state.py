@@ -18,7 +18,7 @@ STATE_FILES = {"dialects/state.py", "dialects/mcode/host/state.py"} | {
     f"dialects/{family}/host/codec.py" for family in ("modbus", "pmx", "tmcl")
 }
 FIELDS = {each.name for cls in (MCodeState, ModbusState, PmxState) for each in fields(cls)}
-COMMON = {"name", "address", "restore", "running", "error", "notes", "remarks", "version", "codec"}
+COMMON = {"name", "address", "restore", "running", "error", "notes", "remarks", "version", "codec", "label"}
 """Fields whose names other classes have too: only an assignment to something called a state counts."""
 MUTATORS = {"append", "clear", "extend", "insert", "pop", "remove"}
 
