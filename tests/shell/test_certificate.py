@@ -246,7 +246,7 @@ async def test_nothing_moves_without_a_yes(cell):
         return False
 
     cell.session.front = Front(no)
-    assert {*(await asked(cell, *moving)).unasked} == {*moving} and "move the motor by 400 steps at most" in asks[0]
+    assert {*(await asked(cell, *moving)).unasked} == {*moving} and "the motor moves by 400 steps at most" in asks[0]
     assert device.position(cell.floor.now()) == 0
 
     async def stop(question):

@@ -109,7 +109,7 @@ async def test_a_drive_without_an_address_is_the_bus(session):
     for line in ("@door: MR 100", "/record m", "@door:door PR P", "/use door", "PR P", "/record stop", "/drives"):
         await session.run(line)
     assert [step.line for step in session.macros.load("m").steps] == ["@door: PR P", "@door: PR P"]
-    assert output(session)[-1].startswith("* door door LMDCE")
+    assert output(session)[-1].startswith("* door:door door LMDCE")
     with pytest.raises(Exception, match="no address x: the drive on door takes none"):
         await session.run("@door:x MR 100")
 
@@ -129,7 +129,7 @@ async def test_an_unplugged_line_is_told_once_and_fails_what_follows(session):
 async def test_a_wait_that_runs_out_names_the_drive_that_moves(session):
     await session.open("line")
     await session.run("@b SL 1000")
-    with pytest.raises(DriveError, match="b still runs"):
+    with pytest.raises(DriveError, match="gantry still runs"):
         await session.run("/wait stopped 0")
 
 

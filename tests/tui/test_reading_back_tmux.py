@@ -58,7 +58,7 @@ def test_lines_are_found_and_copied_by_keys(tmux: Tmux) -> None:
     shown = tmux.shows("2 of 2")
     assert [row[0] for row in shown.split("\n") if "› PR" in row] == ["•", "►"]
     tmux.run("send-keys", "Escape")
-    tmux.shows("press:a ▸", gone="find ▸")
+    tmux.shows("press:gantry ▸", gone="find ▸")
     tmux.run("send-keys", "S-Up", "S-Up")
     tmux.shows("2 lines, 9 characters")
     tmux.run("send-keys", "Enter")

@@ -61,13 +61,13 @@ async def test_a_typed_move_is_seen_and_its_end_is_read(tmp_path: Path) -> None:
         await until(pilot, lambda: "▶ moving" in status(pilot))
         await until(pilot, lambda: "■ stopped" in status(pilot) and "10.00000 mm" in status(pilot))
         typed(pilot, "PR P", "enter")
-        await until(pilot, lambda: "a     102400" in transcript(pilot))
+        await until(pilot, lambda: "  102400" in transcript(pilot))
 
 
 async def test_clear_empties_the_transcript_and_help_is_shown_to_its_end(tmp_path: Path) -> None:
     async with press(tmp_path) as pilot:
         typed(pilot, "PR 424242", "enter")
-        await until(pilot, lambda: "a     424242" in transcript(pilot))
+        await until(pilot, lambda: "  424242" in transcript(pilot))
         typed(pilot, "/clear", "enter")
         await until(pilot, lambda: "424242" not in transcript(pilot))
         typed(pilot, "/help", "enter")

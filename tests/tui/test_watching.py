@@ -102,7 +102,9 @@ async def test_a_watcher_sees_and_stops_what_the_host_has() -> None:
         await pair.until(lambda: any("error 23" in text for text in texts(watcher)))
         said = "".join(each.text for each in watcher.last_records(100))
         assert "tcp://***@127.0.0.1:1" in said and "secret" not in said and "PASSWORD" not in said
-        own, other = (app.model.traces.get(Quantity("press", "a", "", "position")) for app in (pair.host, watcher))
+        quantity = Quantity("press", "a", "", "position")
+        await pair.until(lambda: watcher.model.traces.get(quantity) is not None)
+        own, other = (app.model.traces.get(quantity) for app in (pair.host, watcher))
         assert own is not None and other is not None
         await pair.until(lambda: other.values and other.values[-1] == own.values[-1] == 51200)
         assert list(zip(own.at, own.values, strict=True))[-len(other.at) :] == [

@@ -135,7 +135,7 @@ async def test_values_and_positions_share_the_wire(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("checksum", "asked", "says"),
     [
-        (1, 3, "press: a replies NAK to 'QQ'; it is not read again"),
+        (1, 3, "press: a: NAK to 'QQ'; it is not read again"),
         (0, 1, "press: a refused 'PR QQ'; it is not read again"),
     ],
 )
