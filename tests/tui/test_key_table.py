@@ -126,6 +126,7 @@ async def walked(pilot: Pilot[int], session: FakeSession, name: str, keys: Itera
 
 
 @pytest.mark.tui
+@pytest.mark.wide
 @pytest.mark.parametrize("size", SIZES, ids=lambda size: "x".join(map(str, size)))
 @pytest.mark.parametrize("name", ["main", *(page.name for page in PAGES)])
 async def test_every_key_that_is_shown_is_noticed_and_the_stop_works_after_it(
