@@ -105,9 +105,6 @@ class DriveState:
 
     # Identity
 
-    def labelled(self, label: str) -> None:
-        self.label = label
-
     def identified(self, product: str, version: str, part: str = "") -> None:
         self.product, self.version, self.part = product, version, part or self.part
 

@@ -208,7 +208,7 @@ class Drive:
 
     @label.setter
     def label(self, label: str) -> None:
-        self.state.labelled(label)
+        self.state.label = label
 
     @property
     def shown(self) -> str:

@@ -195,7 +195,7 @@ class Roster:
                 _compare(drive.state, state)
                 state.follows(drive.state)
                 self.restarts.replied_again(drive)
-                state.labelled(drive.label)
+                state.label = drive.label
                 drive.state, drive.missing = state, False
             self.drives[state.address] = drive
         self.unlisted |= {drive.address: drive for drive in before.values() if drive not in self.drives.values()}

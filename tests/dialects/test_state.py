@@ -17,8 +17,8 @@ ROOMS = ("dialects", "drives", "shell", "tui", "macros", "multidrop")
 STATE_FILES = {"dialects/state.py", "dialects/mcode/host/state.py"} | {
     f"dialects/{family}/host/codec.py" for family in ("modbus", "pmx", "tmcl")
 }
-FIELDS = {each.name for cls in (MCodeState, ModbusState, PmxState) for each in fields(cls)}
-COMMON = {"name", "address", "restore", "running", "error", "notes", "remarks", "version", "codec", "label"}
+FIELDS = {each.name for cls in (MCodeState, ModbusState, PmxState) for each in fields(cls)} - {"label"}  # a person's
+COMMON = {"name", "address", "restore", "running", "error", "notes", "remarks", "version", "codec"}
 """Fields whose names other classes have too: only an assignment to something called a state counts."""
 MUTATORS = {"append", "clear", "extend", "insert", "pop", "remove"}
 
