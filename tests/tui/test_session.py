@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from pathlib import Path
@@ -57,11 +58,11 @@ def typed(pilot: Pilot[int], *pieces: str) -> None:
 
 async def test_a_typed_move_is_seen_and_its_end_is_read(tmp_path: Path) -> None:
     async with press(tmp_path) as pilot:
-        typed(pilot, "MR 1024000", "enter")  # 2 s: a busy machine sees it, too
+        typed(pilot, "MR 102400", "enter")
         await until(pilot, lambda: "▶ moving" in status(pilot))
-        await until(pilot, lambda: "■ stopped" in status(pilot) and "100.00000 mm" in status(pilot))
+        await until(pilot, lambda: re.search(r"▸a +■ stopped .* 10\.00000 mm", status(pilot)) is not None)
         typed(pilot, "PR P", "enter")
-        await until(pilot, lambda: "  1024000" in transcript(pilot))
+        await until(pilot, lambda: "  102400" in transcript(pilot))
 
 
 async def test_clear_empties_the_transcript_and_help_is_shown_to_its_end(tmp_path: Path) -> None:
