@@ -152,6 +152,17 @@ async def test_a_value_is_checked_then_shown_then_sent_and_read_again() -> None:
 
 
 @at_screen
+async def test_an_enter_in_the_same_read_takes_the_setting_that_the_last_letter_leaves() -> None:
+    async with on_screen() as (pilot, _, session):
+        page = await opened(pilot, session)
+        page.field.value = "v"
+        await settle(pilot)  # the rows of this are painted, those of the next letter are not
+        page.field.value = "vm"
+        await page.field.action_submit()
+        assert page.said[0].startswith("VM: ")
+
+
+@at_screen
 async def test_escape_and_a_stop_send_nothing() -> None:
     async with on_screen() as (pilot, _, session):
         await opened(pilot, session)

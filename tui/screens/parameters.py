@@ -42,6 +42,7 @@ class SettingsTable:
     at: int = 0
     shown: list[Setting] = field(default_factory=list)
     found: Readings | None = None
+    _drive: Drive | None = None
     _made_of: tuple[object, ...] = ()
     _meanings: dict[str, str] = field(default_factory=dict)
 
@@ -55,14 +56,17 @@ class SettingsTable:
             other = self.other[1] if self.other is not None else None
             table = [] if found is None else rows(found, other, self._meanings)
             self.shown = found_in(table, self.words, differing=self.only_differing)
-        self.found, self._made_of = found, made_of
+        self.found, self._drive, self._made_of = found, drive, made_of
         self.at = min(max(self.at, 0), max(0, len(self.shown) - 1))
 
     @property
     def chosen(self) -> Setting | None:
+        """The chosen setting of what the table is made of now: an Enter may follow in the same read."""
+        self.make(self.found, self._drive)
         return self.shown[self.at] if self.shown else None
 
     def step(self, by: int) -> None:
+        self.make(self.found, self._drive)
         self.at = min(max(self.at + by, 0), max(0, len(self.shown) - 1))
 
     def compare(self, name: str, values: dict[str, Value]) -> None:
