@@ -35,7 +35,7 @@ def write_atomically(path: Path, data: bytes, mode: int = 0o666, *, synced: bool
     A new file in the same folder replaces the old one only once all of it is on the disk. A link stays a link. Not
     `synced`: it survives the process, not the machine, and takes microseconds.
     """
-    make_folder(path.parent, synced=synced)
+    make_folder(path.parent)
     target = Path(os.path.realpath(path))
     beside = target.with_name(f".{target.name}.{os.urandom(4).hex()}.tmp")
     try:
@@ -103,12 +103,15 @@ def create_atomically(path: Path, data: bytes) -> None:
         raise
 
 
-def make_folder(folder: Path, *, synced: bool = True) -> None:
-    """Make a folder and those above it. `synced`: their names survive a power cut. On OSError none of them is made."""
+def make_folder(folder: Path, mode: int = 0o777) -> None:
+    """Make a folder and those above it, whose names survive a power cut. On OSError none of them is made.
+
+    Every maker of a folder calls it: the next one syncs only the names that it makes itself.
+    """
     made = [each for each in (folder, *folder.parents) if not each.exists()]
-    folder.mkdir(parents=True, exist_ok=True)
+    folder.mkdir(mode, parents=True, exist_ok=True)
     try:
-        for each in made if synced else ():
+        for each in made:
             sync_folder(each.parent)
     except OSError:
         for each in made:

@@ -20,6 +20,7 @@ from typing import Any, NamedTuple
 
 from multidrop.dialects import Diagnostic
 from multidrop.dialects.files import opened, why
+from multidrop.macros.atomic import make_folder
 from multidrop.shell.configuration import Settings
 from multidrop.shell.secrets import without_secrets
 
@@ -137,7 +138,7 @@ def fresh(settings: Settings) -> Path:
     """The name of a new log in the folder; the oldest ones there give way. Raises Diagnostic."""
     place = folder(settings)
     try:
-        place.mkdir(parents=True, exist_ok=True)
+        make_folder(place)
         _make_room(place, settings.log.size * settings.log.files)
     except OSError as problem:
         raise Diagnostic(f"cannot be written: {why(problem)}", str(place)) from None
@@ -160,7 +161,7 @@ def note(settings: Settings, path: Path) -> None:
             return
         listed = folder(settings) / "elsewhere"
         known = [each for each in _elsewhere(settings) if each != path.resolve()]
-        listed.parent.mkdir(parents=True, exist_ok=True)
+        make_folder(listed.parent)
         text = "".join(f"{each}\n" for each in [*known, path.resolve()][-NOTED:])
         beside = listed.with_name(f".elsewhere-{PROCESS}")
         beside.write_text(text, encoding="utf-8", errors="surrogateescape")

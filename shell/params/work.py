@@ -29,6 +29,7 @@ from multidrop.dialects.values import (
     same,
 )
 from multidrop.drives.drive import Drive
+from multidrop.macros.atomic import make_folder
 from multidrop.shell import new_file
 from multidrop.shell.channel import running, transferring
 from multidrop.shell.line_syntax import split_target
@@ -120,7 +121,7 @@ async def backup(workspace: Workspace, name: str, target: str) -> None:
     async def keep(drive: Drive) -> None:
         own = file_of(workspace, drive, name, target)
         if is_several(target):
-            Path(own).parent.mkdir(parents=True, exist_ok=True)
+            make_folder(Path(own).parent)
         new_file.check(own, printed=True)
         found, who = await files.read(workspace, drive, "backup"), workspace.display_name(drive)
         text = files.formatted(files.identity(drive.state, drive.family.values.parameters.language), found)

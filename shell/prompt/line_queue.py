@@ -23,7 +23,7 @@ from pathlib import Path
 from multidrop.dialects import Diagnostic
 from multidrop.dialects.files import lines_of
 from multidrop.dialects.text import counted, visible
-from multidrop.macros.atomic import write_atomically
+from multidrop.macros.atomic import make_folder, write_atomically
 from multidrop.shell.events import FAILURES
 from multidrop.shell.line_syntax import NOWHERE, DriveLine, Place, TypedLine, VerbLine, parse
 
@@ -66,7 +66,7 @@ class History:
         if not line.strip() or "\n" in line or "\r" in line:
             return
         with contextlib.suppress(OSError):
-            self.path.parent.mkdir(parents=True, exist_ok=True)
+            make_folder(self.path.parent)
             with self._opened() as (descriptor, _):
                 os.write(descriptor, f"{_gap(descriptor)}{line}\n".encode("utf-8", "replace"))
 

@@ -11,7 +11,7 @@ from urllib.parse import quote
 from multidrop.dialects import Diagnostic
 from multidrop.dialects.files import why
 from multidrop.dialects.program_files import Held
-from multidrop.macros.atomic import create_atomically, make_folder, sync_folder
+from multidrop.macros.atomic import create_atomically, make_folder
 from multidrop.shell.state.store import Store, digest
 
 
@@ -91,7 +91,6 @@ def write_backup(state: Path, at: datetime, bus: str, address: str, ending: str,
     name = "-".join(filter(None, parts))
     try:
         make_folder(folder)
-        sync_folder(folder.parent.parent)  # the log or the history may have made the state folder, in no hurry
         path, number = folder / f"{name}{ending}", 1
         while True:
             try:

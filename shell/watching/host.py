@@ -21,6 +21,7 @@ from functools import partial
 from pathlib import Path
 
 from multidrop.dialects import Diagnostic
+from multidrop.macros.atomic import make_folder
 from multidrop.shell.threads import BoundedWriter, Loss
 from multidrop.shell.watching.wire import (
     LONGEST_GREETING,
@@ -187,7 +188,7 @@ class Gate:
 
 def private(folder: Path) -> None:
     """Make a folder that only this account can enter. Raises OSError where that cannot be."""
-    folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+    make_folder(folder, 0o700)
     found = folder.lstat()
     if not stat.S_ISDIR(found.st_mode) or found.st_uid != os.getuid():
         raise OSError(0, "the folder is another account's")

@@ -35,6 +35,7 @@ FIXED = {
     1164: "an earlier stop, confirmed as another one came by what was read before that",
     1406: "a stop behind 28 others that the far end of a relay had not taken (of the simulation itself)",
     1499: "what noise left of two OKs, which was shown as a value",
+    2381549: "a state folder that the log had made and not synced, lost in a power cut with the echo mode owed",
     1502: "a stored line that was typed before a stop, too (of the simulation itself)",
 }
 DERIVED = 12

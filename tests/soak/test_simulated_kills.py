@@ -16,6 +16,9 @@ import pytest
 
 from multidrop.macros.atomic import create_atomically, make_folder, write_atomically
 from multidrop.shell import threads
+from multidrop.shell.configuration import Settings
+from multidrop.shell.log import files
+from multidrop.shell.prompt.line_queue import History
 from multidrop.shell.state.backups import write_backup
 from multidrop.shell.state.store import Store
 from soak.simulation.climate import Climate
@@ -246,10 +249,21 @@ def test_a_new_file_in_a_new_folder_survives_a_power_cut(bench: Bench) -> None:
     assert [each.read_bytes() for each in made] == [b"whole"] * 20
 
 
-def test_a_backup_survives_a_power_cut_in_a_state_folder_that_was_just_made(bench: Bench) -> None:
+@pytest.mark.parametrize(
+    "first",
+    [
+        lambda state: files.fresh(Settings(state=state)),
+        lambda state: History(state / "history").append("PR P"),
+        lambda state: Store(state).write("k", {}, 1, synced=False),
+    ],
+    ids=["the log", "the history", "what may be lost"],
+)
+def test_a_backup_survives_a_power_cut_whoever_made_the_state_folder(
+    bench: Bench, first: Callable[[Path], object]
+) -> None:
     def create(path: Path) -> None:
         state = path.with_name(f"state-{len(made)}")
-        state.mkdir()
+        first(state)
         made.append(write_backup(state, datetime(2026, 1, 1), "l0", "a", ".mxt", "PG"))
 
     made: list[Path] = []
