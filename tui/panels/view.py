@@ -109,6 +109,12 @@ def figures_at(session: Session, bus: str, address: str, axis: str) -> Figures:
     return figures_of(session.units.of(drive, axis), session.units.referenced(drive, axis))
 
 
+def names_on(session: Session, bus: str) -> dict[str, str]:
+    """The names that a person gave to drives of a bus, by address."""
+    drives = session.buses[bus].drives if bus in session.buses else {}
+    return {address: drive.label for address, drive in drives.items() if drive.label}
+
+
 def name_at(session: Session, bus: str, address: str) -> str:
     """The name that a person gave to a drive; empty without one."""
     drive = session.buses[bus].drives.get(address) if bus in session.buses else None

@@ -10,7 +10,7 @@ from textual.binding import BindingType
 from multidrop.dialects.text import counted
 from multidrop.tui.key_table import bound
 from multidrop.tui.panels.traffic import piece_rows
-from multidrop.tui.panels.view import View
+from multidrop.tui.panels.view import View, names_on
 from multidrop.tui.screen_model import TrafficStore
 from multidrop.tui.screens.page import Host, Page
 from multidrop.tui.text import visible
@@ -45,7 +45,7 @@ class TrafficPage(Page):
 
     def show(self, view: View) -> None:
         store, part = self._store(), self.lines("traffic")
-        height, rows = part.size.height, list[Row]()
+        height, rows, names = part.size.height, list[Row](), names_on(self.host.session, self._bus)
         self._shown = 0
         behind = 0 if self._bottom is None else store.taken - 1 - self._bottom
         for piece in islice(reversed(store.pieces), max(0, behind), None):
@@ -53,7 +53,7 @@ class TrafficPage(Page):
                 break
             self._shown += 1
             if self._polls or not piece.poll:
-                rows[:0] = piece_rows(piece, view.session.wall, self.size.width, self._hex)
+                rows[:0] = piece_rows(piece, view.session.wall, self.size.width, names, self._hex)
         part.put(rows[-height:] if height else [])
         state = (
             "follows the newest" if self._bottom is None else f"paused; {counted(max(0, behind), 'piece')} came since"
