@@ -103,7 +103,7 @@ def test_bytes_stand_beside_the_name_that_a_person_gave_to_the_drive() -> None:
     wall, names = demo_session().wall, {"a": "gantry", "b": "a name of more than twelve cells"}
     rows = [piece_rows(Piece(67.25, True, b"P\n", each), wall, 80, names)[0] for each in "abc"]
     shown = ["gantry      ", "a name of m…", "c           "]
-    assert text(rows) == [f" 12:41:07.250 ↑ {each} P·            50 0A" for each in shown]
+    assert text(rows) == [f" 12:41:07.250 ↑ {each} P·           50 0A" for each in shown]
 
 
 @pytest.mark.parametrize("width", [40, 80])
