@@ -123,6 +123,10 @@ _LIMITS: Mapping[str, tuple[int, ...]] = {
 """The characters from which on each takes one code unit more."""
 
 
+_LINE_END = re.compile(r"\r\n|\r|\n")
+"""The end of a line for every client."""
+
+
 class Positions:
     """Converts columns of lines between characters and code units; UTF-16 unless both agreed on another encoding."""
 
@@ -146,6 +150,21 @@ class Positions:
             if units < 0:
                 return column
         return len(line)
+
+    def changed(self, text: str, change: types.TextDocumentContentChangeEvent) -> str:
+        """Return the text after a change of all of it or of a range; an end before its start is there, too."""
+        if isinstance(change, types.TextDocumentContentChangeWholeDocument):
+            return change.text
+        ends = [0, *(found.end() for found in _LINE_END.finditer(text))]
+
+        def offset(place: types.Position) -> int:
+            if place.line >= len(ends):
+                return len(text)
+            line = _LINE_END.split(text[ends[place.line] :], maxsplit=1)[0]
+            return ends[place.line] + self.column(line, place.character)
+
+        start = offset(change.range.start)
+        return text[:start] + change.text + text[max(start, offset(change.range.end)) :]
 
     def range(self, lines: Sequence[str], place: Span) -> types.Range:
         line = lines[place.line] if place.line < len(lines) else ""

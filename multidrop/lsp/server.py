@@ -7,11 +7,14 @@ a place without a name or a word. A `Diagnostic` becomes an error of the request
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from functools import partial
+from functools import partial, reduce
+from typing import Any
 
 from lsprotocol import types
-from pygls.exceptions import JsonRpcException
+from pygls.exceptions import JsonRpcException, JsonRpcInvalidParams, JsonRpcInvalidRequest
 from pygls.lsp.server import LanguageServer
+from pygls.protocol import LanguageServerProtocol
+from pygls.protocol.json_rpc import RPCRequest
 
 import multidrop
 from multidrop.dialects import Diagnostic
@@ -37,13 +40,37 @@ At = (
 """The requests that name a place."""
 
 
+class Protocol(LanguageServerProtocol):
+    """The protocol of the library, which leaves a request without a reply that it cannot take."""
+
+    def structure_message(self, data: dict[str, Any]) -> Any:
+        try:
+            return super().structure_message(data)
+        except JsonRpcException:
+            if "method" in data and "id" in data:
+                self._refuse(data["id"], JsonRpcInvalidParams(f"{data['method']}: its parameters are wrong"))
+            raise
+
+    def handle_message(self, message: Any) -> None:
+        if not hasattr(message, "jsonrpc"):
+            number = message.get("id") if isinstance(message, dict) else None
+            self._refuse(number, JsonRpcInvalidRequest("no message of JSON-RPC 2.0"))
+        elif isinstance(message, RPCRequest) and (self._shutdown or message.jsonrpc != self.VERSION):
+            what = "after shutdown only exit is valid" if self._shutdown else f"JSON-RPC {self.VERSION} is valid"
+            self._refuse(message.id, JsonRpcInvalidRequest(what))
+        else:
+            super().handle_message(message)
+
+    def _refuse(self, number: object, why: JsonRpcException) -> None:
+        known = number if isinstance(number, int | str) else None
+        self._send_data({"jsonrpc": self.VERSION, "id": known, "error": why.to_response_error()})
+
+
 class Server:
     """The handlers of a client's requests. `product`: the personality for which texts are checked."""
 
     def __init__(self, product: str, delay: float = DELAY) -> None:
-        self.protocol_server = LanguageServer(
-            "multidrop", multidrop.__version__, text_document_sync_kind=types.TextDocumentSyncKind.Full
-        )
+        self.protocol_server = LanguageServer("multidrop", multidrop.__version__, protocol_cls=Protocol)
         self.documents = Documents(self._publish, product, delay)
         features: list[tuple[str, Callable[..., object], object | None]] = [
             (types.INITIALIZE, self.initialize, None),
@@ -115,9 +142,9 @@ class Server:
         self.documents.open(given.uri, file, given.language_id, given.text, given.version)
 
     def changed(self, params: types.DidChangeTextDocumentParams) -> None:
-        uri = params.text_document.uri
-        text = self.protocol_server.workspace.get_text_document(uri).source
-        self.documents.change(uri, text, params.text_document.version)
+        if (document := self.documents.find(params.text_document.uri)) is not None:
+            text = reduce(self._positions.changed, params.content_changes, document.text.text)
+            self.documents.change(document.uri, text, params.text_document.version)
 
     def closed(self, params: types.DidCloseTextDocumentParams) -> None:
         self.documents.close(params.text_document.uri)

@@ -160,6 +160,8 @@ class ProgramRun:
     def _load(self, anywhere: bool = False) -> Iterator[Printed | Failed]:
         device = self._device
         for line in self._lines:
+            if anywhere and device.programming is None and line.section == "program" and line.mark is None:
+                device.core.mode.address = FIRST_ADDRESS
             address = device.programming
             if address is None and line.text.upper() == "S":
                 continue
@@ -171,10 +173,8 @@ class ProgramRun:
                 code = self._failures[-1].code
                 self._errors.append(code)
                 yield Failed(0.0, code, line.number, line.text, loading=True, personality=self._personality)
-                if address is None and line.section == "program":
-                    if not anywhere:
-                        return
-                    device.core.mode.address = FIRST_ADDRESS
+                if address is None and line.section == "program" and not anywhere:
+                    return
             elif address is not None:
                 self._stored[address] = line
         self._failures.clear()

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import re
+
 import pytest
-from hypothesis import given
+from hypothesis import assume, given
 from hypothesis import strategies as st
 from lsprotocol import types
 
@@ -81,3 +83,28 @@ def test_edits_have_a_version_only_where_the_client_heeds_it() -> None:
     assert replies.workspace_edit(document, [edit], False).changes == {"file:///a": [edit]}
     (change,) = replies.workspace_edit(document, [edit], True).document_changes
     assert change.text_document.version == 7 and list(change.edits) == [edit]
+
+
+PIECES = st.text(st.sampled_from("aé€😀 \n\r"), max_size=12)
+
+
+@given(PIECES, PIECES, PIECES, PIECES, ENCODINGS)
+def test_a_change_of_a_part_is_the_change_of_the_whole(
+    before: str, old: str, after: str, new: str, encoding: str
+) -> None:
+    text, places = before + old + after, []
+    for part in (before, before + old):
+        assume(not (part.endswith("\r") and text[len(part) :].startswith("\n")))  # no place of a client
+        lines = re.split(r"\r\n|\r|\n", part)
+        places.append(types.Position(len(lines) - 1, size(lines[-1], encoding)))
+    change = types.TextDocumentContentChangePartial(types.Range(*places), new)
+    assert Positions(encoding).changed(text, change) == before + new + after
+    assert Positions(encoding).changed(text, types.TextDocumentContentChangeWholeDocument(new)) == new
+
+
+@given(PIECES, st.tuples(*[st.integers(0, 2**31 - 1)] * 4))
+def test_a_change_at_any_place_changes_a_part(text: str, numbers: tuple[int, int, int, int]) -> None:
+    one, two = types.Position(*numbers[:2]), types.Position(*numbers[2:])
+    found = Positions(None).changed(text, types.TextDocumentContentChangePartial(types.Range(one, two), "NEW"))
+    head, _, tail = found.partition("NEW")
+    assert text.startswith(head) and text.endswith(tail) and len(head + tail) <= len(text)

@@ -148,10 +148,13 @@ def _unsendable(line: ProgramLine, names: frozenset[str]) -> Iterator[Problem]:
 def _sections(lines: list[ProgramLine]) -> tuple[list[str], list[Problem]]:
     """Find the section of each line, and report each PG without a partner.
 
-    A PG without a partner counts as what it was meant to be, so it is reported once.
+    A PG without a partner counts as what it was meant to be, so it is reported once. A PG that ends a program of which
+    no line is the begin ends the lines before it that are no settings: the line of their PG has another error.
     """
     opened: ProgramLine | None = None
     ended: float = inf
+    names = frozenset(line.declares for line in lines if line.declares)
+    since = 0
     inside: list[bool] = []
     problems: list[Problem] = []
     for at, line in enumerate(lines):
@@ -166,7 +169,10 @@ def _sections(lines: list[ProgramLine]) -> tuple[list[str], list[Problem]]:
             problems.append(Problem(line.number, line.column, what, "end that with PG first"))
         following = next((each.mark for each in lines[at + 1 :] if each.mark is not None), None)
         opens = bool(line.mark) or (opened is None and following == "")  # where the next PG ends a program
-        opened, ended = (line if opens else None), line.number
+        if opened is None and not opens:
+            first = next((n for n in range(since, at) if not _is_setting(lines[n].text, names)), at)
+            inside[first:at] = [True] * (at - first)
+        opened, ended, since = (line if opens else None), line.number, at + 1
     if opened is not None:
         hint = "the program's last line is PG alone"
         problems.append(Problem(opened.number, opened.column, "PG is never ended", hint))

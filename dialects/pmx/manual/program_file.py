@@ -25,7 +25,7 @@ from multidrop.dialects.pmx.manual.script_compiler import (
     split,
 )
 from multidrop.dialects.pmx.manual.script_parser import AXES, WORDS, parse
-from multidrop.dialects.program_files import Problem, errors, refuse, respelled
+from multidrop.dialects.program_files import Problem, errors, in_order, refuse, respelled
 
 _OPERATIONS = {code: op for op, code in OPERATION.items()}
 _COMPARISONS = {code: op for op, code in COMPARISON.items()}
@@ -255,10 +255,11 @@ def formatted(text: str) -> str:
 
 def check(text: str, product: str = "") -> list[Problem]:  # noqa: ARG001
     """Report every error of a program, by line; there is one product."""
-    if wrong := [Problem(*place, "lines end at LF or CR LF") for place in wrong_characters(split_lines(text))]:
-        return wrong
+    unreadable = [Problem(*place, "lines end at LF or CR LF") for place in wrong_characters(split_lines(text))]
     lines = _lines(text)
-    return _check_raw(lines) if is_raw(lines) else script_checker.check(text)
+    problems = _check_raw(lines) if is_raw(lines) else script_checker.check(text)
+    wrong = {each.line for each in unreadable}
+    return in_order([*unreadable, *(each for each in problems if each.line not in wrong)])
 
 
 def is_raw(lines: Sequence[SourceLine]) -> bool:

@@ -54,9 +54,7 @@ def _checked(text: str) -> tuple[list[Statement], list[Problem]]:
         checker.take(each)
     checker.finish()
     statements = [each for each in statements if each is not checker.final]
-    if not checker.problems and not any(each.wrong and each.word for each in statements):
-        problems += _check_flow(statements)
-    problems += checker.problems + _calls(statements)
+    problems += [*_check_flow(statements), *checker.problems, *_calls(statements)]
     if not errors(problems):
         code = script_compiler.compile_(statements)
         if len(code.lines) > LINES:
@@ -226,7 +224,7 @@ _COMPARED = {">": int.__gt__, "<": int.__lt__, "=": int.__eq__, ">=": int.__ge__
 
 
 def _check_flow(statements: Sequence[Statement]) -> Iterator[Problem]:
-    """Report what the paths through correct blocks show; a statement with an error is passed over.
+    """Report what the paths show; a statement with an error is passed over, a block without its end ends the file.
 
     These are the first statement of each part that no path reaches, and moves that another statement does not wait for.
     """
@@ -289,18 +287,19 @@ class _Flow:
         each = self.statements[at]
         if each.word in ("END", "ENDSUB"):
             return
-        if each.word == "ENDWHILE":
-            yield self._partner[at]
-            return
-        holds = _holds(each) if each.word in ("IF", "ELSEIF", "WHILE") else True
-        if holds is not False and at + 1 < len(self.statements):
-            yield self._end.get(at + 1, at + 1)
-        if holds is not True and self._partner[at] < len(self.statements):
-            yield self._partner[at]
+        found = []
+        holds = _holds(each) if each.word in ("IF", "ELSEIF", "WHILE") else each.word != "ENDWHILE"
+        if holds is not False:
+            found.append(self._end.get(at + 1, at + 1))
+        if holds is not True:
+            found.append(self._partner.get(at, len(self.statements)))
+        yield from (at for at in found if at < len(self.statements) and self.statements[at].word not in ("PRG", "SUB"))
 
 
 def _holds(each: Statement) -> bool | None:
     """Whether a condition of two numbers holds; None for any other."""
+    if each.wrong:
+        return None
     left, right = (value.constant for value in each.values)
     return None if left is None or right is None else _COMPARED[each.op](left, right)
 

@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import difflib
 import re
-from collections.abc import Container, Iterable, Mapping, Sequence
+from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import NamedTuple
@@ -253,31 +253,32 @@ def compiled(lines: Sequence[SourceLine]) -> list[Placed]:
 
 def check(text: str, product: str = "") -> list[Problem]:  # noqa: ARG001
     """Report every error of a program, and warn of what runs otherwise than it reads."""
-    if wrong := [Problem(*place, "lines end at LF or CR LF") for place in wrong_characters(split_lines(text))]:
-        return wrong
-    rows = [ProgramLine(number, line) for number, line in enumerate(split_lines(text), 1)]
-    made = assembled(rows)
-    return made.problems or _warnings(made)
+    lines = split_lines(text)
+    unreadable = [Problem(*place, "lines end at LF or CR LF") for place in wrong_characters(lines)]
+    made = assembled([ProgramLine(number, line) for number, line in enumerate(lines, 1)])
+    problems = [*unreadable, *(each for each in made.problems if each.line not in {each.line for each in unreadable})]
+    return in_order([*problems, *_warnings(made, {each.line for each in problems})])
 
 
-def _warnings(made: Assembled) -> list[Problem]:
+def _warnings(made: Assembled, wrong: Container[int]) -> Iterator[Problem]:
+    """Warn of what the correct lines do together. A line with an error may be any command."""
     targets = {*made.labels.values(), *(each.call.value for each in made.lines if each.call.command in JUMPS)}
-    found, dead = [], False
+    dead = False
     for each in made.lines:
-        dead = dead and each.at not in targets
+        dead = dead and each.at not in targets and each.source not in wrong
         if dead:
-            found.append(Problem(each.source, 1, "this line is never executed", "", True))
+            yield Problem(each.source, 1, "this line is never executed", "", True)
         if each.call.command in WEARS:
             what = f"{spelled(each.call)} writes to the EEPROM, which wears out, each time that it is executed"
-            found.append(Problem(each.source, 1, what, "", True))
+            yield Problem(each.source, 1, what, "", True)
         if each.call.command in JUMPS and each.call.value > len(made.lines):
             what = f"the program has no line {each.call.value}"
-            found.append(Problem(each.source, 1, what, f"its lines are 0 to {len(made.lines) - 1}", True))
+            yield Problem(each.source, 1, what, f"its lines are 0 to {len(made.lines) - 1}", True)
         dead = each.call.command in ENDS
-    if made.lines and made.lines[-1].call.command not in ENDS:
+    if made.lines and made.lines[-1].call.command not in ENDS and made.lines[-1].source not in wrong:
         what = "the program runs on past this line, its last one"
-        found.append(Problem(made.lines[-1].source, 1, what, "end it with STOP or JA", True))
-    return in_order([*found, *_too_deep(made)])
+        yield Problem(made.lines[-1].source, 1, what, "end it with STOP or JA", True)
+    yield from _too_deep(made)
 
 
 def _too_deep(made: Assembled) -> list[Problem]:
