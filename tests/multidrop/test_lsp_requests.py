@@ -125,12 +125,10 @@ PROGRAMS = {
 
 @pytest.mark.parametrize("file", PROGRAMS)
 @pytest.mark.parametrize("typed", ["x", "\x0b"])
-def test_one_more_letter_hides_at_most_the_problems_beside_it(file: str, typed: str) -> None:
+def test_one_more_letter_hides_few_problems(file: str, typed: str) -> None:
     grammar, text = ProgramGrammar(file), PROGRAMS[file]
     before = {each.line for each in grammar.check(text, "LMDCM")}
     assert len(before) >= 19
     for at in [n for n in range(len(text)) if text[n - 1 : n] in ("", "\n") or text[n] == "\n"]:
         problems = grammar.check(text[:at] + typed + text[at:], "LMDCM")
-        place = text[:at].count("\n") + 1
-        gone = before - {each.line for each in problems}
-        assert gone <= {place - 1, place, place + 1}, (at, problems)
+        assert len(before - {each.line for each in problems}) <= 2, (at, problems)

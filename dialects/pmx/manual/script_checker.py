@@ -54,7 +54,8 @@ def _checked(text: str) -> tuple[list[Statement], list[Problem]]:
         checker.take(each)
     checker.finish()
     statements = [each for each in statements if each is not checker.final]
-    problems += [*_check_flow(statements), *checker.problems, *_calls(statements)]
+    flow = () if checker.problems else _check_flow(statements)
+    problems += [*flow, *checker.problems, *_calls(statements)]
     if not errors(problems):
         code = script_compiler.compile_(statements)
         if len(code.lines) > LINES:
@@ -224,7 +225,7 @@ _COMPARED = {">": int.__gt__, "<": int.__lt__, "=": int.__eq__, ">=": int.__ge__
 
 
 def _check_flow(statements: Sequence[Statement]) -> Iterator[Problem]:
-    """Report what the paths show; a statement with an error is passed over, a block without its end ends the file.
+    """Report what the paths through blocks show that match; a statement with an error is passed over.
 
     These are the first statement of each part that no path reaches, and moves that another statement does not wait for.
     """
