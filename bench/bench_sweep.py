@@ -129,7 +129,7 @@ def swept(cases: int, *arguments: str) -> float:
     """Seconds of a sweep as its summary has them, without the start of the program."""
     line = [sys.executable, "-m", "multidrop", *_arguments(cases), *arguments]
     done = subprocess.run(line, capture_output=True, text=True, env=_env())
-    words = done.stdout.split()
+    words = done.stdout.splitlines()[-1].split()
     assert done.returncode == 0 and words[:4] == [str(cases), "cases,", "0", "failed,"], done
     return float(words[4])
 

@@ -7,25 +7,32 @@ from __future__ import annotations
 
 import argparse
 import json
+import os
 import sys
 import time
+from collections import deque
 from collections.abc import Iterator, Sequence
 from datetime import datetime
 from functools import partial
+from pathlib import Path
 
 from multidrop.commands import fail
 from multidrop.dialects import Diagnostic
+from multidrop.dialects.files import why
 from multidrop.dialects.text import counted
+from multidrop.macros.atomic import write_atomically
 from multidrop.shell import configuration
 from multidrop.shell.batch.report import Case as JUnitCase
-from multidrop.shell.batch.report import JUnitFile
+from multidrop.shell.batch.report import JUnitFile, check_place
 from multidrop.shell.exit_codes import INTERRUPTED
 from multidrop.shell.signals import Interruption
 from multidrop.shell.streams.stdout import StatusLine, write
 from multidrop.shell.sweeps import plan as planning
 from multidrop.shell.sweeps import workers
+from multidrop.shell.sweeps.answers import Answer
 from multidrop.shell.sweeps.failures import Group, command, grouped, rows
 from multidrop.shell.sweeps.plan import Asked, Plan
+from multidrop.shell.sweeps.results import Table
 from multidrop.shell.sweeps.trial import Case, Result, bench
 from multidrop.shell.sweeps.variation import SEED, spelled
 from multidrop.transports import TransportLost
@@ -42,19 +49,26 @@ def run(chosen: argparse.Namespace) -> int:
         chosen.until,
         chosen.random,
         chosen.seed,
+        chosen.search,
     )
     plan = planning.make(asked)
-    report = Report(plan, as_json=chosen.json, junit=chosen.junit)
+    if chosen.svg:
+        if chosen.search or sum(each.count > 1 for each in plan.values) < 2:
+            raise Diagnostic("shows two keys with several values each", f"--svg {chosen.svg}", "vary a second key")
+        check_place(chosen.svg, "--svg", b"<svg", "picture")
+    table = Table(plan, chosen.csv, chosen.parquet, chosen.resume)
+    report = Report(plan, table, as_json=chosen.json, junit=chosen.junit, svg=chosen.svg)
     with Interruption() as interruption:
         try:
-            cases = (plan.case(number) for number in range(1, plan.count + 1))
             if chosen.cluster:
                 agree = partial(_agree, chosen.cluster, chosen.yes, workers.TRUST, interruption)
-                results = workers.cluster_results(plan.job, cases, chosen.cluster, interruption, agree)
+                cases = (map(plan.case, numbers) for numbers in report.rounds())
+                report.take_all(workers.cluster_results(plan.job, cases, chosen.cluster, interruption, agree))
             else:
                 jobs = chosen.jobs or workers.cores()
-                results = workers.results(plan.job, cases, plan.count, jobs, interruption)
-            report.take_all(results)
+                for todo in report.rounds():
+                    cases = map(plan.case, todo)
+                    report.take_all(workers.results(plan.job, cases, len(todo), jobs, interruption))
         except KeyboardInterrupt:
             return report.finish(interruption, INTERRUPTED)
         except (Diagnostic, TransportLost) as problem:
@@ -93,18 +107,22 @@ SEARCH, LATE_SEARCH = 10.0, 1.0
 class Report:
     """The reports of one sweep. Raises Diagnostic for a JUnit file that cannot be written."""
 
-    def __init__(self, plan: Plan, *, as_json: bool, junit: str) -> None:
-        self._plan, self._json = plan, as_json
+    def __init__(self, plan: Plan, table: Table, *, as_json: bool, junit: str, svg: str) -> None:
+        self._plan, self._table, self._json, self._svg = plan, table, as_json, svg
         self._begun, self._began = datetime.now().astimezone(), time.perf_counter()
         self._junit = JUnitFile(junit, plan.asked.file, self._begun)
         self._junit.begin()
         self._status = StatusLine()
         self._shown_at = 0.0
-        self._early: dict[int, Result] = {}
-        """Results of which a case before them is not done."""
-        self._next = 1
+        self._results = dict(table.known)
+        self._awaited: deque[int] = deque()
+        """The cases of the round that are not reported yet."""
+        self._cut = False
+        """The sweep ended early."""
         self._reported: list[int] = []
         self._failed: dict[int, Result] = {}
+        if table.known:
+            write(sys.stderr, f"{counted(len(table.known), 'case')} of {plan.count} are in the file already")
         if not as_json:
             asked = plan.asked
             if asked.draws is not None:
@@ -112,14 +130,26 @@ class Report:
             if any(key.part == SEED for key in plan.job.keys):
                 write(sys.stderr, "seed changes the faults of a wire only, and a program test has no wire")
 
+    def rounds(self) -> Iterator[list[int]]:
+        """Yield the cases to run, in rounds: without those whose results are known."""
+        for numbers in self._plan.rounds(self._results):
+            self._awaited.extend(numbers)
+            self._report_ready()
+            yield [number for number in numbers if number not in self._results]
+
     def take_all(self, results: Iterator[list[Result]]) -> None:
         """Take results as they come; report each once all before it are done."""
         for chunk in results:
-            self._early.update((each.number, each) for each in chunk)
-            while self._next in self._early:
-                self._take(self._early.pop(self._next))
-                self._next += 1
+            for each in chunk:
+                self._results[each.number] = each
+                self._table.take(each)
+            self._report_ready()
+            self._table.save()
             self._progress()
+
+    def _report_ready(self) -> None:
+        while self._awaited and self._awaited[0] in self._results:
+            self._take(self._results[self._awaited.popleft()])
 
     def _take(self, result: Result) -> None:
         self._reported.append(result.number)
@@ -132,12 +162,12 @@ class Report:
 
     def _progress(self) -> None:
         now = time.perf_counter()
-        done, count = len(self._reported) + len(self._early), self._plan.count
-        if now - self._shown_at < PERIOD or done == count:
+        done, count, new = len(self._results), self._plan.runs, len(self._results) - len(self._table.known)
+        if now - self._shown_at < PERIOD or done >= count:
             return
         self._shown_at = now
-        left = (now - self._began) / done * (count - done)
-        failed = sum(not each.ok for each in self._early.values()) + len(self._failed)
+        left = (now - self._began) / max(new, 1) * (count - done)
+        failed = sum(not each.ok for each in self._results.values())
         self._status.show(f"{done} of {counted(count, 'case')}, {failed} failed, {_time(left)} left")
 
     def erase(self) -> None:
@@ -145,26 +175,51 @@ class Report:
 
     def finish(self, interruption: Interruption, code: int) -> int:
         """Report the rest; return the exit code, `code` unless that is 0 and a case failed."""
-        for number in sorted(self._early):
-            self._take(self._early.pop(number))
+        for number in [each for each in self._awaited if each in self._results]:
+            self._take(self._results[number])
         seconds = time.perf_counter() - self._began
         interruption.came = False  # the next signal ends the search
         groups = self._groups(interruption, LATE_SEARCH if code else SEARCH)
         self.erase()
+        self._cut = bool(code)
+        answer = None if self._json and not self._svg else self._answer()
+        code = self._kept(answer, code)
         if code not in (0, INTERRUPTED) and not self._reported:
             return self._finish_junit(groups, seconds, code)
         if self._json:
             summary = {"cases": len(self._reported), "failed": len(self._failed), "seconds": round(seconds, 3)}
             write(sys.stdout, json.dumps({"summary": summary}))
-        else:
+        elif answer is not None:
+            write(sys.stdout, *answer.rows(), *answer.map() if not (colours := _colours()) else ())
+            write(sys.stdout, *answer.map(colours=True) if colours else (), styled=True)
+            write(sys.stdout, *answer.boundary())
             if groups:
                 write(sys.stdout, *rows(self._plan, groups, len(self._failed)))
             write(sys.stdout, f"{self._counted}, {len(self._failed)} failed, {seconds:.1f} s")
         if code:
-            write(sys.stderr, f"ended after {self._counted} of {self._plan.count}; the others were not run")
+            write(sys.stderr, f"ended after {self._counted} of {self._plan.runs}; the others were not run")
         elif interruption.came:
             write(sys.stderr, "interrupted while simpler worlds were looked for")
         return self._finish_junit(groups, seconds, code or (FAILED if self._failed else 0))
+
+    def _answer(self) -> Answer:
+        reported = {number: self._results[number] for number in self._reported}
+        return Answer(self._plan, reported, self._plan.asked.search)
+
+    def _kept(self, answer: Answer | None, code: int) -> int:
+        """Write the table and the picture; return the exit code."""
+        try:
+            self._table.save(now=True)
+            if answer is not None and self._svg:
+                if not (picture := answer.svg()):
+                    raise Diagnostic("too few cases ran for a picture", self._svg)
+                write_atomically(Path(self._svg), picture.encode())
+        except OSError as problem:
+            return code or fail(Diagnostic(f"cannot be written: {why(problem)}", self._svg))
+        except Diagnostic as problem:
+            wrong = fail(problem)
+            return code or wrong
+        return code
 
     @property
     def _counted(self) -> str:
@@ -193,9 +248,9 @@ class Report:
             number: command(self._plan, group.world, group.failed) for group in groups for number in group.numbers
         }
         cases = [self._junit_case(number, commands) for number in self._reported]
-        if len(cases) < self._plan.count:
+        if self._cut:
             file = self._plan.asked.file
-            cases.append(JUnitCase(file, file, error=f"ended after {self._counted} of {self._plan.count}"))
+            cases.append(JUnitCase(file, file, error=f"ended after {self._counted} of {self._plan.runs}"))
         try:
             self._junit.write(cases, seconds)
         except Diagnostic as problem:
@@ -213,6 +268,12 @@ class Report:
         repeat = commands.get(number) or command(self._plan, tuple(case[1]), result.failed)
         failure, error = (result.why, "") if result.failed >= 0 else ("", result.why)
         return JUnitCase(name, self._plan.asked.file, failure=failure, error=error, printed=(repeat,))
+
+
+def _colours() -> bool:
+    """Whether standard output shows colours."""
+    plain = "NO_COLOR" in os.environ or os.environ.get("TERM") == "dumb" or sys.platform == "win32"
+    return sys.stdout.isatty() and not plain
 
 
 def _time(seconds: float) -> str:

@@ -104,7 +104,7 @@ class JUnitFile:
         if self._path is None:
             return
         try:
-            _check_place(self._path)
+            check_place(str(self._path), "--junit", b"<testsuite", "JUnit report")
             self.write([Case(self._name, self._name, error="the run did not end")])
         except Diagnostic:
             self._path = None
@@ -119,18 +119,18 @@ class JUnitFile:
             raise Diagnostic(f"the report cannot be written: {why(error)}", str(self._path)) from None
 
 
-def _check_place(path: Path) -> None:
-    """Check that a report may be written to a path: it replaces a report only. Raises Diagnostic."""
-    if str(path) == new_file.STANDARD_OUTPUT:
-        raise Diagnostic("standard output has the replies", "--junit -", "name a file for the report")
+def check_place(path: str, option: str, sign: bytes, what: str) -> None:
+    """Check that a report may be written to a path: it replaces a report only, with that sign. Raises Diagnostic."""
+    if path == new_file.STANDARD_OUTPUT:
+        raise Diagnostic("standard output has the replies", f"{option} -", "name a file for the report")
     new_file.check_folder(path)
     if not os.path.exists(path):  # Path's own methods raise for a name that is too long
         return
     if not os.path.isfile(path):
-        raise Diagnostic("is not a file", str(path), "name a new file for the report")
+        raise Diagnostic("is not a file", path, "name a new file for the report")
     begin = bytes_of(path, LARGEST_PROGRAM)[:400]
-    if begin and b"<testsuite" not in begin:
-        raise Diagnostic("exists already and is not a JUnit report", str(path), "name a new file for the report")
+    if begin and sign not in begin:
+        raise Diagnostic(f"exists already and is not a {what}", path, "name a new file for the report")
 
 
 class Report:

@@ -71,6 +71,7 @@ PROGRAM_SWEEP = Operation(
     examples=[
         'program sweep shuttle.mxt --cell press.toml --vary "b.load=0..1.2:0.1" --expect "errors == []"',
         'program sweep shuttle.mxt --cell press.toml --vary "b.stall_at=1..90000" --random 500 --junit sweep.xml',
+        'program sweep shuttle.mxt --vary "load=0..2:0.001" --vary RC=25,50,75 --search load --csv sweep.csv',
         'program sweep shuttle.mxt --vary VM=20000..80000:5000 --expect "virtual_s < 2" --cluster tcp://pc:8786',
     ],
     arguments={
@@ -88,8 +89,16 @@ PROGRAM_SWEEP = Operation(
         ),
         "--expect CONDITION ...": "a comparison with position, errors, prints, virtual_s or ended; all must hold; "
         "may be repeated (default: errors == [])",
-        "--random N": typed("draw N cases, in place of all", type=count),
+        "[--random | --search]": {
+            "--random N": typed("draw N cases, in place of all", type=count),
+            "--search KEY": typed(
+                "find where KEY begins to fail by halving its range, for the values of the others", default=""
+            ),
+        },
         "--seed N": typed("the seed of these draws (default: 1)", default=1, type=int),
+        "--search KEY": typed(
+            "find where KEY begins to fail by halving its range, for the values of the others", default=""
+        ),
         "--run LABEL": START,
         "--until SECONDS": typed(
             "virtual seconds of a case at most; without it, a case that still runs after 60 s has failed", type=duration
@@ -101,6 +110,10 @@ PROGRAM_SWEEP = Operation(
         "--yes": YES,
         "--json": "print one JSON object a case, and a summary",
         "--junit FILE": "write the cases to a JUnit XML file",
+        "--csv FILE": typed("write a table with a row for each case: values, result, seed, versions", default=""),
+        "--parquet FILE": typed("write the same table as Parquet", default=""),
+        "--resume FILE": typed("take the results in such a table, run the other cases, and keep all in it", default=""),
+        "--svg FILE": typed("draw what passed at the values of two keys", default=""),
     },
 )
 PROGRAM_CONVERT = Operation(

@@ -18,7 +18,7 @@ from typing import Any
 
 from multidrop.dialects import Diagnostic
 from multidrop.dialects.text import visible
-from multidrop.shell.plots.file import GAP, SinkBroken, disk_full, synced, take_lock
+from multidrop.shell.plots.file import GAP, SinkBroken, disk_full, pyarrow, synced, take_lock
 from multidrop.shell.plots.request import PlotTarget
 from multidrop.shell.plots.rerun_calls import TWIN, Batch
 
@@ -38,7 +38,7 @@ class TableSink:
         """Open the file. Raises Diagnostic if that fails, and leaves the file unchanged then."""
         assert target.file is not None
         self.target, self.path = target, target.file
-        self._parquet = _pyarrow() if self.path.suffix == ".parquet" else None
+        self._parquet = pyarrow("plot to FILE.csv") if self.path.suffix == ".parquet" else None
         self.writes = self.path.with_name(f"{self.path.stem}.part.csv") if self._parquet else self.path
         self._made = not os.path.exists(self.path)
         self._lock = take_lock(self.path)
@@ -146,18 +146,6 @@ def _end(path: Path) -> float:
 
 def _strange(path: Path) -> Diagnostic:
     return Diagnostic(f"{path} is not a plot of multidrop", hint="use another file; this one is unchanged")
-
-
-def _pyarrow() -> Any:
-    """Import pyarrow. Raises Diagnostic if it is missing."""
-    try:
-        import pyarrow
-        import pyarrow.csv
-        import pyarrow.parquet
-    except ImportError:
-        hint = "plot to FILE.csv, or pipx install 'multidrop[rerun]', which brings it"
-        raise Diagnostic("Parquet files need pyarrow, which is not installed", hint=hint) from None
-    return pyarrow
 
 
 def _parquet_end(pa: Any, path: Path) -> float:

@@ -52,15 +52,15 @@ dropped: list[str] = []
 """The reasons why lines were lost although a reader waits for them, such as a full disk."""
 
 
-def write(stream: TextIO, *lines: str, spare: bool = False) -> None:
-    r"""Write and flush lines, their control characters as text (`\x1b`).
+def write(stream: TextIO, *lines: str, spare: bool = False, styled: bool = False) -> None:
+    r"""Write and flush lines, their control characters as text (`\x1b`) unless they are `styled` already.
 
     A lost reader gets nothing more; a slow one gets no spare lines. What a program has printed comes before what is
     written to standard error.
     """
     if stream is sys.stderr:
         flush_printed()
-    lines = tuple(visible(line, tabs=True) for line in lines)
+    lines = lines if styled else tuple(visible(line, tabs=True) for line in lines)
     if isinstance(stream, output_streams.LineStream):
         stream.lines(lines, spare)
         return

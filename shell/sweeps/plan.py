@@ -5,8 +5,11 @@ The cases of a grid are in the order of `--vary`: the values of the last key cha
 
 from __future__ import annotations
 
+import hashlib
 import json
-from collections.abc import Collection, Sequence
+import platform
+import shlex
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from math import prod
@@ -17,7 +20,7 @@ from multidrop.dialects import Diagnostic
 from multidrop.dialects.families import program_language_of
 from multidrop.dialects.files import program_text_of
 from multidrop.shell import configuration
-from multidrop.shell.sweeps.trial import Case, Job, bench
+from multidrop.shell.sweeps.trial import Case, Job, Result, bench, version
 from multidrop.shell.sweeps.variation import (
     OWN_KEYS,
     SEED,
@@ -53,6 +56,8 @@ class Asked:
     until: float | None = None
     draws: int | None = None
     seed: int = 1
+    search: str = ""
+    """The key whose boundary is searched, by bisection."""
 
 
 @dataclass(frozen=True)
@@ -75,13 +80,65 @@ class Plan:
         return [tuple(each.draw(rng) for each in self.values) for _ in range(self.asked.draws or 0)]
 
     def case(self, number: int) -> Case:
+        return number, self.values_of(number)
+
+    def values_of(self, number: int) -> tuple[Value, ...]:
+        """The values of a case."""
         if self.asked.draws is not None:
-            return number, self._drawn[number - 1]
+            return self._drawn[number - 1]
         index, found = number - 1, []
         for each in reversed(self.values):
             index, rest = divmod(index, each.count)
             found.append(each.at(rest))
-        return number, tuple(reversed(found))
+        return tuple(reversed(found))
+
+    def rounds(self, results: Mapping[int, Result]) -> Iterator[Sequence[int]]:
+        """Yield the numbers of the cases to run, in rounds; `results` has those of a round before the next is taken.
+
+        A search runs the ends of its key in each world, and halves the interval of each whose ends differ.
+        """
+        if not self.asked.search:
+            yield range(1, self.count + 1)
+            return
+        at = [key.text for key in self.job.keys].index(self.asked.search)
+        count, stride = self.values[at].count, prod(each.count for each in self.values[at + 1 :])
+        worlds = [
+            1 + high * stride * count + low for high in range(self.count // stride // count) for low in range(stride)
+        ]
+        spans = {world: (0, count - 1) for world in worlds}
+        yield sorted({world + stride * end for world, span in spans.items() for end in span})
+
+        def ok(world: int, index: int) -> bool:
+            return results[world + stride * index].ok
+
+        while spans := {w: (a, b) for w, (a, b) in spans.items() if b - a > 1 and ok(w, a) != ok(w, b)}:
+            yield sorted(world + stride * ((low + high) // 2) for world, (low, high) in spans.items())
+            for world, (low, high) in spans.items():
+                middle = (low + high) // 2
+                spans[world] = (middle, high) if ok(world, middle) == ok(world, low) else (low, middle)
+
+    @property
+    def runs(self) -> int:
+        """The largest number of cases that run."""
+        if not self.asked.search:
+            return self.count
+        searched = next(v.count for k, v in zip(self.job.keys, self.values, strict=True) if k.text == self.asked.search)
+        return self.count // searched * (1 + searched.bit_length())
+
+    def facts(self) -> dict[str, str]:
+        """What makes this sweep the same as another: equal facts, equal results."""
+        drawn = f"{self.asked.draws} draws" if self.asked.draws is not None else ""
+        until = "" if self.job.until is None else f"until {self.job.until:.15g}"
+        found = {
+            "seed": str(self.asked.seed),
+            "multidrop": version(),
+            "python": platform.python_version(),
+            "program": _digest(self.job.program, self.job.language),
+            "cell": _digest(self.job.drive, self.job.own_units),
+            "vary": " ".join(filter(None, [*(shlex.quote(f"{key}={text}") for key, text in self.asked.vary), drawn])),
+            "expect": "; ".join(filter(None, [*self.job.expects, self.job.run and f"run {self.job.run}", until])),
+        }
+        return {name: text for name, text in found.items() if name not in (key.text for key in self.job.keys)}
 
     def settings(self, case: Case) -> dict[str, Value]:
         """The values of a case by their keys, as they are written; the cell's own ones are left out."""
@@ -135,6 +192,10 @@ def _values(key: str, text: str, asked: Asked) -> Values:
         raise Diagnostic(problem.message, f"--vary {key}", problem.hint) from None
 
 
+def _digest(*parts: object) -> str:
+    return hashlib.sha256(json.dumps(parts).encode()).hexdigest()[:16]
+
+
 def _names(drive: Placed) -> tuple[str, ...]:
     name = drive.spec.name
     return (name, f"{drive.bus}:{name}") if drive.bus else (name,)
@@ -158,9 +219,11 @@ def _check_keys(keys: Sequence[Key]) -> None:
 
 def _check(plan: Plan) -> None:
     """Refuse too many cases, and any value that the world or the drive refuses. Raises Diagnostic."""
-    if plan.count > MOST:
+    if plan.asked.search and plan.asked.search not in (key.text for key in plan.job.keys):
+        raise Diagnostic("has no values", f"--search {plan.asked.search}", f"--vary {plan.asked.search}=A..B:STEP")
+    if plan.runs > MOST:
         hint = "take larger steps or fewer values, or draw some with --random N"
-        raise Diagnostic(f"{plan.count} cases are too many; a sweep has {MOST} at most", "--vary", hint)
+        raise Diagnostic(f"{plan.runs} cases are too many; a sweep has {MOST} at most", "--vary", hint)
     bench(plan.job)
     for index, (key, each) in enumerate(zip(plan.job.keys, plan.values, strict=True)):
         for value in each.samples():

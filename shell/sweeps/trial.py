@@ -23,6 +23,7 @@ from multidrop.dialects.on_demand import imported
 from multidrop.shell.scripts.expression import (
     EQUAL,
     Comparison,
+    Constant,
     Expression,
     Known,
     Name,
@@ -77,6 +78,10 @@ def outcome_of(events: Iterable[Event]) -> Outcome:
 
 
 NAMES = Outcome._fields
+KEPT = ("position", "errors", "virtual_s", "ended")
+"""The fields that are kept of each case."""
+MARGIN = "margin of "
+"""The beginning of the name of a margin."""
 LISTS = ("errors", "prints")
 POSITION, ENDED = "position", "ended"
 List = tuple[Scalar, ...]
@@ -94,13 +99,35 @@ class Condition:
 
     def holds(self, outcome: Outcome) -> bool:
         """Whether the condition holds for a result. Raises Diagnostic for a calculation without a value."""
+        left, right, within = self._sides(outcome)
+        return _compared(self.tree.sign, left, right, within)
+
+    @property
+    def has_margin(self) -> bool:
+        """Whether it is about an order, or has a tolerance."""
+        return self.tree.sign not in EQUAL or (self.tree.sign == "==" and self.tree.within != Constant(0))
+
+    def margin(self, outcome: Outcome) -> str:
+        """The distance of a result from the limit, below 0 beyond it; empty without numbers on both sides."""
+        try:
+            left, right, within = self._sides(outcome)
+        except Diagnostic:
+            return ""
+        if not (isinstance(left, int | float) and isinstance(right, int | float)):
+            return ""
+        if self.tree.sign == "==":
+            return f"{within - abs(left - right):.9g}"
+        return f"{right - left if self.tree.sign[0] == '<' else left - right:.9g}"
+
+    def _sides(self, outcome: Outcome) -> tuple[Side, Side, float]:
+        """Both sides and the tolerance. Raises Diagnostic for a calculation without a value."""
         names = [each for each in unknowns(self.tree) if isinstance(each, Name)]
         values = {each: getattr(outcome, each.name, each.name) for each in names}
         known: Known = {each: "" if isinstance(value, tuple) else value for each, value in values.items()}
         left, right = (_side(each, outcome, known) for each in (self.tree.left, self.tree.right))
         if not (isinstance(left, tuple) or isinstance(right, tuple)):
             left, right = _beside(self.tree, left, right)
-        return _compared(self.tree.sign, left, right, number(evaluate(self.tree.within, known)))
+        return left, right, number(evaluate(self.tree.within, known))
 
     def seen(self, outcome: Outcome) -> str:
         found = (each.name for each in unknowns(self.tree) if isinstance(each, Name))
@@ -231,6 +258,8 @@ class Result(NamedTuple):
     number: int
     failed: int = HELD
     why: str = ""
+    cells: tuple[str, ...] = ()
+    """Texts for `Bench.columns`; empty ones where the run had no result."""
 
     @property
     def ok(self) -> bool:
@@ -245,6 +274,18 @@ class Bench:
     load: Load
     drive: Drive
     conditions: tuple[Condition, ...]
+    measured: tuple[Condition, ...]
+    """The conditions that have a margin."""
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """The names of what is kept of a run: margins, and the result."""
+        return (*(f"{MARGIN}{each.text}" for each in self.measured), *KEPT)
+
+    def _cells(self, outcome: Outcome) -> tuple[str, ...]:
+        margins = [each.margin(outcome) for each in self.measured]
+        kept = [getattr(outcome, name) for name in KEPT]
+        return (*margins, *(json.dumps(each) if isinstance(each, tuple) else str(each) for each in kept))
 
     def loaded(self, values: Sequence[Value | None]) -> ProgramRun:
         """Load the program into a drive with these values. Raises Diagnostic."""
@@ -256,17 +297,19 @@ class Bench:
 
     def tried(self, case: Case) -> Result:
         number, values = case
-        job = self.job
+        job, cells = self.job, ("",) * len(self.columns)
         try:
             outcome = outcome_of(self.loaded(values).run(job.run, UNTIL if job.until is None else job.until))
+            cells = self._cells(outcome)
             if job.until is None and outcome.ended == "until":
-                return Result(number, CUT, f"still running after {UNTIL:g} s; --until SECONDS sets another limit")
+                what = f"still running after {UNTIL:g} s; --until SECONDS sets another limit"
+                return Result(number, CUT, what, cells)
             for index, each in enumerate(self.conditions):
                 if not each.holds(outcome):
-                    return Result(number, index, each.seen(outcome))
+                    return Result(number, index, each.seen(outcome), cells)
         except Diagnostic as problem:
-            return Result(number, REFUSED, str(problem))
-        return Result(number)
+            return Result(number, REFUSED, str(problem), cells)
+        return Result(number, cells=cells)
 
 
 @lru_cache(maxsize=4)
@@ -274,7 +317,8 @@ def bench(job: Job) -> Bench:
     load = PROGRAMS[job.language].read(job.program, job.file)
     drive: Drive = json.loads(job.drive)
     example = outcome_of(load(read_drive(drive, job.where, job.own_units)).run(job.run, 0.0))
-    return Bench(job, load, drive, tuple(parse_condition(each, example) for each in job.expects))
+    conditions = tuple(parse_condition(each, example) for each in job.expects)
+    return Bench(job, load, drive, conditions, tuple(each for each in conditions if each.has_margin))
 
 
 def chunk(job: Job, cases: Sequence[Case]) -> list[Result]:

@@ -12,7 +12,7 @@ import os
 import re
 import sys
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from itertools import islice
 from typing import TYPE_CHECKING, Any
@@ -25,7 +25,7 @@ from multidrop.shell.sweeps.trial import DIED, Case, Job, Result
 from multidrop.transports import TransportLost, Unreachable
 
 if TYPE_CHECKING:
-    from distributed import Client, Future
+    from distributed import Client, Future, as_completed
 
 
 CHUNK = 0.075
@@ -73,6 +73,13 @@ def chunks(cases: Iterator[Case], size: int) -> Iterator[list[Case]]:
 
 PATIENCE = 3.0
 """Time for the scheduler to reply, s."""
+SILENT = 30.0
+"""The time without a sign of life of any worker after which a cluster is lost, s."""
+STUCK = 600.0
+"""The time without a result after which it is, s."""
+LOOK = 3.0
+"""The time between two looks for signs of life, s."""
+WAIT = 0.1
 TRUST = (
     "the scheduler, its workers and, without TLS, all computers on the network between can run any code on this "
     "computer with your rights, because Dask unpickles what they send"
@@ -81,9 +88,9 @@ INSTALL = "pip install 'multidrop[cluster]'"
 
 
 def cluster_results(
-    job: Job, cases: Iterator[Case], address: str, interruption: Interruption, agree: Callable[[], None]
+    job: Job, rounds: Iterable[Iterator[Case]], address: str, interruption: Interruption, agree: Callable[[], None]
 ) -> Iterator[list[Result]]:
-    """Run cases on the cluster of a scheduler; yield the results of each chunk as it ends.
+    """Run rounds of cases on the cluster of a scheduler; yield the results of each chunk as it ends.
 
     `agree` is called before anything is connected; it raises Diagnostic where a person has not agreed to the address.
     Raises Unreachable, TransportLost, and Diagnostic for workers that have another multidrop or none.
@@ -91,13 +98,16 @@ def cluster_results(
     with _client(address, interruption, agree) as client, _reached(address):
         with interruption.open():
             _check_workers(client, address)
-            first = next(cases)
-            begin = time.process_time()
-            found = trial.chunk(job, [first])
-        size = max(1, round(CHUNK / max(time.process_time() - begin, 1e-6)))
-        yield found
-        if todo := list(chunks(cases, size)):
-            yield from _Work(client, job, address, interruption).results(todo)
+        size = 0
+        for cases in rounds:
+            if not size and (first := next(cases, None)) is not None:
+                with interruption.open():
+                    begin = time.process_time()
+                    found = trial.chunk(job, [first])
+                size = max(1, round(CHUNK / max(time.process_time() - begin, 1e-6)))
+                yield found
+            if todo := list(chunks(cases, max(1, size))):
+                yield from _Work(client, job, address, interruption).results(todo)
 
 
 @contextmanager
@@ -139,9 +149,12 @@ def _reached(address: str) -> Iterator[None]:
 
 
 def _check_workers(client: Client, address: str) -> None:
-    """Refuse a cluster without workers, and workers with another multidrop."""
+    """Refuse a cluster without workers, and workers with another multidrop or without a reply."""
     try:
-        found: dict[str, Any] = client.run(trial.version, on_error="return")
+        run = client._run  # `run` waits for a worker that hangs without an end
+        found: dict[str, Any] = client.sync(run, trial.version, on_error="return", callback_timeout=SILENT)
+    except TimeoutError:
+        raise TransportLost(f"{address}: a worker does not reply within {SILENT:g} s") from None
     except ImportError as problem:
         raise Diagnostic(
             f"a worker has no multidrop ({problem})", address, f"install {trial.version()} there"
@@ -185,6 +198,7 @@ class _Work:
         try:
             while of:
                 with self._interruption.open():
+                    self._wait(done)
                     future = next(done)
                     found = self._result(future, of[future])
                 del of[future]
@@ -194,16 +208,47 @@ class _Work:
                 with suppress(OSError, TimeoutError):
                     self._client.cancel(list(of))
 
+    def _wait(self, done: as_completed) -> None:
+        """Wait until a chunk is at its end. Raises TransportLost for a cluster that is lost."""
+        heard, looked = {}, time.monotonic()
+        begun = alive = looked
+        while not done.has_ready():
+            with done.thread_condition:
+                done.thread_condition.wait(WAIT)
+            if (now := time.monotonic()) - looked < LOOK:
+                continue
+            looked, last, heard = now, heard, self._heard()
+            alive = now if heard and heard != last else alive
+            if now - alive >= SILENT:
+                raise TransportLost(f"{self._address}: no worker gave a sign of life for {SILENT:g} s")
+            if now - begun >= STUCK:
+                raise TransportLost(f"{self._address}: the workers gave no result for {STUCK:g} s")
+
+    def _heard(self) -> dict[str, float]:
+        """The time at which the scheduler last heard of each worker; none if the scheduler does not reply."""
+        with suppress(OSError, TimeoutError):
+            found = self._client.sync(self._client.scheduler.identity, callback_timeout=PATIENCE)
+            return {name: each["last_seen"] for name, each in found["workers"].items()}
+        return {}
+
     def _result(self, future: Future, cases: list[Case]) -> list[Result]:
         """The results of a chunk; none if it is to run again. Raises TransportLost."""
         from distributed import KilledWorker
         from distributed.client import FutureCancelledError
 
         try:
-            found: list[Result] = future.result()
+            problem = future.exception(timeout=SILENT) if future.status == "error" else None
+            if problem is not None and not isinstance(problem, KilledWorker):
+                raise TransportLost(f"{self._address}: a worker failed: {type(problem).__name__}: {problem}")
+            found = future.result(timeout=SILENT)
+            numbers = [each.number for each in found if isinstance(each, Result)] if isinstance(found, list) else []
+            if not numbers or numbers != [number for number, _ in cases[: len(found)]]:
+                raise TransportLost(f"{self._address}: a worker replied with something else than results")
             if len(found) < len(cases):
                 self._again.append(cases[len(found) :])
-            return found
+            return list(found)
+        except TimeoutError:
+            raise TransportLost(f"{self._address}: a result was not sent within {SILENT:g} s") from None
         except FutureCancelledError:
             if self._client.status != "running":
                 raise TransportLost(f"{self._address}: the scheduler was lost") from None
