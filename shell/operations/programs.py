@@ -96,9 +96,6 @@ PROGRAM_SWEEP = Operation(
             ),
         },
         "--seed N": typed("the seed of these draws (default: 1)", default=1, type=int),
-        "--search KEY": typed(
-            "find where KEY begins to fail by halving its range, for the values of the others", default=""
-        ),
         "--run LABEL": START,
         "--until SECONDS": typed(
             "virtual seconds of a case at most; without it, a case that still runs after 60 s has failed", type=duration

@@ -190,26 +190,42 @@ class Answer:
         """The boundary in words: the values of one key at which a case fails, for those of the other."""
         if self._search:
             first = self._names.index(self._search)
-            others = [at for at in range(len(self._names)) if at != first]
+            said = self._said(first, [at for at in range(len(self._names)) if at != first])
         elif self._pair:
-            first, others = self._pair[0], self._pair[1:]
+            said = self._said(self._pair[0], self._pair[1:])
+            if all(" every " in begin for (begin, _), _ in said):  # the other key decides
+                said = self._said(self._pair[-1], self._pair[:-1])
         else:
             return
-        found: dict[str, dict[str, bool]] = {}
-        axes = {other: self._axes[other].merged(MOST, STRETCHES) for other in others}
+        if len({words for words, _ in said}) == 1:
+            begin, end = said[0][0]
+            yield f"{begin.partition(' at every ')[0]} everywhere" if " every " in begin else f"{begin}{end}"
+            return
+        for (begin, end), same in groupby(said, key=lambda each: each[0]):
+            for place in _joined([place for _, place in same]):
+                yield f"{begin} at {place}{end}"
+
+    def _said(self, first: int, others: Sequence[int]) -> list[tuple[tuple[str, str], list[str]]]:
+        """Words for the values of a key that fail, at each place: the names and values of other keys."""
+        found: dict[tuple[str, ...], dict[str, bool]] = {}
+        axes = [self._axes[other].merged(MOST, STRETCHES) for other in others]
         for texts, ok, _ in self._cases:
-            at = ", ".join(f"{axis.name} {axis.at[texts[other]]}" for other, axis in axes.items())
-            fails = found.setdefault(at, {})
+            place = tuple(axis.at[texts[other]] for other, axis in zip(others, axes, strict=True))
+            fails = found.setdefault(place, {})
             fails[texts[first]] = fails.get(texts[first], False) or not ok
         name = self._names[first]
-        said = [(_words(name, fails), at) for at, fails in found.items()]
-        for (begin, end), same in groupby(said, key=lambda each: each[0]):
-            places = [at for _, at in same if at]
-            if len(others) == 1:  # the name of the key once
-                places = [each.removeprefix(f"{self._names[others[0]]} ") for each in places]
-                places = [f"{self._names[others[0]]} {', '.join(places if len(places) < 4 else [_stretch(places)])}"]
-            for place in places or [""]:
-                yield f"{begin}{f' at {place}' * bool(place)}{end}"
+        pairs = ([f"{axis.name} {value}" for axis, value in zip(axes, place, strict=True)] for place in found)
+        return [(_words(name, fails), pair) for fails, pair in zip(found.values(), pairs, strict=True)]
+
+
+def _joined(places: Sequence[Sequence[str]]) -> Iterator[str]:
+    """Words for places; those of one key in one, which is named once."""
+    if len(places[0]) != 1:
+        yield from map(", ".join, places)
+        return
+    name = places[0][0].partition(" ")[0]
+    values = [each.removeprefix(f"{name} ") for (each,) in places]
+    yield f"{name} {', '.join(values if len(values) < 4 else [_stretch(values)])}"
 
 
 def _words(name: str, fails: Mapping[str, bool]) -> tuple[str, str]:

@@ -117,6 +117,39 @@ def test_nothing_of_a_hostile_cluster_runs_here_before_a_person_has_agreed_to_it
     assert ran_here.exists()  # the sentence is true: agreeing lets their code run
 
 
+@pytest.mark.slow
+@pytest.mark.fork
+@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGSTOP])
+def test_a_cluster_whose_workers_die_or_hang_is_lost_after_a_time_that_is_named(
+    folder: Path, multidrop: Command, monkeypatch: pytest.MonkeyPatch, number: signal.Signals
+) -> None:
+    """What was done before is in the table, and a sweep of this machine goes on with it."""
+    pytest.importorskip("distributed", reason="the extra cluster is not installed")
+    monkeypatch.setattr(workers, "SILENT", 2.0)
+    monkeypatch.setattr(workers, "LOOK", 0.2)
+    monkeypatch.setattr(workers, "PATIENCE", 1.0)
+    wait, hit = workers._Work._wait, []
+
+    with cluster(folder, "dask_cluster.py", "1") as address:
+        scheduler = subprocess.run(["pgrep", "-f", str(folder / "address")], capture_output=True, text=True).stdout
+        children = subprocess.run(["pgrep", "-P", scheduler.split()[0]], capture_output=True, text=True).stdout.split()
+
+        def struck(self: workers._Work, done: object) -> None:
+            if not hit:
+                for each in children:
+                    os.kill(int(each), number)
+            hit.append(1)
+            wait(self, done)  # type: ignore[arg-type]
+
+        monkeypatch.setattr(workers._Work, "_wait", struck)
+        lost = multidrop("program", "sweep", "go.mxt", *WALLS, "--yes", "--cluster", address, "--csv", "some.csv")
+        for each in children if number == signal.SIGSTOP else []:
+            os.kill(int(each), signal.SIGCONT)
+    assert lost.returncode == 3 and "no worker gave a sign of life for 2 s" in lost.stderr, lost
+    whole = multidrop("program", "sweep", "go.mxt", *WALLS, "--jobs", "1", "--resume", "some.csv")
+    assert whole.returncode == 1 and "120 cases, 60 failed" in whole.stdout and "in the file already" in whole.stderr
+
+
 def test_an_address_is_asked_for_once_at_a_terminal_and_a_yes_is_kept(
     folder: Path, multidrop: Command, monkeypatch: pytest.MonkeyPatch
 ) -> None:
