@@ -62,8 +62,8 @@ def run(chosen: argparse.Namespace) -> int:
         try:
             if chosen.cluster:
                 agree = partial(_agree, chosen.cluster, chosen.yes, workers.TRUST, interruption)
-                cases = (map(plan.case, numbers) for numbers in report.rounds())
-                report.take_all(workers.cluster_results(plan.job, cases, chosen.cluster, interruption, agree))
+                rounds = (map(plan.case, todo) for todo in report.rounds())
+                report.take_all(workers.cluster_results(plan.job, rounds, chosen.cluster, interruption, agree))
             else:
                 jobs = chosen.jobs or workers.cores()
                 for todo in report.rounds():

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from decimal import Decimal
 from html import escape
@@ -105,17 +105,17 @@ class Answer:
             texts = _sorted(texts)
         return {each: each for each in texts}
 
-    def _tallies(self, key: Callable[[tuple[str, ...]], str]) -> dict[str, Tally]:
+    def _tallies(self, index: int, axis: Axis) -> dict[str, Tally]:
         found: dict[str, Tally] = {}
         for texts, ok, margins in self._cases:
-            found.setdefault(key(texts), Tally()).take(ok, margins)
+            found.setdefault(axis.at[texts[index]], Tally()).take(ok, margins)
         return found
 
     def _two(self, seeds: Sequence[bool]) -> list[int]:
         """The two keys that matter most, as they are written: those whose values differ most in what passes."""
         spread = {}
         for index, axis in enumerate(self._axes):
-            shares = [each.passed / each.cases for each in self._tallies(lambda texts, i=index: texts[i]).values()]
+            shares = [each.passed / each.cases for each in self._tallies(index, axis).values()]
             if len(axis.at) > 1 and not seeds[index]:
                 spread[index] = max(shares) - min(shares)
         return sorted(sorted(spread, key=lambda index: -spread[index])[:2])
@@ -125,11 +125,14 @@ class Answer:
         lines = []
         for index, each in enumerate(self._axes):
             axis = each.merged(MOST, STRETCHES)
-            tallies = self._tallies(lambda texts, i=index, at=axis.at: at[texts[i]])
+            tallies = self._tallies(index, axis)
             lines += [(f"{axis.name}={label}", tallies[label]) for label in axis.labels]
         width = max((len(name) for name, _ in lines), default=0)
         for name, tally in lines:
-            margins = "; ".join(f"{least:.4g} of {condition}" for condition, least in tally.margins.items())
+            margins = "; ".join(
+                f"{least:{'.0f' if abs(least) >= 1000 else '.4g'}} of {condition}"
+                for condition, least in tally.margins.items()
+            )
             found = f"{name:{width}}  {tally.percent:3}%  {tally.passed} of {tally.cases}"
             yield found + f"  margin {margins}" * bool(margins)
 

@@ -210,7 +210,8 @@ class _Work:
 
     def _wait(self, done: as_completed) -> None:
         """Wait until a chunk is at its end. Raises TransportLost for a cluster that is lost."""
-        heard, looked = {}, time.monotonic()
+        heard: dict[str, float] = {}
+        looked = time.monotonic()
         begun = alive = looked
         while not done.has_ready():
             with done.thread_condition:

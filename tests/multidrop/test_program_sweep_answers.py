@@ -55,11 +55,11 @@ def ran(monkeypatch: pytest.MonkeyPatch) -> list[int]:
 
 def test_each_value_has_a_line_then_come_the_map_and_the_boundary(sweep: Sweep) -> None:
     assert sweep(*GRID).stdout.splitlines()[:12] == [
-        "b.load=0            33%  1 of 3  margin -43384 of position == 51200 +- 2",
-        "b.load=0.1          33%  1 of 3  margin -43384 of position == 51200 +- 2",
-        "b.load=0.2          33%  1 of 3  margin -43384 of position == 51200 +- 2",
-        "b.stall_at=100000    0%  0 of 3  margin -43384 of position == 51200 +- 2",
-        "b.stall_at=200000    0%  0 of 3  margin -35571 of position == 51200 +- 2",
+        "b.load=0            33%  1 of 3  margin -43385 of position == 51200 +- 2",
+        "b.load=0.1          33%  1 of 3  margin -43385 of position == 51200 +- 2",
+        "b.load=0.2          33%  1 of 3  margin -43385 of position == 51200 +- 2",
+        "b.stall_at=100000    0%  0 of 3  margin -43385 of position == 51200 +- 2",
+        "b.stall_at=200000    0%  0 of 3  margin -35573 of position == 51200 +- 2",
         "b.stall_at=700000  100%  3 of 3  margin 2 of position == 51200 +- 2",
         "per cent that passed: b.load down, b.stall_at across",
         "b.load 100000 200000 700000",
@@ -102,14 +102,14 @@ def test_a_table_has_all_cases_with_seed_and_versions(sweep: Sweep, tmp_path: Pa
         "b.load": "0",
         "b.stall_at": "100000",
         "failed": "position == 51200 +- 2",
-        "why": "position == 7814",
-        "position": "7814",
+        "why": "position == 7813",
+        "position": "7813",
         "errors": "[86]",
         "ended": "E",
     }
     assert first["seed"] == "1" and first["multidrop"] == trial.version() and first["python"]
     assert first["vary"] == "b.load=0..0.2:0.1 b.stall_at=100000,200000,700000"
-    assert float(first["margin of position == 51200 +- 2"]) == 2 - (51200 - 7814)
+    assert float(first["margin of position == 51200 +- 2"]) == 2 - (51200 - 7813)
 
 
 def test_parquet_has_the_same_rows_with_types_and_is_resumed_too(sweep: Sweep, tmp_path: Path, ran: list[int]) -> None:
@@ -117,12 +117,12 @@ def test_parquet_has_the_same_rows_with_types_and_is_resumed_too(sweep: Sweep, t
     sweep(*GRID, "--csv", "all.csv", "--parquet", "all.parquet")
     table = pa.read_table(tmp_path / "all.parquet").to_pylist()
     assert [list(each) for each in table[:1]] == [list(rows(tmp_path / "all.csv")[0])]
-    assert (table[0]["b.load"], table[0]["ok"], table[0]["position"], table[8]["ok"]) == (0.0, False, 7814, True)
+    assert (table[0]["b.load"], table[0]["ok"], table[0]["position"], table[8]["ok"]) == (0.0, False, 7813, True)
     ran.clear()
     again = sweep(*GRID, "--resume", "all.parquet", "--csv", "again.csv")
     assert again.stderr == "9 cases of 9 are in the file already\n"
     assert (tmp_path / "again.csv").read_bytes() == (tmp_path / "all.csv").read_bytes()
-    assert not set(ran) - {1, 2}  # the simplest worlds
+    assert not set(ran) & {3, 6, 9}  # it runs for the simplest worlds only
 
 
 def test_without_pyarrow_nothing_runs(sweep: Sweep, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
@@ -148,8 +148,7 @@ def test_a_killed_sweep_goes_on_where_it_was(
         context.setattr(trial.Bench, "tried", killed)
         context.setattr(results, "PERIOD", 0.0)
         context.setattr(results, "SHARE", 0)
-        with pytest.raises(SystemExit):
-            sweep(*GRID, "--resume", "part.csv")
+        assert sweep(*GRID, "--resume", "part.csv").returncode == 137
     assert [each["case"] for each in rows(tmp_path / "part.csv")] == ["1", "2", "3", "4"]
     ran.clear()
     done = sweep(*GRID, "--resume", "part.csv")
@@ -225,12 +224,10 @@ def test_a_file_that_cannot_be_a_table_is_one_line_and_nothing_runs(sweep: Sweep
 def test_a_table_that_cannot_be_written_any_more_is_said(
     sweep: Sweep, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    written = results.write_atomically
-
     def full(path: Path, data: bytes) -> None:
         if data.count(b"\n") > 4:
             raise OSError(28, "No space left on device")
-        written(path, data)
+        atomic.write_atomically(path, data)
 
     monkeypatch.setattr(results, "write_atomically", full)
     done = sweep(*GRID, "--csv", "all.csv")
@@ -315,8 +312,8 @@ def test_other_boundaries_in_words(failing: str, words: str) -> None:
 
 
 def test_the_boundary_of_each_value_of_the_other_key(sweep: Sweep) -> None:
-    expect = ("--expect", "virtual_s < 1.2")
-    vary = ("--vary", "b.A=300000..900000:100000", "--vary", "b.VM=200000,400000,600000,800000")
+    expect = ("--expect", "virtual_s < 1.28")
+    vary = ("--vary", "b.A=300000..900000:100000", "--vary", "b.VM=60000,90000,120000,150000")
     said = [line for line in sweep(*vary, *expect).stdout.splitlines() if "b.A" in line and " at b.VM " in line]
     assert len(said) > 1 and all(line.startswith(("fails ", "passes ")) for line in said)
     assert any(line.startswith("fails from b.A ") and line.endswith(" down") for line in said)
@@ -326,7 +323,7 @@ def test_many_values_come_as_stretches(sweep: Sweep) -> None:
     lines = [line.split() for line in sweep("--vary", "seed=1..201", "--vary", "b.stall_at=1").stdout.splitlines()]
     assert (
         lines[0]
-        == ["seed=1..11", "0%", "0", "of", "11", "margin", "-51197", "of", "position", "==", "51200"] + lines[0][11:]
+        == ["seed=1..11", "0%", "0", "of", "11", "margin", "-51198", "of", "position", "==", "51200"] + lines[0][11:]
     )
     assert sum(each[0].startswith("seed=") for each in lines) == 19
 

@@ -11,7 +11,7 @@ import pytest
 
 from multidrop.dialects import Diagnostic
 from multidrop.shell.signals import Interruption
-from multidrop.shell.sweeps import workers
+from multidrop.shell.sweeps import trial, workers
 from multidrop.shell.sweeps.trial import Case, Job, Result
 from multidrop.transports import TransportLost
 
@@ -38,7 +38,7 @@ def test_a_scheduler_that_ends_in_the_middle_of_a_question_is_lost(monkeypatch: 
 
     monkeypatch.setattr(workers, "_client", dying)
     monkeypatch.setattr(workers, "_check_workers", lambda *_: None)
-    monkeypatch.setattr(workers.trial, "chunk", run)
+    monkeypatch.setattr(trial, "chunk", run)
     cases: Iterator[Case] = iter([(number, ()) for number in (1, 2, 3)])
     found: list[Result] = []
     job = Job("", "", "", "", "", (), ())
@@ -112,7 +112,7 @@ def test_a_cluster_that_gives_no_result_is_lost_after_a_time(
     monkeypatch.setattr("distributed.as_completed", client)
     monkeypatch.setattr(workers, "time", SimpleNamespace(monotonic=lambda: client.now))
     with Interruption() as interruption:
-        work = workers._Work(client, Job("", "", "", "", "", (), ()), "tcp://h:1", interruption)  # type: ignore[arg-type]
+        work = workers._Work(client, Job("", "", "", "", "", (), ()), "tcp://h:1", interruption)
         with pytest.raises(TransportLost, match=f"^tcp://h:1: {what}$"):
             list(work.results([[(1, ())], [(2, ())]]))
     assert seconds <= client.now < seconds + 3 * workers.LOOK and client.cancelled == 2
@@ -126,15 +126,15 @@ def test_a_reply_that_is_no_result_ends_the_sweep(found: object) -> None:
     future = SimpleNamespace(status="finished", result=lambda timeout: found)
     with Interruption() as interruption:
         job = Job("", "", "", "", "", (), ())
-        work = workers._Work(SimpleNamespace(), job, "tcp://h:1", interruption)  # type: ignore[arg-type]
+        work = workers._Work(SimpleNamespace(), job, "tcp://h:1", interruption)
         with pytest.raises(TransportLost, match="^tcp://h:1: a worker replied with something else than results$"):
-            work._result(future, [(1, ()), (2, ())])  # type: ignore[arg-type]
+            work._result(future, [(1, ()), (2, ())])
 
 
 def test_an_exception_of_a_worker_is_one_line() -> None:
     future = SimpleNamespace(status="error", exception=lambda timeout: ImportError("no module x"))
     with Interruption() as interruption:
         job = Job("", "", "", "", "", (), ())
-        work = workers._Work(SimpleNamespace(), job, "tcp://h:1", interruption)  # type: ignore[arg-type]
+        work = workers._Work(SimpleNamespace(), job, "tcp://h:1", interruption)
         with pytest.raises(TransportLost, match="^tcp://h:1: a worker failed: ImportError: no module x$"):
-            work._result(future, [(1, ())])  # type: ignore[arg-type]
+            work._result(future, [(1, ())])
