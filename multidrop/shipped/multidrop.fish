@@ -87,7 +87,7 @@ function _shtab_multidrop_using
 end
 
 set -g _shtab_multidrop_commands demo tui shell send run sim program 'program check' 'program test' 'program sweep' 'program convert' 'program list' 'program diff' 'program upload' 'program download' params 'params backup' 'params diff' 'params restore' macro 'macro list' 'macro show' 'macro play' 'macro edit' 'macro describe' 'macro rename' 'macro copy' 'macro delete' 'macro key' 'macro import' 'macro export' plot poll publish share snapshot certify ports relay scan rescue log 'log show' 'log follow' 'log grep' 'log judge' 'log replay' config 'config path' 'config show' 'config check' help lsp report completion
-set -g _shtab_multidrop_opts_with_value --against --allow --baud --break --cell --cluster --compare --dialect --drive --every --expect --jobs --join --junit --language --on --other --output --page --personality --random --rate --rfc2217 --role --rows --run --save --seed --serve --set --speed --tcp --times --to --until --vary --watch --with -o
+set -g _shtab_multidrop_opts_with_value --against --allow --baud --break --cell --cluster --compare --csv --dialect --drive --every --expect --jobs --join --junit --language --on --other --output --page --parquet --personality --random --rate --resume --rfc2217 --role --rows --run --save --search --seed --serve --set --speed --svg --tcp --times --to --until --vary --watch --with -o
 
 complete -c multidrop -e
 complete -c multidrop -f
@@ -171,6 +171,7 @@ complete -c multidrop -n '_shtab_multidrop_using program sweep' -l cell -xka "(_
 complete -c multidrop -n '_shtab_multidrop_using program sweep' -l vary -x -d 'KEY: DRIVE.KEY, KEY with one drive (of its world, else a parameter), or seed; VALUES: a,b,c or A..B or A..B:STEP; may be repeated'
 complete -c multidrop -n '_shtab_multidrop_using program sweep' -l expect -x -d 'a comparison with position, errors, prints, virtual_s or ended; all must hold; may be repeated (default: errors == [])'
 complete -c multidrop -n '_shtab_multidrop_using program sweep' -l random -x -d 'draw N cases, in place of all'
+complete -c multidrop -n '_shtab_multidrop_using program sweep' -l search -x -d 'find where KEY begins to fail by halving its range, for the values of the others'
 complete -c multidrop -n '_shtab_multidrop_using program sweep' -l seed -x -d 'the seed of these draws (default: 1)'
 complete -c multidrop -n '_shtab_multidrop_using program sweep' -l run -x -d 'the label or program to execute (default: its own start)'
 complete -c multidrop -n '_shtab_multidrop_using program sweep' -l until -x -d 'virtual seconds of a case at most; without it, a case that still runs after 60 s has failed'
@@ -179,6 +180,10 @@ complete -c multidrop -n '_shtab_multidrop_using program sweep' -l cluster -x -d
 complete -c multidrop -n '_shtab_multidrop_using program sweep' -l yes -d 'answer every question with yes beforehand'
 complete -c multidrop -n '_shtab_multidrop_using program sweep' -l json -d 'print one JSON object a case, and a summary'
 complete -c multidrop -n '_shtab_multidrop_using program sweep' -l junit -xka "(__fish_complete_path (commandline -ct))" -d 'write the cases to a JUnit XML file'
+complete -c multidrop -n '_shtab_multidrop_using program sweep' -l csv -xka "(__fish_complete_path (commandline -ct))" -d 'write a table with a row for each case: values, result, seed, versions'
+complete -c multidrop -n '_shtab_multidrop_using program sweep' -l parquet -xka "(__fish_complete_path (commandline -ct))" -d 'write the same table as Parquet'
+complete -c multidrop -n '_shtab_multidrop_using program sweep' -l resume -xka "(__fish_complete_path (commandline -ct))" -d 'take the results in such a table, run the other cases, and keep all in it'
+complete -c multidrop -n '_shtab_multidrop_using program sweep' -l svg -xka "(__fish_complete_path (commandline -ct))" -d 'draw what passed at the values of two keys'
 complete -c multidrop -n '_shtab_multidrop_using program sweep' -l no-config -d 'read no configuration file'
 complete -c multidrop -n '_shtab_multidrop_using program sweep; and test $_shtab_multidrop_npos -eq 0' -ka "(__fish_complete_path (commandline -ct))" -d 'MCode (.mxt, .txt) or A-SCRIPT (.prg, .asc) or TMCL (.tmc)'
 complete -c multidrop -n '_shtab_multidrop_using program; and test $_shtab_multidrop_npos -eq 0' -a convert -d 'Make a program file into one for other drives, name each change, and run both beside each other.'
