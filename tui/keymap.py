@@ -20,7 +20,7 @@ from multidrop.dialects import Diagnostic
 from multidrop.dialects.text import visible
 from multidrop.macros import Macro, MacroStore
 from multidrop.macros.model import FIRST_PAGE, KEYS, describe_clash, page_order
-from multidrop.tui.sheets import NONE
+from multidrop.tui.key_table import NONE
 from multidrop.tui.text import key_words
 
 FIXED = {"escape", "enter", "tab", "space", "up", "down", "left", "right", "backspace", "delete"}

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from multidrop.tui.key_table import SHEETS, STOP
-from multidrop.tui.sheets import Key, shown_key
+from multidrop.tui.key_table import SHEETS, STOP, Key, shown_key
 
 PAGE = Path(__file__).parents[2] / "docs" / "screen.md"
 BEGIN, END = "<!-- keys: made by tests/support/key_docs.py -->\n", "<!-- end of the keys -->\n"

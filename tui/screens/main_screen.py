@@ -13,11 +13,10 @@ from textual.containers import Horizontal, Vertical
 from textual.geometry import Size
 
 from multidrop.shell.roles import Filter
-from multidrop.tui.key_table import bound
+from multidrop.tui.key_table import NONE, bound
 from multidrop.tui.panels.table import CONDITIONS, LAYOUTS, MOTION, PANELS, Place, Shown, fitting, side_width
 from multidrop.tui.screen_model import Record
 from multidrop.tui.screens.page import Framed
-from multidrop.tui.sheets import NONE
 from multidrop.tui.text import fit, shorter
 from multidrop.tui.widgets.bars import Banner, rule_row
 from multidrop.tui.widgets.entry import Complete, Draft, Entry, Menu, Typed
