@@ -56,58 +56,17 @@ __version__ = "0.1.0"
 if not os.path.isdir(os.path.join(__path__[0], "shell")):  # a checkout without symbolic links: the rooms lie beside
     __path__.append(os.path.dirname(os.path.abspath(__path__[0])))
 _PLACES = {
-    "multidrop.api.blocking": (
-        "Drive",
-        "Events",
-        "Session",
-        "Telemetry",
-        "connect",
-    ),
-    "multidrop.api.calls": (
-        "Lost",
-        "StopReport",
-    ),
-    "multidrop.api.drives": (
-        "AsyncDrive",
-        "Limits",
-    ),
-    "multidrop.api.events": (
-        "AsyncEvents",
-        "Event",
-        "Fault",
-    ),
-    "multidrop.api.sessions": (
-        "AsyncSession",
-        "Run",
-        "connect_async",
-    ),
-    "multidrop.api.simulated": (
-        "SimulatedCell",
-        "simulate",
-    ),
-    "multidrop.api.telemetry": (
-        "AsyncTelemetry",
-        "Sample",
-        "Samples",
-        "read_rrd",
-    ),
-    "multidrop.dialects.errors": (
-        "Diagnostic",
-        "Differs",
-        "DriveError",
-        "Inexpressible",
-        "NoAnswer",
-        "Refused",
-        "Stopped",
-        "Timeout",
-        "Unreferenced",
-    ),
-    "multidrop.transports": (
-        "TransportLost",
-        "Unreachable",
-    ),
+    "multidrop.api.blocking": "Drive Events Session Telemetry connect",
+    "multidrop.api.calls": "Lost StopReport",
+    "multidrop.api.drives": "AsyncDrive Limits",
+    "multidrop.api.events": "AsyncEvents Event Fault",
+    "multidrop.api.sessions": "AsyncSession Run connect_async",
+    "multidrop.api.simulated": "SimulatedCell simulate",
+    "multidrop.api.telemetry": "AsyncTelemetry Sample Samples read_rrd",
+    "multidrop.dialects.errors": "Diagnostic Differs DriveError Inexpressible NoAnswer Refused Stopped Timeout Unreferenced",
+    "multidrop.transports": "TransportLost Unreachable",
 }
-_PUBLIC = {name: module for module, names in _PLACES.items() for name in names}
+_PUBLIC = {name: module for module, names in _PLACES.items() for name in names.split()}
 __all__ = [*_PUBLIC]
 
 
