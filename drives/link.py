@@ -10,26 +10,14 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 
 from multidrop.dialects import End, Kind, Priority, Request
-from multidrop.drives.events import (
-    BusEvent,
-    Changed,
-    Ended,
-    EventQueue,
-    Lost,
-    Notice,
-    Sent,
-    Traffic,
-    Transaction,
-    Unsolicited,
-    isolated,
-)
+from multidrop.drives import events
 from multidrop.drives.inbox import Debris, Leftovers
 from multidrop.drives.line import Finished, Line, Write
 from multidrop.drives.port_journal import GLOBAL, Departure, Keeper
 from multidrop.transports import Transport, TransportLost
 from multidrop.transports.pipe import running_loop
 
-OnAnswer = Callable[[Transaction | TransportLost], None]
+OnAnswer = Callable[[events.Transaction | TransportLost], None]
 """Called with the end of a request that was queued, in the turn of the event loop in which it ends."""
 
 
@@ -80,10 +68,10 @@ class Link:
         self.now = self._loop.time
         self._waiting: dict[int, OnAnswer] = {}
         self._advancing = self._further = False
-        self._news = EventQueue(name)
+        self._news = events.EventQueue(name)
         self.watch, self.publish = self._news.subscribe, self._news.publish
         self._timer: asyncio.TimerHandle | None = None
-        self._answering = isolated(f"a conversation on {name}")
+        self._answering = events.isolated(f"a conversation on {name}")
 
     def start(self) -> None:
         self.leftovers.opened(self.now())
@@ -118,7 +106,7 @@ class Link:
 
     def notify(self, text: str, address: str = "", warning: bool = False) -> None:
         """Publish a message for the user."""
-        self.publish(Notice(self.now(), text, address, warning))
+        self.publish(events.Notice(self.now(), text, address, warning))
 
     # Requests
 
@@ -159,7 +147,7 @@ class Link:
         self.line.wrote(data, now, whole=True)
         if data.endswith(TERMINATORS):
             self._loop.call_at(self.line.transmitted, left)
-        self.publish(Traffic(now, True, data))
+        self.publish(events.Traffic(now, True, data))
         self.advance()
         return True
 
@@ -203,8 +191,8 @@ class Link:
         """Gather what is received meanwhile."""
         heard = bytearray()
 
-        def take(event: BusEvent) -> None:
-            if isinstance(event, Traffic) and not event.outgoing:
+        def take(event: events.BusEvent) -> None:
+            if isinstance(event, events.Traffic) and not event.outgoing:
                 heard.extend(event.data)
 
         leave = self.watch(take)
@@ -224,7 +212,7 @@ class Link:
 
     def _received(self, data: bytes) -> None:
         now, self.unheard = self.now(), False
-        self._news.collect(Traffic(now, False, data))
+        self._news.collect(events.Traffic(now, False, data))
         self.line.receive(data, now)
         self.advance()
 
@@ -235,7 +223,7 @@ class Link:
             return
         if request is None:
             self.debris.stop_written(b"", self.line.transmitted)
-            self.publish(Traffic(now, True, data, stop=True))
+            self.publish(events.Traffic(now, True, data, stop=True))
             return
         # A program's lines are stored and do nothing; a part of a setting or of a question moves nothing.
         if request.kind is Kind.COMMAND or request.address in GLOBAL:
@@ -243,8 +231,8 @@ class Link:
         self.debris.request_written(data, request, now)
         if request.address:  # the trace of a lone drive repeats lines that were sent to be stored
             self.leftovers.request_written(data, now)
-        self.publish(Sent(now, request))
-        self.publish(Traffic(now, True, data))
+        self.publish(events.Sent(now, request))
+        self.publish(events.Traffic(now, True, data))
 
     def _finished(self, event: Finished) -> None:
         transaction = event.transaction
@@ -254,14 +242,14 @@ class Link:
             self.departure.arrived()
         if transaction.reply.end is End.DAMAGED:  # by a sign-on, perhaps
             self.on_unsolicited(transaction.reply.raw.decode("latin-1").splitlines())
-        self.publish(Ended(transaction.ended_at, transaction))
+        self.publish(events.Ended(transaction.ended_at, transaction))
         if transaction.reply.collided:
             self.notify(_destroyed(transaction), transaction.request.address, warning=True)
         if (on_answer := self._waiting.pop(event.ticket, None)) is not None:
             with self._answering:
                 on_answer(transaction)
 
-    def _unsolicited(self, event: Unsolicited, now: float) -> None:
+    def _unsolicited(self, event: events.Unsolicited, now: float) -> None:
         self.on_unsolicited(event.lines)
         if lines := self.debris.removed(event.lines, self.line.inbox.codec.stop_debris, now):
             codec = self.line.inbox.codec
@@ -272,7 +260,7 @@ class Link:
         if left:
             self.notify(f"left by a session before, not printed by a program: {_short(left)}", warning=True)
         if lines:
-            self.publish(Unsolicited(event.at, lines))
+            self.publish(events.Unsolicited(event.at, lines))
 
     # The end
 
@@ -281,7 +269,7 @@ class Link:
         self._held = self._held or why
         self._lose(why)
         self.advance()
-        self.publish(Changed(self.now()))
+        self.publish(events.Changed(self.now()))
         await self.transport.close()
 
     def _broke(self, error: TransportLost) -> None:
@@ -291,8 +279,8 @@ class Link:
         self._lose(error)
         self.advance()
         if known is None:
-            self.publish(Lost(self.now(), error))
-            self.publish(Changed(self.now()))
+            self.publish(events.Lost(self.now(), error))
+            self.publish(events.Changed(self.now()))
 
     def _lose(self, error: TransportLost) -> None:
         """Fail what waits; who waits for a reply learns that its request was written."""
@@ -309,7 +297,7 @@ class Link:
         """Write the stop that is still to be repeated, and fail what waits, so that every conversation ends."""
         self._orderly = not self.lost
         if self._orderly and (repeats := self.line.take_repeats()):
-            with isolated(f"the stop of {self.name}"):
+            with events.isolated(f"the stop of {self.name}"):
                 self.transport.write(repeats)
         self._lose(self.lost or TransportLost(f"{self.transport.name} is closed"))
 
@@ -322,7 +310,7 @@ class Link:
         self._keeper.close()
 
 
-def _destroyed(transaction: Transaction) -> str:
+def _destroyed(transaction: events.Transaction) -> str:
     """Say what was damaged in the time of a request, and may have been a print."""
     request, reply = transaction.request, transaction.reply
     asked = "a poll" if request.is_poll else f"'{request.text}'"

@@ -63,7 +63,9 @@ _PLACES = {
     "multidrop.api.sessions": "AsyncSession Run connect_async",
     "multidrop.api.simulated": "SimulatedCell simulate",
     "multidrop.api.telemetry": "AsyncTelemetry Sample Samples read_rrd",
-    "multidrop.dialects.errors": "Diagnostic Differs DriveError Inexpressible NoAnswer Refused Stopped Timeout Unreferenced",
+    "multidrop.dialects.errors": (
+        "Diagnostic Differs DriveError Inexpressible NoAnswer Refused Stopped Timeout Unreferenced"
+    ),
     "multidrop.transports": "TransportLost Unreachable",
 }
 _PUBLIC = {name: module for module, names in _PLACES.items() for name in names.split()}

@@ -16,20 +16,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-from multidrop.transports import Unreachable
-from multidrop.transports.performax import (
-    GONE,
-    IN,
-    OUT,
-    PACKET,
-    PRODUCT,
-    REQUEST,
-    REQUEST_TYPE,
-    STALLED,
-    TIMEOUT,
-    VENDOR,
-    Control,
-)
+from multidrop.transports import Unreachable, performax
 from multidrop.transports.serial_ports import PortInfo, holder, list_ports, natural
 
 RULE = Path(__file__).with_name("60-multidrop-usb.rules")
@@ -38,7 +25,7 @@ UNREAD = "unread"
 """In place of a device number that cannot be read."""
 _ACCESS, _NO_DEVICE, _BUSY, _TIMED_OUT, _STALL = -3, -4, -6, -7, -9
 """libusb's errors."""
-STATUS = {_NO_DEVICE: GONE, _TIMED_OUT: TIMEOUT, _STALL: STALLED}
+STATUS = {_NO_DEVICE: performax.GONE, _TIMED_OUT: performax.TIMEOUT, _STALL: performax.STALLED}
 OTHER = -5
 """The status of any other error."""
 ASKING = 100
@@ -82,7 +69,7 @@ def controllers(usb1: ModuleType, context: Any) -> list[Found]:
     """The controllers in the order of their places."""
     found = []
     for device in context.getDeviceIterator(skip_on_error=True):
-        if (device.getVendorID(), device.getProductID()) == (VENDOR, PRODUCT):
+        if (device.getVendorID(), device.getProductID()) == (performax.VENDOR, performax.PRODUCT):
             bus, ports = device.getBusNumber(), ".".join(map(str, device.getPortNumberList())) or "0"
             path = f"/dev/bus/usb/{bus:03}/{device.getDeviceAddress():03}"
             try:
@@ -98,13 +85,13 @@ def _asked(usb1: ModuleType, device: Any) -> str:
     handle = device.open()
     try:
         handle.claimInterface(0)
-        for value in (Control.OPEN, Control.FLUSH):
-            handle.controlWrite(REQUEST_TYPE, REQUEST, value, 0, b"", ASKING)
+        for value in (performax.Control.OPEN, performax.Control.FLUSH):
+            handle.controlWrite(performax.REQUEST_TYPE, performax.REQUEST, value, 0, b"", ASKING)
         with contextlib.suppress(usb1.USBErrorTimeout):
-            handle.bulkRead(IN, PACKET, ASKING)  # what an earlier session has left
-        handle.bulkWrite(OUT, b"DN\0", ASKING)
-        reply = bytes(handle.bulkRead(IN, PACKET, ASKING)).partition(b"\0")[0].decode("latin-1")
-        handle.controlWrite(REQUEST_TYPE, REQUEST, Control.CLOSE, 0, b"", ASKING)
+            handle.bulkRead(performax.IN, performax.PACKET, ASKING)  # what an earlier session has left
+        handle.bulkWrite(performax.OUT, b"DN\0", ASKING)
+        reply = bytes(handle.bulkRead(performax.IN, performax.PACKET, ASKING)).partition(b"\0")[0].decode("latin-1")
+        handle.controlWrite(performax.REQUEST_TYPE, performax.REQUEST, performax.Control.CLOSE, 0, b"", ASKING)
         return reply if re.fullmatch(r"\w+", reply, re.ASCII) else UNREAD
     finally:
         handle.close()

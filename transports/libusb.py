@@ -11,20 +11,8 @@ import contextlib
 import threading
 from typing import Any
 
-from multidrop.transports import Unreachable
+from multidrop.transports import Unreachable, performax
 from multidrop.transports.controllers import ASKING, OTHER, STATUS, chosen, controllers, library, refusal
-from multidrop.transports.performax import (
-    CANCELLED,
-    GONE,
-    IN,
-    OUT,
-    PACKET,
-    REQUEST,
-    REQUEST_TYPE,
-    STALLED,
-    TIMEOUT,
-    Control,
-)
 from multidrop.transports.pipe import in_thread
 from multidrop.transports.usb import Broken, Done, TransferFailed, UsbPipe, open_usb
 
@@ -71,19 +59,19 @@ class LibusbCarrier:
         self._thread = threading.Thread(target=self._watch, name=f"{self.name} events", daemon=True)
         self._thread.start()
 
-    def control(self, value: Control) -> int:
-        return self._begin("setControl", REQUEST_TYPE, REQUEST, value, 0, b"")
+    def control(self, value: performax.Control) -> int:
+        return self._begin("setControl", performax.REQUEST_TYPE, performax.REQUEST, value, 0, b"")
 
     def send(self, data: bytes) -> int:
-        return self._begin("setBulk", OUT, data)
+        return self._begin("setBulk", performax.OUT, data)
 
     def receive(self) -> int:
-        return self._begin("setBulk", IN, PACKET)
+        return self._begin("setBulk", performax.IN, performax.PACKET)
 
     def _begin(self, kind: str, *arguments: object) -> int:
         with self._guard:
             if self._ending:
-                raise TransferFailed(GONE)
+                raise TransferFailed(performax.GONE)
             self._last += 1
             number = self._last
             transfer = self._spare.pop() if self._spare else self._handle.getTransfer()
@@ -118,7 +106,9 @@ class LibusbCarrier:
         with contextlib.suppress(self._usb1.USBError):
             for endpoint in self._stalled:
                 self._handle.clearHalt(endpoint)
-            self._handle.controlWrite(REQUEST_TYPE, REQUEST, Control.CLOSE, 0, b"", ASKING)
+            self._handle.controlWrite(
+                performax.REQUEST_TYPE, performax.REQUEST, performax.Control.CLOSE, 0, b"", ASKING
+            )
         self._handle.close()
         self._opened.close()
 
@@ -139,15 +129,15 @@ class LibusbCarrier:
         usb1, number = self._usb1, transfer.getUserData()
         ends = {
             usb1.TRANSFER_COMPLETED: 0,
-            usb1.TRANSFER_CANCELLED: CANCELLED,
-            usb1.TRANSFER_STALL: STALLED,
-            usb1.TRANSFER_NO_DEVICE: GONE,
-            usb1.TRANSFER_TIMED_OUT: TIMEOUT,
+            usb1.TRANSFER_CANCELLED: performax.CANCELLED,
+            usb1.TRANSFER_STALL: performax.STALLED,
+            usb1.TRANSFER_NO_DEVICE: performax.GONE,
+            usb1.TRANSFER_TIMED_OUT: performax.TIMEOUT,
         }
         status = ends.get(transfer.getStatus(), OTHER)
-        if status == STALLED:
-            self._stalled |= {transfer.getEndpoint()} & {IN, OUT}
-        incoming = transfer.getEndpoint() == IN and status == 0
+        if status == performax.STALLED:
+            self._stalled |= {transfer.getEndpoint()} & {performax.IN, performax.OUT}
+        incoming = transfer.getEndpoint() == performax.IN and status == 0
         data = bytes(transfer.getBuffer()[: transfer.getActualLength()]) if incoming else b""
         with self._guard:
             self._transfers.pop(number, None)

@@ -17,24 +17,7 @@ from typing import NamedTuple
 from multidrop.dialects import Priority, Request
 from multidrop.dialects.values import UNREAD, Conditions
 from multidrop.drives.events import BusEvent, Conditioned, Ended, Sample, Sent, Silent, Traffic, Unsolicited, Valued
-from multidrop.shell.events import (
-    By,
-    Bytes,
-    Entered,
-    Failed,
-    Notified,
-    OnBus,
-    Output,
-    Predicted,
-    Printed,
-    ProgramRead,
-    ProgramSeen,
-    Progressed,
-    SessionEvent,
-    SettingsRead,
-    StateChanged,
-    TwinEvent,
-)
+from multidrop.shell import events
 from multidrop.shell.line_syntax import EVERYONE
 from multidrop.tui.curves.chart import Look
 from multidrop.tui.curves.samples import Traces
@@ -260,30 +243,30 @@ class ScreenModel:
         """The progress of the job that runs, in words."""
         self._current, self._opened = current, opened
 
-    def take(self, event: SessionEvent) -> None:
+    def take(self, event: events.SessionEvent) -> None:
         match event:
-            case OnBus():
+            case events.OnBus():
                 self._on_bus(event)
-            case StateChanged():
+            case events.StateChanged():
                 self.changed = True
-            case Entered():
+            case events.Entered():
                 if event.bus:
                     self._touch(self.bus(event.bus), event.address, event.at)
                     if event.address not in EVERYONE and not event.line.startswith("/"):
                         self.bus(event.bus).readout(event.address).sent = event.line, event.at
-                mine = event.by is By.OPERATOR
+                mine = event.by is events.By.OPERATOR
                 record = Record(event.at, event.address, ">" if mine else "»", event.line, mine=mine)
                 self._of_drive(event.bus, record)
-            case Printed():
-                record = Record(event.at, event.address, "", event.text, mine=event.by is By.OPERATOR)
+            case events.Printed():
+                record = Record(event.at, event.address, "", event.text, mine=event.by is events.By.OPERATOR)
                 self._of_drive(event.bus, record)
-            case Output():
+            case events.Output():
                 self.page("").append(Record(event.at, "", "", event.text, columns=event.columns))
-            case Notified():
+            case events.Notified():
                 if event.warning:
                     self.trouble = event.text
                 self.page(event.bus).append(Record(event.at, "", "!" if event.warning else ".", event.text))
-            case Failed():
+            case events.Failed():
                 self.trouble = event.text
                 if event.bus and event.address:
                     readout = self.bus(event.bus).readout(event.address)
@@ -291,35 +274,35 @@ class ScreenModel:
                     if event.code is not None:
                         readout.failure = event.text[max(0, event.text.find("error ")) :], event.at
                 explained = "" if event.code is None else f"/help {event.code}"
-                mine = event.by is By.OPERATOR
+                mine = event.by is events.By.OPERATOR
                 self._of_drive(event.bus, Record(event.at, event.address, "x", event.text, mine=mine, help=explained))
-            case Bytes():
+            case events.Bytes():
                 mark = "↑" if event.outgoing else "↓"
                 rows = [Record(event.at, "", mark, row, columns=True, mine=False) for row in event.rows]
                 self.page(event.bus).extend(rows)
-            case Progressed():
+            case events.Progressed():
                 self.progress = "" if event.over else event.text
-            case ProgramRead():
+            case events.ProgramRead():
                 program = self.bus(event.bus).readout(event.address).program
                 program.lines, program.read_at = event.lines, event.at
-            case ProgramSeen():
+            case events.ProgramSeen():
                 program = self.bus(event.bus).readout(event.address).program
                 program.line, program.phase, program.seen_at = event.line, event.phase, event.at
                 program.break_point = event.break_point
-            case SettingsRead():
+            case events.SettingsRead():
                 readout = self.bus(event.bus).readout(event.address)
                 readout.settings, readout.settings_at = event.readings, event.at
 
-    def quiet(self, event: SessionEvent) -> bool:
+    def quiet(self, event: events.SessionEvent) -> bool:
         """True if an event alone is not a reason to paint: bytes on the wire, or values that are those before."""
-        if not isinstance(event, OnBus):
+        if not isinstance(event, events.OnBus):
             return False
         inner = event.event
         if isinstance(inner, Sample):
             return self.bus(event.bus).readout(inner.address).repeats(inner)
         if isinstance(inner, Conditioned):
             return self.bus(event.bus).readout(inner.address).recurs(inner)
-        if isinstance(inner, Predicted):
+        if isinstance(inner, events.Predicted):
             return self.bus(event.bus).readout(inner.address).predicted(inner)
         return isinstance(inner, Traffic | Sent | Ended)
 
@@ -361,7 +344,7 @@ class ScreenModel:
         for readout in touched:
             readout.touched = at
 
-    def _on_bus(self, event: OnBus) -> None:
+    def _on_bus(self, event: events.OnBus) -> None:
         inner = event.event
         if isinstance(inner, Sample | Valued):
             self.traces.take(event.bus, inner)
@@ -373,8 +356,8 @@ class ScreenModel:
             for each in happened:
                 mark = "!" if each.warning else "."
                 self._of_drive(event.bus, Record(inner.at, inner.address, mark, each.text, help=each.help))
-        elif isinstance(inner, TwinEvent):
-            if isinstance(inner, Predicted):
+        elif isinstance(inner, events.TwinEvent):
+            if isinstance(inner, events.Predicted):
                 self.traces.predict(event.bus, inner)
             self.bus(event.bus).readout(inner.address).compare(inner)
         elif self.bus(event.bus).traffic.take(inner):

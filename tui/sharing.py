@@ -15,19 +15,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from multidrop.drives.events import Conditioned, Sample, Silent, Valued
-from multidrop.shell.events import (
-    Agreed,
-    Diverged,
-    Entered,
-    OnBus,
-    Predicted,
-    ProgramRead,
-    ProgramSeen,
-    Progressed,
-    SessionEvent,
-    StateChanged,
-    TwinEnded,
-)
+from multidrop.shell import events
 from multidrop.shell.roles import Series
 from multidrop.shell.stop_report import Found
 from multidrop.shell.watching.wire import Dropped, Heard, Item, Now, line
@@ -52,13 +40,13 @@ SAMPLES = 1000
 """Samples of each axis for his plots."""
 AT_ONCE = 250
 """Items of a line to him."""
-SERIES = (Sample, Valued, Predicted)
+SERIES = (Sample, Valued, events.Predicted)
 """Values of which a plot shows many."""
-ON_BUS = (*SERIES, Silent, Conditioned, Diverged, Agreed, TwinEnded)
+ON_BUS = (*SERIES, Silent, Conditioned, events.Diverged, events.Agreed, events.TwinEnded)
 """Values that are events of a bus."""
-LASTING = (*ON_BUS, ProgramRead, ProgramSeen)
+LASTING = (*ON_BUS, events.ProgramRead, events.ProgramSeen)
 """Events of which a watcher that comes needs the last."""
-VALUES = (*LASTING, Entered, Progressed)
+VALUES = (*LASTING, events.Entered, events.Progressed)
 
 
 class SharedDrive(NamedTuple):
@@ -191,11 +179,11 @@ class Feed:
 
     # What happens in the session
 
-    def _take(self, event: SessionEvent) -> None:
-        if isinstance(event, StateChanged):
+    def _take(self, event: events.SessionEvent) -> None:
+        if isinstance(event, events.StateChanged):
             self._changed = True
             return
-        value, bus = (event.event, event.bus) if isinstance(event, OnBus) else (event, getattr(event, "bus", ""))
+        value, bus = (event.event, event.bus) if isinstance(event, events.OnBus) else (event, getattr(event, "bus", ""))
         if not isinstance(value, VALUES):
             return
         item = Item(value, bus)

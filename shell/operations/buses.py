@@ -4,23 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from multidrop.shell.operations.arguments import (
-    BEYOND,
-    JSON,
-    JUNIT,
-    NO_RECONNECT,
-    SUMMED,
-    WHAT,
-    YES,
-    allowed,
-    any_baud,
-    baud,
-    dialect,
-    freed_dialect,
-    named_value,
-    role_url,
-    speed,
-)
+from multidrop.shell.operations import arguments
 from multidrop.shell.operations.operation import Arguments, Operation, typed
 from multidrop.simulator import sim_words
 
@@ -29,17 +13,17 @@ if TYPE_CHECKING:
     from multidrop.simulator.serving.running import RunningFloor
 
 SHOWN: Arguments = {
-    "[URL ...]": WHAT,
+    "[URL ...]": arguments.WHAT,
     "[--raw | --twin]": {
         "--raw": "look for no drives: bytes both ways, with times and in hex",
         "--twin": "run a simulated twin beside each drive; warn of differences",
     },
-    "--no-reconnect": NO_RECONNECT,
+    "--no-reconnect": arguments.NO_RECONNECT,
 }
 SEARCHED: Arguments = {
     "url=PORT-OR-URL": "the port to search; its baud rate is tried first",
-    "--baud N": typed("this baud rate only", type=baud),
-    "--dialect": dialect,
+    "--baud N": typed("this baud rate only", type=arguments.baud),
+    "--dialect": arguments.dialect,
     "--json": "print one JSON object a drive",
 }
 
@@ -95,8 +79,8 @@ SHELL = Operation(
     examples=["shell sim:", "shell /dev/ttyUSB0?drives=a,b", "shell sim: < lines.txt", "shell --raw /dev/ttyUSB0"],
     arguments={
         **SHOWN,
-        "--yes": YES,
-        "--beyond": BEYOND,
+        "--yes": arguments.YES,
+        "--beyond": arguments.BEYOND,
     },
 )
 SEND = Operation(
@@ -105,11 +89,11 @@ SEND = Operation(
     run="lines.send",
     examples=['send sim:#press "@a MR 51200" "/wait stopped" "@a PR P"', 'send press "PR AL"'],
     arguments={
-        "URL": WHAT,
+        "URL": arguments.WHAT,
         "LINE ...": "text for a drive, @ADDR TEXT, or a /verb",
-        "--json": SUMMED,
-        "--yes": YES,
-        "--beyond": BEYOND,
+        "--json": arguments.SUMMED,
+        "--yes": arguments.YES,
+        "--beyond": arguments.BEYOND,
     },
 )
 RUN = Operation(
@@ -124,14 +108,14 @@ RUN = Operation(
     arguments={
         "SCRIPT": "a file of lines as typed at the prompt, or a Python program (.py); -: standard input",
         "--on URL ...": "what to open; may be repeated",
-        "--set NAME=VALUE ...": typed("the value of {NAME} in a line", type=named_value),
+        "--set NAME=VALUE ...": typed("the value of {NAME} in a line", type=arguments.named_value),
         "--role NAME=URL ...": typed(
-            "open a URL as the bus NAME, which lines address as @NAME:ADDR; may be repeated", type=role_url
+            "open a URL as the bus NAME, which lines address as @NAME:ADDR; may be repeated", type=arguments.role_url
         ),
-        "--json": SUMMED,
-        "--junit FILE": JUNIT,
-        "--yes": YES,
-        "--beyond": BEYOND,
+        "--json": arguments.SUMMED,
+        "--junit FILE": arguments.JUNIT,
+        "--yes": arguments.YES,
+        "--beyond": arguments.BEYOND,
     },
 )
 OPEN = Operation(
@@ -178,7 +162,7 @@ SCAN = Operation(
     arguments={
         **SEARCHED,
         "--all": "go on after the first drives that reply; with --dialect tmcl, ask every address and not only 1",
-        "--yes": YES,
+        "--yes": arguments.YES,
         "--save NAME": "save what was found as a connection of this name",
     },
 )
@@ -189,11 +173,11 @@ RESCUE = Operation(
     examples=["rescue /dev/ttyUSB0", "rescue /dev/ttyUSB0 --plain", "rescue COM3 --baud 9600 --dialect mcode"],
     arguments={
         **SEARCHED,
-        "--dialect": freed_dialect,
+        "--dialect": arguments.freed_dialect,
         "--all": "take every step, although other drives reply",
         "--plain": "then set EM=0, CK=0 and PY=0 in the drive, after a question",
         "--erase": "go as far as FD, which erases; it is asked about as well",
-        "--yes": YES,
+        "--yes": arguments.YES,
     },
 )
 REFERENCED = Operation(
@@ -320,10 +304,11 @@ SIM = Operation(
     arguments={
         "[CELL]": typed("a cell file (TOML)", default=None),
         "--allow PATH ...": typed(
-            "let paths of the cell lead there, too: a file or a folder outside its own; may be repeated", type=allowed
+            "let paths of the cell lead there, too: a file or a folder outside its own; may be repeated",
+            type=arguments.allowed,
         ),
         "--json": "print the endpoints as JSON objects, one a line",
-        "--speed N": typed("run time N times as fast", default=1.0, type=speed),
+        "--speed N": typed("run time N times as fast", default=1.0, type=arguments.speed),
     },
 )
 SHARE = Operation(
@@ -346,7 +331,7 @@ RELAY = Operation(
     examples=["relay /dev/ttyUSB0", "relay /dev/ttyUSB0 --baud 115200"],
     arguments={
         "PORT": "a serial port of this machine; screen: is the screen that it shares",
-        "--baud N": typed("bits/s (default: 9600)", default=9600, type=any_baud),
+        "--baud N": typed("bits/s (default: 9600)", default=9600, type=arguments.any_baud),
     },
 )
 PORTS = Operation(
@@ -354,5 +339,5 @@ PORTS = Operation(
     meaning="list the serial ports of this machine, with their stable names",
     run="serving.ports",
     examples=["ports", "ports --json"],
-    arguments={"--json": JSON},
+    arguments={"--json": arguments.JSON},
 )

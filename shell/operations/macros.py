@@ -2,16 +2,7 @@
 
 from __future__ import annotations
 
-from multidrop.shell.operations.arguments import (
-    BEYOND,
-    JUNIT,
-    SUMMED,
-    YES,
-    function_key,
-    named_value,
-    role_url,
-    rounds,
-)
+from multidrop.shell.operations import arguments
 from multidrop.shell.operations.operation import Operation, typed
 
 MACROS = Operation(
@@ -87,15 +78,15 @@ PLAY = Operation(
         "NAME": None,
         "--on URL ...": "what to open; may be repeated",
         "--role NAME=URL ...": typed(
-            "open a URL as the bus NAME, which lines address as @NAME:ADDR; may be repeated", type=role_url
+            "open a URL as the bus NAME, which lines address as @NAME:ADDR; may be repeated", type=arguments.role_url
         ),
-        "--set NAME=VALUE ...": typed("the value of {NAME} in a line", type=named_value),
-        "--times N|forever": typed("play N rounds, or until it is interrupted", default=1, type=rounds),
+        "--set NAME=VALUE ...": typed("the value of {NAME} in a line", type=arguments.named_value),
+        "--times N|forever": typed("play N rounds, or until it is interrupted", default=1, type=arguments.rounds),
         "--fast": "leave out the recorded pauses",
-        "--json": SUMMED,
-        "--junit FILE": JUNIT,
-        "--yes": YES,
-        "--beyond": BEYOND,
+        "--json": arguments.SUMMED,
+        "--junit FILE": arguments.JUNIT,
+        "--yes": arguments.YES,
+        "--beyond": arguments.BEYOND,
     },
 )
 MACRO_EDIT = Operation(
@@ -131,7 +122,7 @@ MACRO_DELETE = Operation(
     meaning="delete a macro; asks first",
     run="macros.change",
     examples=["macro delete shuttle"],
-    arguments={"NAME": None, "--yes": YES},
+    arguments={"NAME": None, "--yes": arguments.YES},
 )
 KEY = Operation(
     usage="/key F2..F12 MACRO|off [--page PAGE]",
@@ -147,7 +138,7 @@ KEY = Operation(
     run="macros.change",
     examples=["macro key F3 shuttle", "macro key F3 shuttle --page 2", "macro key F3 off"],
     arguments={
-        "key=F2..F12": typed(None, type=function_key),
+        "key=F2..F12": typed(None, type=arguments.function_key),
         "NAME|off": "off: free the key",
         "--page PAGE": typed("a number or a word (default: 1)", default="1"),
     },

@@ -19,18 +19,7 @@ from multidrop.dialects.units import Takes
 from multidrop.dialects.values import UNREAD, Conditions
 from multidrop.drives.events import Conditioned, Lost, Sample, Unsolicited, Valued
 from multidrop.drives.telemetry import MODEST, USUAL, Subscription, Telemetry, Value
-from multidrop.shell.events import (
-    Diverged,
-    Entered,
-    Failed,
-    Notified,
-    OnBus,
-    Predicted,
-    Printed,
-    SessionEvent,
-    TwinEnded,
-    TwinEvent,
-)
+from multidrop.shell import events
 from multidrop.shell.plots.file import SinkBroken
 from multidrop.shell.plots.request import TABLES, PlotTarget, shown
 from multidrop.shell.plots.rerun_calls import AGREES, COLOURS, DIFFERS, RUNS, TWIN, Batch, Curve, Sink, State
@@ -116,7 +105,7 @@ class Plot:
             self.samples += 1
             self._point(Curve(bus, read.address, "", read.word), read.at, read.value)
 
-    def predicted(self, bus: str, twin: Predicted, *, alone: bool = False) -> None:
+    def predicted(self, bus: str, twin: events.Predicted, *, alone: bool = False) -> None:
         """Take a prediction of a drive's twin; `alone`: the difference only."""
         if not self._done:
             self.samples += alone
@@ -323,11 +312,11 @@ def attach(workspace: Session, plot: Plot, series: Sequence[Series], period: flo
     return detach
 
 
-def _take(workspace: Session, plot: Plot, wanted: set[Series], buses: set[str], event: SessionEvent) -> None:
-    if not isinstance(event, OnBus):
+def _take(workspace: Session, plot: Plot, wanted: set[Series], buses: set[str], event: events.SessionEvent) -> None:
+    if not isinstance(event, events.OnBus):
         return _log(plot, buses, event)
     bus, inner = event
-    if isinstance(inner, TwinEvent):
+    if isinstance(inner, events.TwinEvent):
         return _twin(plot, wanted, bus, inner)
     if isinstance(inner, Sample) and Series(bus, inner.address) in wanted:
         plot.sample(bus, inner)
@@ -386,28 +375,31 @@ def _sparing(telemetry: Telemetry, addresses: Sequence[str]) -> Iterator[Callabl
     yield close
 
 
-def _twin(plot: Plot, wanted: set[Series], bus: str, event: TwinEvent) -> None:
+def _twin(plot: Plot, wanted: set[Series], bus: str, event: events.TwinEvent) -> None:
     whole = Series(bus, event.address) in wanted
     if not whole and Series(bus, event.address, DIFFERENCE) not in wanted:
         return
-    if isinstance(event, Predicted):
+    if isinstance(event, events.Predicted):
         plot.predicted(bus, event, alone=not whole)
-    elif isinstance(event, TwinEnded):
+    elif isinstance(event, events.TwinEnded):
         plot.twin_ended(bus, event.address, event.at)
     else:
-        said = DIFFERS if isinstance(event, Diverged) else AGREES
+        said = DIFFERS if isinstance(event, events.Diverged) else AGREES
         plot.state(bus, event.address, event.axis, TWIN, event.at, said)
 
 
-def _log(plot: Plot, buses: set[str], event: SessionEvent) -> None:
+def _log(plot: Plot, buses: set[str], event: events.SessionEvent) -> None:
     """Log an event of these buses, or of no bus (a verb)."""
-    if not isinstance(event, Entered | Printed | Failed | Notified) or event.bus not in {*buses, ""}:
+    if not isinstance(event, events.Entered | events.Printed | events.Failed | events.Notified) or event.bus not in {
+        *buses,
+        "",
+    }:
         return
-    if isinstance(event, Entered):
+    if isinstance(event, events.Entered):
         plot.text(event.bus, event.address, event.at, event.line, "command")
-    elif isinstance(event, Printed):
+    elif isinstance(event, events.Printed):
         plot.text(event.bus, event.address, event.at, event.text, "reply")
-    elif isinstance(event, Failed):
+    elif isinstance(event, events.Failed):
         plot.text(event.bus, event.address, event.at, event.text, "error")
     else:
         plot.text(event.bus, "", event.at, event.text, "note")

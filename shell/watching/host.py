@@ -23,18 +23,7 @@ from pathlib import Path
 from multidrop.dialects import Diagnostic
 from multidrop.macros.atomic import make_folder
 from multidrop.shell.threads import BoundedWriter, Loss
-from multidrop.shell.watching.wire import (
-    LONGEST_GREETING,
-    STOP,
-    Dropped,
-    Garbled,
-    Heard,
-    Item,
-    greeted,
-    greeting,
-    line,
-    other_version,
-)
+from multidrop.shell.watching import wire
 
 assert sys.platform != "win32"
 
@@ -93,7 +82,7 @@ class Watcher:
                 if self._greeted():
                     self._call(self._calls.joined, self)
                     self._take_stops()
-            except (OSError, Garbled):
+            except (OSError, wire.Garbled):
                 pass  # hung up, or no watcher
             finally:
                 self.close()
@@ -104,31 +93,31 @@ class Watcher:
             self.turn_away("it is of another account")
             return False
         self._socket.settimeout(PATIENCE)
-        self._socket.sendall(greeting())
+        self._socket.sendall(wire.greeting())
         said, until = b"", time.monotonic() + PATIENCE
         while not said.endswith(b"\n"):
             data = self._socket.recv(1)  # no byte of what follows
-            if not data or len(said) > LONGEST_GREETING or time.monotonic() > until:
+            if not data or len(said) > wire.LONGEST_GREETING or time.monotonic() > until:
                 return False
             said += data
-        version, self.name = greeted(said)
-        if wrong := other_version(version, f"the program of {self.name}"):
+        version, self.name = wire.greeted(said)
+        if wrong := wire.other_version(version, f"the program of {self.name}"):
             self.turn_away(wrong)
             return False
         self._socket.settimeout(None)
         return True
 
     def _take_stops(self) -> None:
-        while (data := self._socket.recv(4096)) and not data.strip(STOP):
+        while (data := self._socket.recv(4096)) and not data.strip(wire.STOP):
             self._calls.stop_ahead()
             self._stops += len(data)
             self._call(self._calls.stop, self.name)
-            self._writer.put(line([Item(Heard(self._stops))]), keep=True)
+            self._writer.put(wire.line([wire.Item(wire.Heard(self._stops))]), keep=True)
             time.sleep(PAUSE)
 
     def _lost(self, loss: Loss) -> bytes:
         self._call(self._calls.behind, self)
-        return line([Item(Dropped(loss.count))])
+        return wire.line([wire.Item(wire.Dropped(loss.count))])
 
     def _call(self, function: Callable[..., None], *arguments: object) -> None:
         with contextlib.suppress(RuntimeError):  # the loop has ended

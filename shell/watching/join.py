@@ -15,15 +15,7 @@ from pathlib import Path
 from typing import Protocol
 
 from multidrop.dialects import Diagnostic
-from multidrop.shell.watching.wire import (
-    LONGEST_GREETING,
-    STOP,
-    WORD,
-    Garbled,
-    greeted,
-    greeting,
-    other_version,
-)
+from multidrop.shell.watching import wire
 from multidrop.transports import Unreachable
 from multidrop.transports.ssh import RELAY, FarPort
 
@@ -112,17 +104,17 @@ def _greet(connection: Connection, there: str, far: FarPort | None) -> tuple[str
         while (left := until - time.monotonic()) > 0 and len(held) < _READ:
             if not select.select([connection.fileno()], [], [], left)[0]:
                 continue
-            if not (data := connection.read(LONGEST_GREETING)):
+            if not (data := connection.read(wire.LONGEST_GREETING)):
                 break
             *lines, rest = (held := held + data).split(b"\n")
             for number, each in enumerate(lines):
-                if each.startswith(WORD.encode()):
-                    version, name = greeted(each)
-                    if wrong := other_version(version, there):
+                if each.startswith(wire.WORD.encode()):
+                    version, name = wire.greeted(each)
+                    if wrong := wire.other_version(version, there):
                         raise Unreachable(f"{there}: {wrong}")
-                    connection.write(greeting())
+                    connection.write(wire.greeting())
                     return name, b"\n".join([*lines[number + 1 :], rest])
-    except (OSError, Garbled) as problem:
+    except (OSError, wire.Garbled) as problem:
         held = held or str(problem).encode()
     except Unreachable:
         connection.close(True)
@@ -194,7 +186,7 @@ class Stops:
             self.sent += 1
             try:
                 if not self.trouble:
-                    self._connection.write(STOP)
+                    self._connection.write(wire.STOP)
             except OSError as problem:
                 self.trouble = problem.strerror or str(problem)
 

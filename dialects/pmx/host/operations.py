@@ -12,20 +12,8 @@ from multidrop.dialects.errors import Inexpressible, NoAnswer, Refused
 from multidrop.dialects.exchange import Exchange
 from multidrop.dialects.family import Hints, Motion, Referencing
 from multidrop.dialects.pmx.host.codec import FACTORY, Pmx, PmxState
+from multidrop.dialects.pmx.manual import table
 from multidrop.dialects.pmx.manual.help import suggestion
-from multidrop.dialects.pmx.manual.table import (
-    AXES,
-    LIMIT_ERROR,
-    LOOP_ERRORS,
-    MOVING,
-    grouped,
-    lookup,
-    loop_words,
-    meaning,
-    program_words,
-    status_words,
-    trouble_words,
-)
 from multidrop.dialects.scanning import WINDOW, Found, Outcome, Reach, Scan, Step
 
 # One request to a controller, and proof of its outcome.
@@ -69,12 +57,12 @@ def refusal(state: PmxState, request: Request, reply: Reply) -> Refused:
     """Describe a refusal: the reply where it says more than the command, its meaning, the remedy."""
     received, text = reply.text, request.text
     head = f"{who(state)} refused '{text}'"
-    if (found := meaning(received)) is not None:
+    if (found := table.meaning(received)) is not None:
         return Refused(f"{head}: {received}: {found[0]} ({found[1]})")
     if received != f"?{text}" and not text.startswith(received[1:]):
         return Refused(f"{head}: it received {received[1:]!r}, or does not accept it so (was the line disturbed?)")
     advice = _advice(text)
-    row = lookup(text)
+    row = table.lookup(text)
     moves = row is not None and text == text.upper() and {"place", "sign", "both"} & set(row.shapes)
     if moves:
         advice = "an axis with a limit error takes no move: /status shows it, CLRX and CLRY clear it"
@@ -83,11 +71,11 @@ def refusal(state: PmxState, request: Request, reply: Reply) -> Refused:
 
 
 def _advice(text: str) -> str:
-    if text != text.upper() and lookup(text.upper()) is not None:
+    if text != text.upper() and table.lookup(text.upper()) is not None:
         return f"it reads capitals only: {text.upper()}"
-    if " " in text and lookup(text.replace(" ", "")) is not None:
+    if " " in text and table.lookup(text.replace(" ", "")) is not None:
         return f"no spaces: {text.replace(' ', '')}"
-    row = lookup(text)
+    row = table.lookup(text)
     if row is not None and "=" in text and "W" not in row.access:
         return f"{row.name} cannot be set"
     return suggestion(text) if row is None else ""
@@ -118,7 +106,7 @@ def perform(known: PmxState, text: str) -> Procedure[tuple[str, ...]]:
 
 def check(known: PmxState, text: str) -> None:
     """Raise Inexpressible for a command with a number in groups of digits."""
-    if wrong := grouped(text):
+    if wrong := table.grouped(text):
         raise Inexpressible(f"'{text}': {wrong}; nothing was sent")
 
 
@@ -126,13 +114,13 @@ def motion(known: PmxState, priority: Priority) -> Procedure[tuple[Motion, ...]]
     """Read position, speed and status of each axis; a poll skips the speed of an axis that rests."""
     doubts: list[Request] = []
     found = []
-    for axis in AXES:
+    for axis in table.AXES:
         position = yield from number(known, f"P{axis}", priority, doubts)
         state = yield from number(known, f"MST{axis}", priority, doubts)
         speed = 0
-        if state & MOVING or priority is not Priority.POLL:
+        if state & table.MOVING or priority is not Priority.POLL:
             speed = yield from number(known, f"PS{axis}", priority, doubts)
-        found.append(Motion(position, speed, axis.lower(), trouble_words(state)))
+        found.append(Motion(position, speed, axis.lower(), table.trouble_words(state)))
     if doubts:
         yield from beyond_doubt(known, doubts[0])
     return tuple(found)
@@ -151,8 +139,8 @@ def homed(known: PmxState) -> Procedure[bool]:
 
 
 def moving(known: PmxState) -> Procedure[bool]:
-    for axis in AXES:
-        if (yield from number(known, f"MST{axis}")) & MOVING:
+    for axis in table.AXES:
+        if (yield from number(known, f"MST{axis}")) & table.MOVING:
             return True
     return False
 
@@ -166,12 +154,12 @@ def busy(known: PmxState) -> Procedure[bool]:
 
 def status(known: PmxState) -> Procedure[tuple[str, ...]]:
     lines = []
-    for axis in AXES:
+    for axis in table.AXES:
         state = yield from number(known, f"MST{axis}")
         loop = yield from number(known, f"SLS{axis}")
-        lines.append(f"{axis}: {', '.join(status_words(state))}; StepNLoop {loop_words(loop)}")
+        lines.append(f"{axis}: {', '.join(table.status_words(state))}; StepNLoop {table.loop_words(loop)}")
     for program in PROGRAMS:
-        lines.append(f"program {program}: {program_words((yield from number(known, f'SASTAT{program}')))}")
+        lines.append(f"program {program}: {table.program_words((yield from number(known, f'SASTAT{program}')))}")
     for word, what in POINTS:
         bits = yield from number(known, word)
         on = ", ".join(str(n + 1) for n in range(bits.bit_length()) if bits >> n & 1)
@@ -181,16 +169,16 @@ def status(known: PmxState) -> Procedure[tuple[str, ...]]:
 
 def troubles(known: PmxState) -> Procedure[None]:
     """Note the errors that are set, with their remedies. Clears none."""
-    for axis in AXES:
+    for axis in table.AXES:
         try:
             state = yield from number(known, f"MST{axis}")
             loop = yield from number(known, f"SLS{axis}")
         except Refused:
             continue
-        if state & LIMIT_ERROR:
-            known.note(f"{who(known)}: {axis} has a {trouble_words(state)}; CLR{axis} clears it")
-        if loop in LOOP_ERRORS:
-            known.note(f"{who(known)}: StepNLoop of {axis} is in {loop_words(loop)}; CLR{axis} clears it")
+        if state & table.LIMIT_ERROR:
+            known.note(f"{who(known)}: {axis} has a {table.trouble_words(state)}; CLR{axis} clears it")
+        if loop in table.LOOP_ERRORS:
+            known.note(f"{who(known)}: StepNLoop of {axis} is in {table.loop_words(loop)}; CLR{axis} clears it")
 
 
 # The controllers on a line: identification, and the search at one baud rate. Both only ask.
