@@ -10,7 +10,7 @@ from __future__ import annotations
 import argparse
 import os
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextvars import copy_context
 from importlib.machinery import PathFinder
 from typing import TYPE_CHECKING, Any, NoReturn
@@ -84,10 +84,10 @@ class Parser(argparse.ArgumentParser):
         if self.operation is None or self.complete:
             return
         from multidrop.shell.operations.operation import add_arguments
-        from multidrop.shell.operations.table import parts
+        from multidrop.shell.operations.table import COMMANDS
 
         self.complete = True
-        own = parts(self.operation.command)
+        own = COMMANDS.parts(self.operation.command)
         named = given[:1] and given[0] in own
         if self.operation.run and not named:
             add_arguments(self, self.operation.arguments)
@@ -97,7 +97,7 @@ class Parser(argparse.ArgumentParser):
             self.add_commands(own, given, "|".join(own), required=True)
 
     def add_commands(
-        self, commands: dict[str, Operation], given: Sequence[str], metavar: str, *, required: bool
+        self, commands: Mapping[str, Operation], given: Sequence[str], metavar: str, *, required: bool
     ) -> None:
         """Add the commands, or only the one that the first word names."""
         added = self.add_subparsers(prog=self.prog, metavar=metavar, required=required, parser_class=Parser)
@@ -186,9 +186,9 @@ def build(given: Sequence[str] = ()) -> Parser:
     _add_no_config(parser)
     parser.set_defaults(run_by="lines.start")
     if given[:1] != ["--version"]:
-        from multidrop.shell.operations.table import parts
+        from multidrop.shell.operations.table import COMMANDS
 
-        parser.add_commands(parts(""), given, "COMMAND", required=False)
+        parser.add_commands(COMMANDS.parts(""), given, "COMMAND", required=False)
     return parser
 
 
@@ -202,9 +202,9 @@ def urls() -> str:
 def _epilog(operation: Operation) -> str:
     import textwrap
 
-    from multidrop.shell.operations.table import parts
+    from multidrop.shell.operations.table import COMMANDS
 
-    examples = operation.examples or [each.examples[-1] for each in parts(operation.command).values()]
+    examples = operation.examples or [each.examples[-1] for each in COMMANDS.parts(operation.command).values()]
     lines = ["examples:", *(f"  multidrop {each}" for each in examples)]
     if operation.urls or "URL" in str([*operation.arguments.items()]):
         lines += ["", *textwrap.wrap(urls(), WIDTH, break_on_hyphens=False, break_long_words=False)]

@@ -1,4 +1,7 @@
-"""Arguments that several commands have, and the types of their values: from a text, or argparse's one line of error."""
+"""What the sections of operations name with `@`: the types of values, and arguments that come from other tables.
+
+A type makes a value of a text, or raises argparse's one line of error.
+"""
 
 from __future__ import annotations
 
@@ -6,18 +9,10 @@ import argparse
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from multidrop.shell.operations.operation import typed
-
 HOST = "127.0.0.1"
 KEYS = [f"F{number}" for number in range(2, 13)]
-WHAT = "what to open"
-YES = "answer every question with yes beforehand"
-BEYOND = "let moves leave the travel of their axis, which --yes does not"
-JSON = "print one JSON object a line"
-SUMMED = "print one JSON object a line, and a summary"
-JUNIT = "write the checks to a JUnit XML file"
-NO_RECONNECT = "give up a lost connection, and do not try again"
-START = "the label or program to execute (default: its own start)"
+NONE = None
+upper, integer = str.upper, int
 
 
 class Several(argparse.Action):
@@ -26,11 +21,6 @@ class Several(argparse.Action):
     def __call__(self, parser: object, chosen: argparse.Namespace, values: object, option: object = None) -> None:
         before = getattr(chosen, self.dest)
         setattr(chosen, self.dest, f"{before},{values}" if before else values)
-
-
-def drives(about: str) -> Mapping[str, Any]:
-    """Declare the drives of a command: one, several, or `all`."""
-    return typed(f"{about}; may be repeated", action=Several)
 
 
 # Values
@@ -138,7 +128,7 @@ def language() -> Mapping[str, Any]:
     known = program_languages()
     named = (f"{name} for {', '.join(each.endings)}" for name, each in known.items() if name != DEFAULT)
     endings = f"default: {'; '.join(named)}; else {DEFAULT}"
-    return typed(endings, choices=list(known))
+    return {"help": endings, "choices": list(known)}
 
 
 def titles() -> str:
@@ -170,7 +160,7 @@ def personality(about: str) -> Mapping[str, Any]:
 
     default = DriveSpec().personality
     about = f"{about} (default: {default})"
-    return typed(about, type=str.upper, choices=_Checked(), default=default)
+    return {"help": about, "type": str.upper, "choices": _Checked(), "default": default}
 
 
 def checked_personality() -> Mapping[str, Any]:
@@ -181,7 +171,7 @@ def converted() -> Mapping[str, Any]:
     from multidrop.dialects.families import program_languages
 
     names = [name for files in program_languages().values() for name in files.converters]
-    return typed("what the new file is for: %(choices)s", choices=names, required=True)
+    return {"help": "what the new file is for: %(choices)s", "choices": names, "required": True}
 
 
 def edited_personality() -> Mapping[str, Any]:
@@ -195,20 +185,24 @@ def tested_personality() -> Mapping[str, Any]:
 
     tested = tuple(personality for name in PROGRAMS for personality in TABLE[name].personalities)
     about = f"%(choices)s (default: the cell's, or {DriveSpec().personality})"
-    return typed(about, type=str.upper, choices=tested)
+    return {"help": about, "type": str.upper, "choices": tested}
 
 
 def spoken() -> Mapping[str, Any]:
     from multidrop.dialects.families import FAMILIES
 
-    return typed("in this language (default: the first that has the word)", choices=list(FAMILIES), default=None)
+    return {
+        "help": "in this language (default: the first that has the word)",
+        "choices": list(FAMILIES),
+        "default": None,
+    }
 
 
 def dialect() -> Mapping[str, Any]:
     from multidrop.dialects.families import FAMILIES
 
     languages = [name for name, family in FAMILIES.items() if family.scan is not None]
-    return typed("this language only", choices=languages)
+    return {"help": "this language only", "choices": languages}
 
 
 def freed_dialect() -> Mapping[str, Any]:
@@ -217,4 +211,4 @@ def freed_dialect() -> Mapping[str, Any]:
 
     scans = {name: family.scan for name, family in FAMILIES.items()}
     languages = [name for name, scan in scans.items() if scan is not None and scan.clear is not None]
-    return typed("this language only", choices=languages)
+    return {"help": "this language only", "choices": languages}

@@ -12,7 +12,7 @@ from multidrop.dialects.families import DEFAULT, FAMILIES
 from multidrop.macros import KEYS
 from multidrop.shell.connect.url_forms import URL_FORMS
 from multidrop.shell.line_syntax import DriveLine, join_target
-from multidrop.shell.operations.buses import simulated_cell
+from multidrop.shell.operations.conditions import simulated_cell
 from multidrop.shell.operations.table import VERBS
 from multidrop.simulator.families import PROGRAMS, TABLE
 

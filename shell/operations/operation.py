@@ -19,7 +19,8 @@ if TYPE_CHECKING:
 
 NOTHING: Mapping[str, Any] = MappingProxyType({})
 Arguments = Mapping[str, Any]
-"""The arguments of a command by their notation; each has its help, a `typed` one, or a function that returns either.
+"""The arguments of a command by their notation; each has its help, a mapping with `help` and what else
+argparse takes for it, or a function that returns either.
 
 `FILE` is one word, `[FILE]` may be left out, `FILE ...` is one or more, `[FILE ...]` any number; `--json` is a flag,
 `--to URL` an option with a value, `--vary KEY=VALUES ...` one that may be repeated. A word is kept under its metavar in
@@ -97,11 +98,6 @@ class Operation(NamedTuple):
         return Diagnostic(message, self.name, usage) if message else Diagnostic(usage, self.name)
 
 
-def typed(help: str | None, **options: Any) -> Mapping[str, Any]:
-    """Declare the help on an argument and what else argparse takes for it."""
-    return {"help": help, **options}
-
-
 def add_arguments(parser: argparse._ActionsContainer, arguments: Arguments) -> None:
     for notation, about in arguments.items():
         if " | " in notation:
@@ -109,7 +105,7 @@ def add_arguments(parser: argparse._ActionsContainer, arguments: Arguments) -> N
             add_arguments(group, about)
             continue
         about = about() if callable(about) else about
-        options: dict[str, Any] = dict(about) if isinstance(about, Mapping) else {"help": about}
+        options: dict[str, Any] = dict(about) if isinstance(about, Mapping) else {"help": about or None}
         name, _, metavar = notation.partition(" ")
         if notation.startswith("-"):
             if metavar.endswith(" ..."):

@@ -1,14 +1,21 @@
 """All operations: `VERBS["/open"]`, `COMMANDS["program check"]`, and `find` for a typed name.
 
-A new operation is one declaration in a file of this folder, and its work. The two orders are those of the overviews; an
+The `.toml` files of this folder declare them. A section is an operation: its head is the command, or the verb where it
+has no command; its keys are the fields of `Operation`. A value `@NAME` is NAME of `arguments`, and `@MODULE:NAME` is in
+another module. A new operation is one section, and its work. The two orders below are those of the overviews; an
 operation that they do not name comes last.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+import os
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from functools import cache
+from typing import Any
 
-from multidrop.shell.operations import buses, drives, macros, programs, session
+from multidrop.dialects.on_demand import imported
+from multidrop.shell.operations import arguments, conditions
 from multidrop.shell.operations.operation import Operation
 
 VERB_GROUPS = {
@@ -42,24 +49,71 @@ SCRIPT_WORDS = {
 """The verbs that only scripts have, with their usage."""
 
 
-def _declared() -> Iterator[Operation]:
-    for file in (buses, programs, drives, macros, session):
-        yield from (each for each in vars(file).values() if isinstance(each, Operation))
+_FILES = ("buses", "programs", "drives", "macros", "session")
+_HEAD = re.compile(r"""^\["?([^".\]]+)"?\]\n(?:usage = ["'](/\w+))?""", re.M)
+_ELSEWHERE = re.compile(r"@([\w.]+:\w+)")
 
 
-def _ordered(found: dict[str, Operation], order: Sequence[str]) -> dict[str, Operation]:
-    return {name: found[name] for name in (*order, *(each for each in found if each not in order))}
+class Declared(Mapping[str, Operation]):
+    """Operations by name. A section is parsed when it is asked for, as a start needs one or two of them."""
+
+    def __init__(self, sections: Mapping[str, str], order: Sequence[str] = ()) -> None:
+        self._sections = {name: sections[name] for name in (*order, *(each for each in sections if each not in order))}
+
+    def __getitem__(self, name: str) -> Operation:
+        return _operation(self._sections[name])
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._sections)
+
+    def __len__(self) -> int:
+        return len(self._sections)
+
+    def parts(self, group: str) -> Declared:
+        """The commands of a group by their last word; of "" all first words."""
+        sections = self._sections.items()
+        return Declared({name.rpartition(" ")[2]: text for name, text in sections if name.rpartition(" ")[0] == group})
 
 
-VERBS = _ordered({each.name: each for each in _declared() if each.usage}, " ".join(VERB_GROUPS.values()).split())
+@cache
+def _operation(section: str) -> Operation:
+    import tomllib
+
+    ((head, fields),) = tomllib.loads(section).items()
+    fields = {name: _meant(value) for name, value in fields.items()}
+    if "usage" in fields:
+        fields["usage"] = _ELSEWHERE.sub(lambda found: imported(found[1]), fields["usage"])
+    if "fits" in fields:
+        fields["fits"] = getattr(conditions, fields["fits"])
+    return Operation(**fields) if head.startswith("/") else Operation(command=head, **fields)
+
+
+def _meant(value: Any) -> Any:
+    """A value with what its names stand for."""
+    if isinstance(value, dict):
+        return {name: _meant(each) for name, each in value.items()}
+    if isinstance(value, list):
+        return tuple(value)
+    if not isinstance(value, str) or not value.startswith("@"):
+        return value
+    return imported(value[1:]) if ":" in value else getattr(arguments, value[1:])
+
+
+def _sections() -> Iterator[tuple[str, str, str]]:
+    """(verb, command, text) of each section; an empty name is none."""
+    for name in _FILES:
+        with open(os.path.join(os.path.dirname(__file__), f"{name}.toml"), encoding="utf-8") as file:
+            text = file.read()
+        heads = [*_HEAD.finditer(text)]
+        for found, end in zip(heads, [*(each.start() for each in heads[1:]), len(text)], strict=True):
+            yield found[2] or "", "" if found[1].startswith("/") else found[1], text[found.start() : end]
+
+
+_FOUND = [*_sections()]
+VERBS = Declared({verb: text for verb, _, text in _FOUND if verb}, " ".join(VERB_GROUPS.values()).split())
 """By name, in the order of `/help`."""
-COMMANDS = _ordered({each.command: each for each in _declared() if each.command}, COMMAND_ORDER.split())
+COMMANDS = Declared({command: text for _, command, text in _FOUND if command}, COMMAND_ORDER.split())
 """By their words, in the order of `--help`; the parts of a group after it."""
-
-
-def parts(group: str) -> dict[str, Operation]:
-    """The commands of a group by their last word; of "" all first words."""
-    return {name.rpartition(" ")[2]: each for name, each in COMMANDS.items() if name.rpartition(" ")[0] == group}
 
 
 def find(name: str) -> Operation:

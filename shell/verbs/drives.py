@@ -12,7 +12,7 @@ from multidrop.dialects.family import Registers
 from multidrop.dialects.text import whole
 from multidrop.drives.drive import Drive
 from multidrop.shell.events import By
-from multidrop.shell.operations.buses import simulated_cell
+from multidrop.shell.operations.conditions import simulated_cell
 from multidrop.shell.params import work
 from multidrop.shell.params.work import Options
 from multidrop.shell.plots.plot import begin

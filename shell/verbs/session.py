@@ -15,8 +15,8 @@ from multidrop.shell.events import By
 from multidrop.shell.log import files
 from multidrop.shell.log.writer import SessionLog
 from multidrop.shell.new_file import STANDARD_OUTPUT
+from multidrop.shell.operations.conditions import ON_SCREEN
 from multidrop.shell.operations.operation import Operation
-from multidrop.shell.operations.session import ON_SCREEN
 from multidrop.shell.operations.table import VERB_GROUPS, VERBS
 from multidrop.shell.operations.usage import split
 from multidrop.shell.roles import EVERYTHING, TIMES, Filter, Transcripts

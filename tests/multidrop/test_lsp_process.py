@@ -21,7 +21,7 @@ from multidrop.dialects import Diagnostic
 from multidrop.lsp.server import Server
 from multidrop.lsp.serving import serve_port
 from multidrop.shell.operations.operation import add_arguments
-from multidrop.shell.operations.programs import LSP
+from multidrop.shell.operations.table import COMMANDS
 from tests.support.lsp_session import Editor
 from tests.support.processes import environment
 from tests.support.until import PATIENCE
@@ -134,7 +134,7 @@ def test_without_its_extra_it_says_what_to_install(
 )
 def test_a_port_is_on_this_computer_unless_a_host_is_named(text: str, address: tuple[str, int] | None) -> None:
     parser = argparse.ArgumentParser(exit_on_error=False)
-    add_arguments(parser, LSP.arguments)
+    add_arguments(parser, COMMANDS["lsp"].arguments)
     if address is None:
         with pytest.raises(argparse.ArgumentError, match="valid: PORT or HOST:PORT"):
             parser.parse_args(["--tcp", text])

@@ -8,7 +8,7 @@ import sys
 
 import pytest
 
-from multidrop.shell.operations.table import parts
+from multidrop.shell.operations.table import COMMANDS
 from tests.support.paths import ROOT
 from tests.support.until import PATIENCE
 
@@ -34,7 +34,7 @@ def test_the_files_are_what_the_parser_gives(generate):
 
 def test_the_man_page_has_every_command():
     page = (SHIPPED / "multidrop.1").read_text()
-    assert [name for name in parts("") if f"multidrop {name}" not in page] == []
+    assert [name for name in COMMANDS.parts("") if f"multidrop {name}" not in page] == []
     assert ".SH EXIT STATUS" in page and r"\-\-serve" in page
 
 
@@ -104,7 +104,7 @@ def test_zsh_takes_the_file(home):
 def test_powershell_has_every_command_and_what_is_listed():
     """No PowerShell runs here: the text is compared with the tree of commands."""
     text = (SHIPPED / "multidrop.ps1").read_text()
-    assert [name for name in parts("") if f"'{name}'" not in text] == []
+    assert [name for name in COMMANDS.parts("") if f"'{name}'" not in text] == []
     assert re.search(r"'_shtab_multidrop_send_pos_0' = '_multidrop_url'", text)
     assert re.search(r"'_shtab_multidrop_macro_play_pos_0' = '_multidrop_macro'", text)
     assert re.search(r"'_shtab_multidrop_params_backup___drive' = '_multidrop_drive'", text)
