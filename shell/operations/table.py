@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import os
 import re
+from ast import literal_eval
 from collections.abc import Iterator, Mapping, Sequence
 from functools import cache
 from typing import Any
@@ -47,10 +48,14 @@ SCRIPT_WORDS = {
     "/call": "/call FILE|MACRO [NAME=VALUE ...]",
 }
 """The verbs that only scripts have, with their usage."""
-
-
 _FILES = ("buses", "programs", "drives", "macros", "session")
 _HEAD = re.compile(r"""^\["?([^".\]]+)"?\]\n(?:usage = ["'](/\w+))?""", re.M)
+_ENTRY = re.compile(
+    r"""^\[\S[^\n]*?(?:\.(\w+))?\]$|^((?:"[^"\n]*"|[\w.-]+)+)\ =\ (?:\"{3}\n(.*?)\"{3}|(\[\n.*?^\]|[^\n]+))$""",
+    re.M | re.S,
+)
+"""A head, with the name of its table; or a key and its text of several lines, or another value."""
+_KEY = re.compile(r'"([^"]*)"|([\w-]+)')
 _ELSEWHERE = re.compile(r"@([\w.]+:\w+)")
 
 
@@ -77,15 +82,30 @@ class Declared(Mapping[str, Operation]):
 
 @cache
 def _operation(section: str) -> Operation:
-    import tomllib
-
-    ((head, fields),) = tomllib.loads(section).items()
-    fields = {name: _meant(value) for name, value in fields.items()}
+    head, fields = section[1:].partition("]")[0].strip('"'), fields_of(section)
     if "usage" in fields:
         fields["usage"] = _ELSEWHERE.sub(lambda found: imported(found[1]), fields["usage"])
     if "fits" in fields:
         fields["fits"] = getattr(conditions, fields["fits"])
+    for name in fields.keys() & {"words", "arguments", "changes", "examples"}:
+        fields[name] = _meant(fields[name])
     return Operation(**fields) if head.startswith("/") else Operation(command=head, **fields)
+
+
+def fields_of(section: str) -> dict[str, Any]:
+    """The values of a section. It is TOML of one sort; tomllib would cost every start 8 ms."""
+    fields: dict[str, Any] = {}
+    table = fields
+    for head, key, text, value in _ENTRY.findall(section):
+        if head:
+            table = fields[head] = {}
+        elif key:
+            *path, last = (quoted or bare for quoted, bare in _KEY.findall(key))
+            place = table
+            for each in path:
+                place = place.setdefault(each, {})
+            place[last] = text or value == "true" or literal_eval(value)
+    return fields
 
 
 def _meant(value: Any) -> Any:
@@ -99,17 +119,20 @@ def _meant(value: Any) -> Any:
     return imported(value[1:]) if ":" in value else getattr(arguments, value[1:])
 
 
-def _sections() -> Iterator[tuple[str, str, str]]:
-    """(verb, command, text) of each section; an empty name is none."""
+def sections(text: str) -> Iterator[tuple[str, str, str]]:
+    """(verb, command, text) of each section of a file; an empty name is none."""
+    heads = [*_HEAD.finditer(text)]
+    for found, end in zip(heads, [*(each.start() for each in heads[1:]), len(text)], strict=True):
+        yield found[2] or "", "" if found[1].startswith("/") else found[1], text[found.start() : end]
+
+
+def _declared() -> Iterator[tuple[str, str, str]]:
     for name in _FILES:
         with open(os.path.join(os.path.dirname(__file__), f"{name}.toml"), encoding="utf-8") as file:
-            text = file.read()
-        heads = [*_HEAD.finditer(text)]
-        for found, end in zip(heads, [*(each.start() for each in heads[1:]), len(text)], strict=True):
-            yield found[2] or "", "" if found[1].startswith("/") else found[1], text[found.start() : end]
+            yield from sections(file.read())
 
 
-_FOUND = [*_sections()]
+_FOUND = [*_declared()]
 VERBS = Declared({verb: text for verb, _, text in _FOUND if verb}, " ".join(VERB_GROUPS.values()).split())
 """By name, in the order of `/help`."""
 COMMANDS = Declared({command: text for _, command, text in _FOUND if command}, COMMAND_ORDER.split())
