@@ -19,6 +19,7 @@ from multidrop.simulator.cell.drive_keys import check_inside
 from multidrop.simulator.cell.spec import BusSpec, Cell, DriveSpec, Endpoint, Faults
 from multidrop.simulator.cell.table import Folder, Source, Table, quoted
 from multidrop.simulator.families import BY_PERSONALITY
+from multidrop.simulator.torque import MOTORS, with_motor
 
 if TYPE_CHECKING:
     from multidrop.simulator.family import Family
@@ -37,6 +38,7 @@ DRIVE_KEYS = (
     "instruction_us",
     "cse",
     "units",
+    "motor",
     "identity",
     "world",
 )
@@ -105,7 +107,7 @@ class Reader:
         own = self._families[name].keys if isinstance(name, str) and name in self._families else ()
         table.only(*DRIVE_KEYS, *own)
         personality = table.choice("personality", tuple(self._families))
-        drive = self._families[personality].read_drive(table, folder)
+        drive = with_motor(self._families[personality].read_drive(table, folder), table, folder)
         if drive.cse and not self._is_ethernet(personality):
             raise table.wrong("cse", "is for Ethernet drives", f"valid: {self._ethernet}")
         return drive
@@ -260,13 +262,21 @@ def _drives(path: str, allow: Sequence[Path]) -> list[Placed]:
     shop = read(text, path, Path(path).absolute().parent, allow) if path else demo()
     tables = toml_of(text, path).get("bus", [])
     return [
-        Placed(path, bus.name, spec, table, shop.own_units)
+        Placed(path, bus.name, spec, _without_files(table, spec), shop.own_units)
         for bus, rows in zip(shop.buses, tables, strict=True)
         for spec, table in zip(bus.drives, rows.get("drive", []), strict=True)
     ]
 
 
+def _without_files(table: Mapping[str, Any], spec: DriveSpec) -> Mapping[str, Any]:
+    """The table with the rows of a motor in place of their file: workers read no file."""
+    if spec.world.motor is None or table["motor"] in MOTORS:
+        return table
+    return {**table, "motor": [list(row) for row in spec.world.motor.curve]}
+
+
 def read_drive(table: Mapping[str, Any], where: str, own_units: tuple[str, ...] = ()) -> DriveSpec:
     """Read the table of a drive, of which no file is read. Raises Diagnostic."""
     source = Source(own_units=own_units)
-    return BY_PERSONALITY[table["personality"]].read_drive(Table(table, where, source), Folder(Path()))
+    read, folder = Table(table, where, source), Folder(Path())
+    return with_motor(BY_PERSONALITY[table["personality"]].read_drive(read, folder), read, folder)

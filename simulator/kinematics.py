@@ -195,7 +195,7 @@ class Profile(NamedTuple):
 
     def turning(self, direction: float, after: float) -> float | None:
         """Find the first time from `after` on at which it moves in a direction; None: never."""
-        for segment in self._ahead(after):
+        for segment in self.ahead(after):
             if segment.direction * direction > 0:
                 return max(after, segment.start)
         return None
@@ -208,14 +208,14 @@ class Profile(NamedTuple):
         At that time it is there, or past it by less than rounding, and never short of it. A motion that is at the
         position at `after`, even as it leaves, gives `after`; a motor at rest there gives None.
         """
-        for segment in self._ahead(after):
+        for segment in self.ahead(after):
             if not direction or segment.direction * direction >= 0:
                 found = self._crossing_in(segment, position, after)
                 if found is not None:
                     return found
         return None
 
-    def _ahead(self, after: float) -> Sequence[Segment]:
+    def ahead(self, after: float) -> Sequence[Segment]:
         """Return the segments that are not over; where two meet only the later one."""
         found, then = [], inf
         for segment in reversed(self.segments):

@@ -12,6 +12,7 @@ from math import ceil, copysign, floor, inf, nextafter
 
 from multidrop.simulator.cell.spec import WorldSpec
 from multidrop.simulator.kinematics import Profile, halt
+from multidrop.simulator.torque import LATE, Torque
 
 REVOLUTION = 51200.0
 """Motor steps of a turn: 200 full steps of 256 microsteps."""
@@ -31,6 +32,7 @@ class World:
         self.limit_minus = spec.limit_minus
         self.stall_at = spec.stall_at
         self.load = spec.load
+        self.torque = Torque(spec)
         self.index = index
         self.pushed = 0.0
         self._locks = spec.locked
@@ -157,8 +159,8 @@ class World:
 
 # A shaft that a motor without feedback turns: what the commanded steps move, and what the shaft runs into.
 #
-# The motor commands steps (a `Profile`); the shaft follows in proportion, or is at rest: without current, at a wall, or
-# held fast. Steps that it misses are lost, as nothing measures it. Each stretch is the command's own profile in another
+# The motor commands steps (a `Profile`); the shaft follows in proportion, or is at rest: without current, at a wall,
+# held fast, or stalled, until the command is at rest or turns back. Steps that it misses are lost, as nothing measures it. Each stretch is the command's own profile in another
 # scale, so walls and switches are found by formulas. A new stretch begins where the profile or the scale changes.
 
 TOUCH = 1e-6
@@ -168,9 +170,15 @@ TOUCH = 1e-6
 class Shaft:
     """One shaft. The motor reports every new profile with `follow` and calls `settle` at events."""
 
-    def __init__(self, world: World) -> None:
+    def __init__(self, world: World, turn: float = REVOLUTION) -> None:
+        """`turn`: motor steps of a turn."""
         self.world = world
         self.powered = False
+        self.current = 1.0
+        """Of the full one. `settle` takes it in."""
+        self._turn = turn
+        self._stalled = 0.0
+        """The direction in which a motion asked for more torque than there is; 0: it does not."""
         self.scale = 1.0
         """Motor steps that a commanded step turns while nothing holds the shaft; signed. `settle` takes it in."""
         self.factor = 0.0
@@ -194,12 +202,16 @@ class Shaft:
     def follow(self, command: Profile, t: float, rounded: float = 0.0) -> None:
         """Follow another profile from now on. `rounded`: commanded steps by which it begins further on."""
         place = self.position(t) + self.factor * rounded
+        self._stalled = self._stalled if self._command.moving(t) else 0.0
         self._command = command
         self._begin(self._coupling(place, t), place, t)
+        if self.world.torque.motor:
+            self.settle(t)
 
     def settle(self, t: float) -> None:
         """Take in what has changed at this time: pushes, walls, locks, current, scale."""
         place = self._this_side(self.position(t) + self.world.pushed - self._pushed)
+        self._balance(t)
         factor = self._coupling(place, t)
         if factor != self.factor or self.world.pushed != self._pushed:
             self._pushed = self.world.pushed
@@ -210,6 +222,11 @@ class Shaft:
         yield self.world.next_lock(after)
         if after >= self._command.end:
             return
+        if self._stalled:
+            turned = self._command.turning(-self._stalled, after)
+            yield self._command.end if turned is None else turned
+        elif self.factor:
+            yield self._fails_at(after)
         if not self.factor:
             turning = self._command.turning(-self._wall * self._sense, after)
             if turning is not None and self.world.stall_at is not None:
@@ -227,9 +244,25 @@ class Shaft:
     def _sense(self) -> float:
         return copysign(1.0, self.scale)
 
+    def used(self, t: float) -> float:
+        """The part of the motor's torque that the shaft needs; without a motor its load."""
+        torque = self.world.torque
+        return abs(torque.used(self.path, t, self.current, self._turn)) if torque.motor else self.world.load
+
+    def _fails_at(self, after: float) -> float:
+        return self.world.torque.fails_at(self.path, after, self.current, self._turn)
+
+    def _balance(self, t: float) -> None:
+        """See whether the motion stalls the shaft, or lets it turn again."""
+        command = self._command
+        if self._stalled and (not command.moving(t) or command.direction(t) != self._stalled):
+            self._stalled = 0.0
+        elif self.factor and not self._stalled and self._fails_at(t) <= t + LATE:
+            self._stalled = command.direction(t)
+
     def _coupling(self, place: float, t: float) -> float:
         """Motor steps that a commanded step turns at a place."""
-        if not self.powered or self.world.locked(t):
+        if not self.powered or self._stalled or self.world.locked(t):
             return 0.0
         stall_at = self.world.stall_at
         at_wall = stall_at is not None and (stall_at - place) * self._wall <= TOUCH

@@ -25,7 +25,7 @@ LONGEST = 60
 INT32 = 2**31
 Check = Callable[[Table, str, Value], None]
 """Refuses a word of `set`, or its value, that the product does not know. Raises Diagnostic."""
-WORLD_KEYS = ("home", "limit_plus", "limit_minus", "stall_at", "load", "inputs", "analog", "locked")
+WORLD_KEYS = ("home", "limit_plus", "limit_minus", "stall_at", "load", "friction", "inertia", "inputs", "analog", "locked")
 """Keys of `world` for every drive."""
 POSITIONS = ("home", "limit_plus", "limit_minus", "stall_at", "index")
 """Those that may have a unit."""
@@ -51,16 +51,21 @@ def common_keys(table: Table, folder: Folder) -> dict[str, Any]:
 def _program(name: str, table: Table, folder: Folder) -> str:
     if not name:
         return ""
+    return program_of(read_file(name, "program", table, folder, LARGEST_PROGRAM), name)[0]
+
+
+def read_file(name: str, key: str, table: Table, folder: Folder, largest: int) -> bytes:
+    """Read a file that a key names. Raises Diagnostic."""
     try:
-        check_inside(Path(folder.real, name).resolve(), name, "program", table, folder)
+        check_inside(Path(folder.real, name).resolve(), name, key, table, folder)
         file = folder.path.joinpath(name)
         if not file.is_file():
-            raise table.wrong("program", f"{quoted(name)} does not exist", "paths are relative to the cell file")
+            raise table.wrong(key, f"{quoted(name)} does not exist", "paths are relative to the cell file")
         with file.open("rb") as stream:
-            return program_of(bounded(stream, name, LARGEST_PROGRAM), name)[0]
+            return bounded(stream, name, largest)
     except (OSError, ValueError) as error:
         why = getattr(error, "strerror", None) or "not a path"
-        raise table.wrong("program", f"{quoted(name)} cannot be read ({why})") from None
+        raise table.wrong(key, f"{quoted(name)} cannot be read ({why})") from None
 
 
 def check_inside(place: Path, name: str, key: str, table: Table, folder: Folder) -> None:
@@ -220,6 +225,8 @@ def read_world(table: Table, inputs: Sequence[int], counts: int, axis: AxisScale
         index=table.number("index", 800.0, low=-(2.0**40), high=2.0**40),
         encoder=table.number("encoder", 1.0, low=0.0, high=1000.0),
         slip=table.number("slip", 0.0, low=0.0, high=1.0),
+        friction=table.number("friction", 0.0, low=0.0, high=1000.0),
+        inertia=table.number("inertia", 0.0, low=0.0, high=1000.0),
     )
 
 

@@ -27,13 +27,21 @@ class Endpoint(NamedTuple):
     path: Path | None = None
 
 
+class MotorSpec(NamedTuple):
+    """A motor at full current: rows of speed, rev/s, from 0 up, and torque, N m; the inertia of its rotor, kg m2."""
+
+    curve: tuple[tuple[float, float], ...]
+    inertia: float = 0.0
+
+
 @dataclass(frozen=True)
 class WorldSpec:
     """The surroundings of one axis: positions in motor steps, times in seconds from power-up, levels 1 (+V) and 0.
 
     `home`: the switch is closed up to this position, or between two. `locked`: times between which the rotor is held
     fast. For drives with a separate encoder: `index` is the position of an index mark, `encoder` the counts of one
-    motor step (decoded once), `slip` the fraction of the steps that is lost.
+    motor step (decoded once), `slip` the fraction of the steps that is lost. `friction` (N m for a rev/s) and `inertia`
+    (kg m2) are for a drive with a `motor`.
     """
 
     home: float | tuple[float, float] | None = None
@@ -47,6 +55,10 @@ class WorldSpec:
     index: float = 800.0
     encoder: float = 1.0
     slip: float = 0.0
+    friction: float = 0.0
+    inertia: float = 0.0
+    motor: MotorSpec | None = None
+    """The motor that turns it; None: any torque."""
 
 
 @dataclass(frozen=True)

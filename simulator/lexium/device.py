@@ -99,7 +99,8 @@ class MCodeDevice(EventLoop):
 
     def position(self, now: float) -> int:
         """P at a time not before the last one."""
-        return self.motor.counters.position(now)
+        counters = self.motor.counters
+        return counters.shown(counters.source, now)
 
     def velocity(self, now: float) -> int:
         """V, likewise."""

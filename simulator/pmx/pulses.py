@@ -100,7 +100,7 @@ class Rotor(Shaft):
     """
 
     def __init__(self, world: World, spec: WorldSpec) -> None:
-        super().__init__(world)
+        super().__init__(world, TURN)
         self.counts_a_step = spec.encoder
         self.decoding = 1
         self._slip = spec.slip

@@ -3,7 +3,7 @@
 Rulings where the manuals are silent: a limit switch stops the motor at once and lets it run away from it; MVP REL
 counts from the last target, with parameter 127 at 1 or 2 from the actual position; a position beyond 32 bits wraps
 around, and a move takes the shorter way; an acceleration of 0 acts as 1. Parameter 206 is FREE while the motor turns
-without load, less by the world's load, and 0 at rest or in a stall; a stall at the velocity of parameter 181 or above
+without load, less by the world's load, or by the part of the torque that a cell's `motor` needs, and 0 at rest or in a stall; a stall at the velocity of parameter 181 or above
 stops the motor at once.
 
 The reference search (RFS) is a sequence of steps by the mode in axis parameter 193. Ruling: the motor turns to a switch
@@ -29,6 +29,8 @@ CLOCK = 16e6
 """The clock of a TMC428 or TMC429, Hz."""
 FREE = 1023
 """The load value (parameter 206) of a motor that turns without load."""
+FULL_CURRENT = 255
+"""Parameter 6 at full current."""
 FROM_TARGET = 0
 """The value of parameter 127 with which MVP REL counts from the last target."""
 VELOCITIES = frozenset({Axis.MAXIMUM_VELOCITY, Axis.MAXIMUM_ACCELERATION, Axis.RAMP_DIVISOR, Axis.PULSE_DIVISOR})
@@ -59,7 +61,7 @@ class Motor:
             Axis.HOME_SWITCH: int(home),
             Axis.RIGHT_SWITCH: int(right),
             Axis.LEFT_SWITCH: int(left),
-            Axis.LOAD: round(FREE * (1 - self.shaft.world.load)) if self.moving(t) and self.shaft.factor else 0,
+            Axis.LOAD: round(FREE * (1 - self.shaft.used(t))) if self.moving(t) and self.shaft.factor else 0,
         }
         return measured[Axis(number)] if number in measured else self.parameters[number]
 
@@ -83,7 +85,7 @@ class Motor:
             self._follow_from(float(value), self._profile.velocity(t), t)  # here; on its way to a target it moves on
         else:
             self.parameters[number] = value
-            if number == Axis.MICROSTEPS:
+            if number in (Axis.MICROSTEPS, Axis.RUN_CURRENT):
                 self._hand_on(t)
             elif number in VELOCITIES and (self.moving(t) or (self.positioning and not self.reached(t))):
                 self._plan(t)
@@ -190,6 +192,7 @@ class Motor:
 
     def _hand_on(self, t: float) -> None:
         self.shaft.scale = FULL / 2 ** self.parameters[Axis.MICROSTEPS]
+        self.shaft.current = min(1.0, self.parameters[Axis.RUN_CURRENT] / FULL_CURRENT)
         self.shaft.follow(self._profile, t)
 
 

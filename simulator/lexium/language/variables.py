@@ -41,14 +41,14 @@ class MotionVariables:
         motor, timeline = self._motor, self._timeline
         axis, counters, status, hmt = motor.axis, motor.counters, motor.status, motor.hmt
         return {
-            "P": lambda: counters.value(counters.source, timeline.now),
+            "P": lambda: counters.shown(counters.source, timeline.now),
             "C1": lambda: counters.value("C1", timeline.now),
-            "C2": lambda: counters.value("C2", timeline.now),
+            "C2": lambda: counters.shown("C2", timeline.now),
             "V": lambda: status.speed(timeline.now),
             "AV": lambda: status.rotor_speed(timeline.now),
             "AF": lambda: hmt.status(timeline.now),
             "CB": lambda: hmt.bounds,
-            "LL": lambda: hmt.lag(timeline.now),
+            "LL": lambda: hmt.shown_lag(timeline.now),
             "MV": lambda: 1 if timeline.now < axis.profile.end else int(status.reported(timeline.now)),
             "MP": lambda: int(status.positioning(timeline.now)),
             "VC": lambda: int(status.changing(timeline.now)),

@@ -41,6 +41,11 @@ class Counters:
     def value(self, name: str, t: float) -> int:
         return wrap(self.raw(name, t) + self._offsets[name])
 
+    def shown(self, name: str, t: float) -> int:
+        """A counter as the drive reports it: C2 sees how far the rotor lags its field."""
+        lag = self._rotor.field_lag(t) / self._memory.steps_per_count if name == "C2" else 0.0
+        return self.value(name, t) if not lag else wrap(floor(self._counts(t) - lag + 0.5) + self._offsets[name])
+
     def position(self, t: float) -> int:
         """P."""
         return self.value(self.source, t)

@@ -228,6 +228,11 @@ class Hmt:
             return 0
         return max(-MOST_LAG, min(MOST_LAG, round(self._axis.direction(t) * self._rotor.lag(t))))
 
+    def shown_lag(self, t: float) -> int:
+        """LL as it is reported: with the lag of the rotor behind its field while it follows."""
+        lag = self.lag(t)
+        return lag if lag or not self.closed else round(self._axis.direction(t) * self._rotor.field_lag(t))
+
     def status(self, t: float) -> int:
         """AF."""
         values, lag, follows = self._values, self.lag(t), self.mode in (FIXED, VARIABLE)

@@ -1,8 +1,9 @@
 """The rotor of a simulated motor: where it really is, which the encoder sees, and what keeps it from following.
 
 Theory of operation. The drive commands steps (a `Profile`, the stator); the rotor follows them at a constant distance,
-`slip`, unless something is in its way: a wall (`stall_at`) or a hand that holds it (`locked`, or a load of 1 or more).
-Then it stops. What happens once it is free again depends on who drives it: an open loop (AS=0) has lost the steps, so
+`slip`, unless something is in its way: a wall (`stall_at`) or a hand that holds it (`locked`, or a load of 1 or more),
+or unless the motion asks for more torque than its motor has: it is pulled out until the command is at rest or turns
+back. Then it stops. What happens once it is free again depends on who drives it: an open loop (AS=0) has lost the steps, so
 the rotor follows on from where it is; with hMT (AS=1, 2) the drive knows what is missing and the rotor catches up, on a
 profile of its own, until it is where the command is. So the rotor is always on one of three profiles (following,
 standing, catching up), and when it changes from one to another is solved, like everything else that happens.
@@ -87,7 +88,9 @@ class WorldFrame:
 
 
 FOLLOWING, STANDING, CATCHING = "following", "standing", "catching"
-WALL, HAND = "wall", "hand"
+WALL, HAND, PULL_OUT = "wall", "hand", "pull-out"
+TORQUE_MODE = 3
+"""The value of AS with which the torque is commanded, and no motion asks for too much."""
 MAKE_UP_VI, MAKE_UP_RATE = 916.0, 16_763_806.0
 """Fixed values of make-up: steps/s, steps/s2 (manual 8.3)."""
 SYSTEM_SPEED = 10000.0
@@ -99,6 +102,7 @@ class Rotor:
 
     def __init__(self, core: Core) -> None:
         self.values, self.world, self.frame = core.values, core.world, WorldFrame(core.world)
+        self._torque = core.world.torque
         self.command: Profile = halt(0.0, 0.0)
         self.closed = False
         self.state = FOLLOWING
@@ -127,6 +131,12 @@ class Rotor:
     def lag(self, t: float) -> float:
         """How far the command is ahead of it, with a sign; 0 while it follows."""
         return 0.0 if self.state == FOLLOWING else self.command.position(t) - self.slip - self.position(t)
+
+    def field_lag(self, t: float) -> float:
+        """How far it lags its field while it follows, as the torque on it makes it; only an encoder sees that."""
+        if self.state != FOLLOWING or self.values.get("AS") == TORQUE_MODE:
+            return 0.0
+        return self._torque.lag(self.command, t, self._current, self.frame.turn)
 
     def physical(self, t: float) -> float:
         """The world's steps."""
@@ -209,7 +219,8 @@ class Rotor:
 
     def next(self, t: float) -> Event:
         """When it next goes over to another profile, and what does that."""
-        return min(self._hit(t), self._free(t), (self.world.next_lock(t), nothing), key=when)
+        pulled = self._pulled_out_at(t), lambda at: self._stand(PULL_OUT, at)
+        return min(self._hit(t), self._free(t), pulled, (self.world.next_lock(t), nothing), key=when)
 
     def caught_up_at(self) -> float:
         """When it will be where the command is; infinite while it rests in lag, or while that is unknown."""
@@ -219,7 +230,7 @@ class Rotor:
         here = self.position(t) + steps
         if self.state == STANDING:
             self._own = halt(t, here)
-            self._cause = self._cause if self._cause == HAND else ""
+            self._cause = self._cause if self._cause in (HAND, PULL_OUT) else ""
             if not self._cause:
                 self.leave(t)
         elif self.closed and driven:
@@ -240,6 +251,15 @@ class Rotor:
             found = profile.crossing(place - shift, t, direction)
         return (inf if found is None else found), lambda at: self._stand(WALL, at)
 
+    @property
+    def _current(self) -> float:
+        return float(self.values["RC"]) / 100
+
+    def _pulled_out_at(self, t: float) -> float:
+        if self.state != FOLLOWING or self.values.get("AS") == TORQUE_MODE:
+            return inf
+        return self._torque.fails_at(self.command, t, self._current, self.frame.turn)
+
     def _stand(self, cause: str, t: float) -> None:
         here = self.position(t)
         wall = self.frame.wall()
@@ -256,6 +276,8 @@ class Rotor:
     def _free(self, t: float) -> Event:
         if self.state == CATCHING:
             return self._meets, self._caught
+        if self._cause == PULL_OUT:
+            return self._in_step_at(t), self.leave
         wall = self.frame.wall()
         if self._cause != WALL or wall is None:
             return inf, nothing
@@ -267,6 +289,16 @@ class Rotor:
         else:
             found = self.command.turning(-direction, t)
         return (inf if found is None else found), self.leave
+
+    def _in_step_at(self, t: float) -> float:
+        """When a rotor that was pulled out turns again: hMT needs the torque for its load to make up what is missing."""
+        command = self.command
+        if self.closed and not self._torque.starts(self._current):
+            return inf
+        if not command.moving(t):
+            return t
+        turning = command.turning(-command.direction(t), t)
+        return command.end if turning is None else turning
 
     def _catch(self, here: float, velocity: float, t: float) -> None:
         """Make up what is missing, as MU says (8.3): to the target, or after a command that leads away from it."""

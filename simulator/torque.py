@@ -1,0 +1,178 @@
+"""The torque of a step motor: what a motion asks of it, when that is more than there is, and how far the rotor lags.
+
+A motor has a curve of torque by speed at full current; the current scales it. A turn takes `load` (a part of the torque
+at rest and full current, against every turn), `friction` for each rev/s and `inertia`, that of the rotor included, for
+the acceleration. Along a segment of constant acceleration all of these are straight lines between the rows of the
+curve, so the time at which a motion asks for too much is a formula; an S-curve is divided into `PARTS`. The jump to the
+initial velocity asks for nothing. A rotor that turns lags its field by an angle whose sine is the part of the torque
+that it needs: a full step at most, with all of it.
+"""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from itertools import pairwise
+from math import asin, inf, pi
+from types import MappingProxyType
+
+from multidrop.dialects.files import LARGEST, split_lines
+from multidrop.simulator.cell.drive_keys import read_file
+from multidrop.simulator.cell.spec import DriveSpec, MotorSpec, WorldSpec
+from multidrop.simulator.cell.table import Folder, Table, quoted
+from multidrop.simulator.kinematics import Profile, Segment
+
+MOTORS: Mapping[str, MotorSpec] = MappingProxyType(
+    {
+        "nema17": MotorSpec(((0, 0.45), (2, 0.44), (5, 0.38), (10, 0.27), (20, 0.13), (40, 0.04), (60, 0.0)), 5.4e-6),
+        "nema23": MotorSpec(((0, 1.2), (2, 1.15), (5, 0.95), (10, 0.65), (20, 0.3), (40, 0.09), (60, 0.0)), 3.0e-5),
+        "nema34": MotorSpec(((0, 4.5), (2, 4.1), (5, 3.2), (10, 1.9), (20, 0.8), (40, 0.2), (60, 0.0)), 1.9e-4),
+    }
+)
+"""Figures of our own for a common motor of each size on 48 V; none is measured."""
+VALID = ", ".join((*MOTORS, "FILE.csv"))
+MOST_ROWS = 1000
+FASTEST, STRONGEST = 1000.0, 10_000.0
+"""The highest speed and torque of a row."""
+FULL_STEPS = 200
+PARTS = 16
+LATE = 1e-9
+"""Seconds, and parts of a torque or a speed, that are rounding."""
+
+
+class Torque:
+    """The torque of one shaft. Profiles are in steps, `turn` of them a turn; `share` is the current, of the full one."""
+
+    def __init__(self, spec: WorldSpec) -> None:
+        self.motor = spec.motor
+        self._spec = spec
+        self._holding = spec.motor.curve[0][1] if spec.motor else 0.0
+        self._inertia = spec.inertia + (spec.motor.inertia if spec.motor else 0.0)
+
+    def available(self, speed: float) -> float:
+        """The torque at full current and a speed, rev/s; none beyond the last row."""
+        assert self.motor is not None
+        curve = self.motor.curve
+        n = bisect_right(curve, speed, key=lambda row: row[0])
+        if n == len(curve):
+            return curve[-1][1] if speed <= curve[-1][0] * (1 + LATE) else 0.0
+        (low, least), (high, most) = curve[n - 1], curve[n]
+        return least + (most - least) * (speed - low) / (high - low)
+
+    def needed(self, speed: float, acceleration: float) -> float:
+        """The torque along the turn that a speed and an acceleration along it take, rev/s and rev/s2."""
+        spec = self._spec
+        return spec.load * self._holding + spec.friction * speed + 2 * pi * self._inertia * acceleration
+
+    def starts(self, share: float) -> bool:
+        """Whether the load lets a rotor at rest begin to turn."""
+        return self.motor is None or self.needed(0.0, 0.0) <= share * self._holding
+
+    def fails_at(self, profile: Profile, after: float, share: float, turn: float) -> float:
+        """Find the first time from `after` on at which a motion asks for more than there is; infinite: never."""
+        if self.motor is None or profile.end <= after:
+            return inf
+        for segment in profile.ahead(after):
+            found = self._fails_in(segment, max(after, segment.start), share, turn)
+            if found < inf:
+                return found
+        return inf
+
+    def used(self, profile: Profile, t: float, share: float, turn: float) -> float:
+        """The part of the torque that a motion needs at a time, with the sign of its direction; 0 at rest."""
+        if self.motor is None or not profile.moving(t):
+            return 0.0
+        direction = profile.direction(t)
+        speed, rate = profile.velocity(t) * direction / turn, profile.acceleration(t) * direction / turn
+        there = share * self.available(speed)
+        return direction * max(-1.0, min(1.0, self.needed(speed, rate) / there)) if there else direction
+
+    def lag(self, profile: Profile, t: float, share: float, turn: float) -> float:
+        """The steps by which the rotor lags its field."""
+        return asin(self.used(profile, t, share, turn)) * 2 / pi * turn / FULL_STEPS
+
+    def _fails_in(self, segment: Segment, begin: float, share: float, turn: float) -> float:
+        direction = segment.direction
+        rows = []
+        for t in sorted(self._joints(segment, begin, turn)):
+            speed = segment.velocity_at(t) * direction / turn
+            rate = segment.acceleration_at(t) * direction / turn
+            rows.append((t, share * self.available(max(speed, 0.0)), self.needed(speed, rate)))
+        found = [t for t, there, needed in rows[:1] if abs(needed) > there * (1 + LATE)]
+        for (low, first, was), (high, last, needed) in pairwise(rows):
+            for sign in (1, -1):  # driving and braking
+                before, behind = first - sign * was, last - sign * needed
+                if behind < -LATE * last:
+                    found.append(low if before <= 0 else low + (high - low) * before / (before - behind))
+        return min(found, default=inf)
+
+    def _joints(self, segment: Segment, begin: float, turn: float) -> Iterator[float]:
+        """Yield times between which available and needed torque are straight lines."""
+        yield begin
+        if segment.end == inf or segment.end <= begin:
+            return
+        yield segment.end
+        if segment.gain:
+            yield from (begin + (segment.end - begin) * n / PARTS for n in range(1, PARTS))
+        elif segment.acceleration:
+            assert self.motor is not None
+            for speed, _ in self.motor.curve:
+                t = segment.start + (speed * turn * segment.direction - segment.velocity) / segment.acceleration
+                if begin < t < segment.end:
+                    yield t
+
+
+def read_motor(table: Table, folder: Folder) -> MotorSpec | None:
+    """Read `motor` of a drive: a class, a CSV file, or its rows. Raises Diagnostic."""
+    given = table.values.get("motor")
+    if given is None:
+        return None
+    if isinstance(given, list):
+        columns = (("rev/s", 0.0, FASTEST), ("N m", 0.0, STRONGEST))
+        return MotorSpec(_checked(table, "motor", table.rows("motor", columns)))
+    name = table.text("motor")
+    if name in MOTORS:
+        return MOTORS[name]
+    if not name.lower().endswith(".csv"):
+        raise table.wrong("motor", f"cannot be {quoted(name)}", f"valid: {VALID}")
+    return MotorSpec(_checked(table, f"motor: {name}", tuple(_rows(table, folder, name))))
+
+
+def with_motor(drive: DriveSpec, table: Table, folder: Folder) -> DriveSpec:
+    """Give a drive the motor of its table, on each axis. Raises Diagnostic."""
+    motor = read_motor(table, folder)
+    worlds = [replace(each, motor=motor) for each in (drive.world, *drive.further)]
+    if motor is None and any(each.friction or each.inertia for each in worlds):
+        raise table.wrong("motor", "is missing, and the world has friction or inertia", f"valid: {VALID}")
+    return replace(drive, world=worlds[0], further=tuple(worlds[1:]))
+
+
+def _rows(table: Table, folder: Folder, name: str) -> Iterator[tuple[float, ...]]:
+    text = read_file(name, "motor", table, folder, LARGEST).decode("utf-8-sig", "replace")
+    for number, line in enumerate(split_lines(text), 1):
+        text = line.partition("#")[0].strip()
+        fields = [each.strip() for each in text.split(",")]
+        if not text or (number == 1 and fields == ["rev/s", "N m"]):
+            continue
+        where = f"motor: {name}:{number}"
+        try:
+            speed, torque = map(float, fields)
+        except ValueError:
+            raise table.wrong(where, f"cannot be {quoted(text)}", "valid: rev/s, N m, as in 5, 0.38") from None
+        if not (0 <= speed <= FASTEST and 0 <= torque <= STRONGEST):
+            hint = f"valid: 0 to {FASTEST:g} rev/s, 0 to {STRONGEST:g} N m"
+            raise table.wrong(where, f"is out of range: {quoted(text)}", hint)
+        yield speed, torque
+
+
+def _checked(table: Table, key: str, rows: tuple[tuple[float, ...], ...]) -> tuple[tuple[float, float], ...]:
+    """Check the rows of a curve. Raises Diagnostic."""
+    if not 2 <= len(rows) <= MOST_ROWS:
+        raise table.wrong(key, f"has {len(rows)} rows", f"valid: 2 to {MOST_ROWS}, each a speed and a torque")
+    if rows[0][0] or not rows[0][1]:
+        raise table.wrong(key, f"begins at {rows[0][0]:g}, {rows[0][1]:g}", "the first row is 0 and the holding torque")
+    for (low, _), (high, _) in pairwise(rows):
+        if low >= high:
+            raise table.wrong(key, f"must go up in speed, not from {low:g} to {high:g} rev/s")
+    return tuple((speed, torque) for speed, torque in rows)
