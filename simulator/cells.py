@@ -270,7 +270,7 @@ def _drives(path: str, allow: Sequence[Path]) -> list[Placed]:
 
 def _without_files(table: Mapping[str, Any], spec: DriveSpec) -> Mapping[str, Any]:
     """The table with the rows of a motor in place of their file: workers read no file."""
-    if spec.world.motor is None or table["motor"] in MOTORS:
+    if spec.world.motor is None or spec.world.motor in MOTORS.values():
         return table
     return {**table, "motor": [list(row) for row in spec.world.motor.curve]}
 

@@ -42,7 +42,7 @@ LATE = 1e-9
 
 
 class Torque:
-    """The torque of one shaft. Profiles are in steps, `turn` of them a turn; `share` is the current, of the full one."""
+    """The torque of one shaft. Profiles have `turn` steps a turn; `share` is the current, of the full one."""
 
     def __init__(self, spec: WorldSpec) -> None:
         self.motor = spec.motor

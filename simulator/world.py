@@ -160,8 +160,9 @@ class World:
 # A shaft that a motor without feedback turns: what the commanded steps move, and what the shaft runs into.
 #
 # The motor commands steps (a `Profile`); the shaft follows in proportion, or is at rest: without current, at a wall,
-# held fast, or stalled, until the command is at rest or turns back. Steps that it misses are lost, as nothing measures it. Each stretch is the command's own profile in another
-# scale, so walls and switches are found by formulas. A new stretch begins where the profile or the scale changes.
+# held fast, or stalled until the command is at rest or turns back. Steps that it misses are lost, as nothing measures
+# it. Each stretch is the command's own profile in another scale, so walls and switches are found by formulas. A new
+# stretch begins where the profile or the scale changes.
 
 TOUCH = 1e-6
 """Steps; less than this is rounding."""

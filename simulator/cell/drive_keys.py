@@ -25,7 +25,18 @@ LONGEST = 60
 INT32 = 2**31
 Check = Callable[[Table, str, Value], None]
 """Refuses a word of `set`, or its value, that the product does not know. Raises Diagnostic."""
-WORLD_KEYS = ("home", "limit_plus", "limit_minus", "stall_at", "load", "friction", "inertia", "inputs", "analog", "locked")
+WORLD_KEYS = (
+    "home",
+    "limit_plus",
+    "limit_minus",
+    "stall_at",
+    "load",
+    "friction",
+    "inertia",
+    "inputs",
+    "analog",
+    "locked",
+)
 """Keys of `world` for every drive."""
 POSITIONS = ("home", "limit_plus", "limit_minus", "stall_at", "index")
 """Those that may have a unit."""

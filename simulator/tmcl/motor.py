@@ -3,8 +3,8 @@
 Rulings where the manuals are silent: a limit switch stops the motor at once and lets it run away from it; MVP REL
 counts from the last target, with parameter 127 at 1 or 2 from the actual position; a position beyond 32 bits wraps
 around, and a move takes the shorter way; an acceleration of 0 acts as 1. Parameter 206 is FREE while the motor turns
-without load, less by the world's load, or by the part of the torque that a cell's `motor` needs, and 0 at rest or in a stall; a stall at the velocity of parameter 181 or above
-stops the motor at once.
+without load, less by the world's load, or by the part of the torque that a cell's `motor` needs, and 0 at rest or in a
+stall; a stall at the velocity of parameter 181 or above stops the motor at once.
 
 The reference search (RFS) is a sequence of steps by the mode in axis parameter 193. Ruling: the motor turns to a switch
 at the search velocity, stops at once where it closes, and leaves it at the switch velocity; where it opens is position

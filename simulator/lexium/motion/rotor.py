@@ -3,10 +3,10 @@
 Theory of operation. The drive commands steps (a `Profile`, the stator); the rotor follows them at a constant distance,
 `slip`, unless something is in its way: a wall (`stall_at`) or a hand that holds it (`locked`, or a load of 1 or more),
 or unless the motion asks for more torque than its motor has: it is pulled out until the command is at rest or turns
-back. Then it stops. What happens once it is free again depends on who drives it: an open loop (AS=0) has lost the steps, so
-the rotor follows on from where it is; with hMT (AS=1, 2) the drive knows what is missing and the rotor catches up, on a
-profile of its own, until it is where the command is. So the rotor is always on one of three profiles (following,
-standing, catching up), and when it changes from one to another is solved, like everything else that happens.
+back. Then it stops. What happens once it is free again depends on who drives it: an open loop (AS=0) has lost the
+steps, so the rotor follows on from where it is; with hMT (AS=1, 2) the drive knows what is missing and the rotor
+catches up, on a profile of its own, until it is where the command is. So the rotor is always on one of three profiles
+(following, standing, catching up), and when it changes from one to another is solved, like everything else.
 
 Positions are the axis's motor steps, as the user counts them; `frame` turns them into the world's. A step of the world
 is 1/51200 of a turn whatever MS is, and RD turns the axis round. Manual 5.1.18, 5.1.87, 5.1.110, 8.1, 8.3.
@@ -291,7 +291,7 @@ class Rotor:
         return (inf if found is None else found), self.leave
 
     def _in_step_at(self, t: float) -> float:
-        """When a rotor that was pulled out turns again: hMT needs the torque for its load to make up what is missing."""
+        """When a rotor that was pulled out turns again; with hMT once the current is enough for the load."""
         command = self.command
         if self.closed and not self._torque.starts(self._current):
             return inf
