@@ -62,11 +62,12 @@ def test_friction_that_grows_with_the_speed_is_met_in_the_middle_of_a_ramp() -> 
 def brute_force(torque: Torque, profile: Profile, share: float) -> bool:
     """Whether any of many moments asks for too much; those of the joints are left out."""
     ends = [each.start for each in profile.segments] + [profile.end]
-    moments = (low + (high - low) * n / 200 for low, high in pairwise(ends) for n in range(1, 200))
+    parts = (0.001, *(n / 20 for n in range(1, 20)), 0.999)
+    moments = (low + (high - low) * part for low, high in pairwise(ends) for part in parts)
     return any(abs(torque.used(profile, t, share, TURN)) >= 1 for t in moments)
 
 
-@examples(60, nightly=2000)
+@examples(25, nightly=2000)
 @given(
     rates=st.tuples(st.floats(1e3, 1e6), st.floats(1e3, 1e6)),
     top=st.floats(500, 60_000),
@@ -83,10 +84,8 @@ def test_the_time_of_a_stall_is_found_where_looking_often_finds_one(
     profile = move(0.0, 0.0, 0.0, 40_000.0, vi=100.0, vm=top, a=rates[0], d=rates[1], up=shape, down=shape)
     found, more, less = (torque.fails_at(profile, 0.0, share * part, TURN) for part in (1, 1.02, 0.98))
     assert less <= found <= more
-    if more < inf:
-        assert brute_force(torque, profile, share)
-    if brute_force(torque, profile, share):
-        assert less < inf
+    seen = brute_force(torque, profile, share)
+    assert seen if more < inf else not seen or less < inf
 
 
 def test_an_open_loop_without_an_encoder_loses_steps_and_does_not_know_it() -> None:
