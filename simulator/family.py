@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 from multidrop.dialects.family import Motion
 from multidrop.dialects.values import Snapshot, Value
 from multidrop.simulator.cell.spec import DriveSpec
 from multidrop.simulator.cell.table import Folder, Table
 from multidrop.simulator.cell.writer import DriveText
+from multidrop.simulator.kinematics import Profile
 from multidrop.simulator.wire import Port
 from multidrop.simulator.world import World
 
@@ -60,6 +61,24 @@ class Place:
     alone: bool = True
 
 
+class Effort(NamedTuple):
+    """The motion that an axis commands, and what its reports tell of the torque that it takes."""
+
+    profile: Profile
+    turn: float
+    """Steps of the profile in a turn."""
+    count: float = 1.0
+    """Steps of the profile in a count of the reported position."""
+    current: float = 1.0
+    """Of the full one."""
+    measured: bool = False
+    """The reported position is that of an encoder."""
+    lag: str = ""
+    """The word that reads how far the rotor lags, in steps of the profile; empty: none."""
+    stalls: bool = False
+    """A stall ends the motion."""
+
+
 @dataclass(frozen=True)
 class Shadow:
     """The operations of a simulated drive that runs beside a real one: they need no wire."""
@@ -70,6 +89,8 @@ class Shadow:
     """Position and velocity of each axis at a time, as the drive reports them."""
     align: Callable[[str, int, float], None]
     """Set the position counter of an axis at rest."""
+    efforts: Callable[[], Mapping[str, Effort]]
+    """What each axis commands now."""
 
 
 @dataclass(frozen=True)

@@ -32,10 +32,11 @@ from multidrop.simulator.cell.spec import DriveSpec
 from multidrop.simulator.cell.spec import Value as Setting
 from multidrop.simulator.cell.table import Folder, Table, quoted
 from multidrop.simulator.cell.writer import DriveText, Entry, plain, remark
-from multidrop.simulator.family import Family, Place, Shadow, Snapshots, StoredProgram, Unit
+from multidrop.simulator.family import Effort, Family, Place, Shadow, Snapshots, StoredProgram, Unit
 from multidrop.simulator.pmx.commands import MODEL
 from multidrop.simulator.pmx.controller import BAUDS
 from multidrop.simulator.pmx.device import PROGRAMS, PmxDevice, PmxPort
+from multidrop.simulator.pmx.pulses import TURN
 from multidrop.simulator.pmx.settings import AXES, VARIABLES
 from multidrop.simulator.pmx.usb import UsbController
 
@@ -180,7 +181,12 @@ def _shadow(device: PmxDevice) -> Shadow:
         if not axes[name].loop.on:  # where it follows the encoder and cannot be set (8.1.2)
             axes[name].set_position(position, now)
 
-    return Shadow(rest, motion, align)
+    def efforts() -> dict[str, Effort]:
+        return {
+            name: Effort(axis.pulses.profile, TURN, axis.unit, stalls=axis.loop.on) for name, axis in axes.items()
+        }
+
+    return Shadow(rest, motion, align, efforts)
 
 
 PMX = Family(

@@ -45,7 +45,7 @@ from multidrop.simulator.cell.spec import DriveSpec
 from multidrop.simulator.cell.spec import Value as Setting
 from multidrop.simulator.cell.table import Folder, Table, quoted
 from multidrop.simulator.cell.writer import DriveText, Entry, remark
-from multidrop.simulator.family import Family, Place, Shadow, Snapshots, StoredProgram, Unit
+from multidrop.simulator.family import Effort, Family, Place, Shadow, Snapshots, StoredProgram, Unit
 from multidrop.simulator.tmcl.module import TmclModule, storable, worlds_of
 from multidrop.simulator.tmcl.motor import FULL
 from multidrop.simulator.tmcl.port import TmclPort
@@ -229,7 +229,10 @@ def _shadow(device: TmclModule, names: Sequence[str]) -> Shadow:
             for name, motor in motors.items()
         )
 
-    return Shadow(device.unwatch, motion, lambda name, position, now: motors[name].stand_at(position, now))
+    def efforts() -> dict[str, Effort]:
+        return {name: motor.effort for name, motor in motors.items()}
+
+    return Shadow(device.unwatch, motion, lambda name, position, now: motors[name].stand_at(position, now), efforts)
 
 
 TMCL = Family(

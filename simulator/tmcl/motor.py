@@ -20,8 +20,9 @@ from typing import NamedTuple
 
 from multidrop.dialects.tmcl.manual.commands import Axis
 from multidrop.dialects.tmcl.manual.modules import INVERTED, MIRRORED, Module
+from multidrop.simulator.family import Effort
 from multidrop.simulator.kinematics import halt, move, slew
-from multidrop.simulator.world import Shaft, World
+from multidrop.simulator.world import REVOLUTION, Shaft, World
 
 FULL = 256
 """Microsteps of a full step, which is one motor step of the world."""
@@ -64,6 +65,11 @@ class Motor:
             Axis.LOAD: round(FREE * (1 - self.shaft.used(t))) if self.moving(t) and self.shaft.factor else 0,
         }
         return measured[Axis(number)] if number in measured else self.parameters[number]
+
+    @property
+    def effort(self) -> Effort:
+        turn = REVOLUTION / FULL * 2 ** self.parameters[Axis.MICROSTEPS]
+        return Effort(self._profile, turn, current=self.shaft.current, stalls=self._stall_speed > 0)
 
     def position(self, t: float) -> int:
         """The actual position, within 32 bits."""
