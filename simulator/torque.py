@@ -88,17 +88,17 @@ class Torque:
         there = share * self.available(speed)
         return direction * max(-1.0, min(1.0, self.needed(speed, rate) / there)) if there else direction
 
+    def most_used(self, profile: Profile, share: float, turn: float) -> float:
+        """The largest part of the torque that a motion needs; infinite where there is none."""
+        rows = [row for each in profile.segments for row in self._balance(each, each.start, share, turn)]
+        return max((abs(needed) / there if there else inf for _, there, needed in rows), default=0.0)
+
     def lag(self, profile: Profile, t: float, share: float, turn: float) -> float:
         """The steps by which the rotor lags its field."""
         return asin(self.used(profile, t, share, turn)) * 2 / pi * turn / FULL_STEPS
 
     def _fails_in(self, segment: Segment, begin: float, share: float, turn: float) -> float:
-        direction = segment.direction
-        rows = []
-        for t in sorted(self._joints(segment, begin, turn)):
-            speed = segment.velocity_at(t) * direction / turn
-            rate = segment.acceleration_at(t) * direction / turn
-            rows.append((t, share * self.available(max(speed, 0.0)), self.needed(speed, rate)))
+        rows = self._balance(segment, begin, share, turn)
         found = [t for t, there, needed in rows[:1] if abs(needed) > there * (1 + LATE)]
         for (low, first, was), (high, last, needed) in pairwise(rows):
             for sign in (1, -1):  # driving and braking
@@ -107,8 +107,16 @@ class Torque:
                     found.append(low if before <= 0 else low + (high - low) * before / (before - behind))
         return min(found, default=inf)
 
+    def _balance(self, segment: Segment, begin: float, share: float, turn: float) -> list[tuple[float, float, float]]:
+        """The available and the needed torque at times between which both are straight lines."""
+        rows = []
+        for t in sorted(self._joints(segment, begin, turn)):
+            speed = max(0.0, segment.velocity_at(t) * segment.direction / turn)
+            rate = segment.acceleration_at(t) * segment.direction / turn
+            rows.append((t, share * self.available(speed), self.needed(speed, rate)))
+        return rows
+
     def _joints(self, segment: Segment, begin: float, turn: float) -> Iterator[float]:
-        """Yield times between which available and needed torque are straight lines."""
         yield begin
         if segment.end == inf or segment.end <= begin:
             return

@@ -182,9 +182,7 @@ def _shadow(device: PmxDevice) -> Shadow:
             axes[name].set_position(position, now)
 
     def efforts() -> dict[str, Effort]:
-        return {
-            name: Effort(axis.pulses.profile, TURN, axis.unit, stalls=axis.loop.on) for name, axis in axes.items()
-        }
+        return {name: Effort(axis.pulses.profile, TURN, axis.unit, stalls=axis.loop.on) for name, axis in axes.items()}
 
     return Shadow(rest, motion, align, efforts)
 
