@@ -16,10 +16,10 @@ from multidrop.dialects import Diagnostic
 from multidrop.dialects.files import toml_of, utf8_of
 from multidrop.dialects.units import check_own
 from multidrop.simulator.cell.drive_keys import check_inside
-from multidrop.simulator.cell.spec import BusSpec, Cell, DriveSpec, Endpoint, Faults
+from multidrop.simulator.cell.spec import BusSpec, Cell, DriveSpec, Endpoint, Faults, MotorSpec
 from multidrop.simulator.cell.table import Folder, Source, Table, quoted
 from multidrop.simulator.families import BY_PERSONALITY
-from multidrop.simulator.torque import MOTORS, with_motor
+from multidrop.simulator.torque import with_motor
 
 if TYPE_CHECKING:
     from multidrop.simulator.family import Family
@@ -270,9 +270,8 @@ def _drives(path: str, allow: Sequence[Path]) -> list[Placed]:
 
 def _without_files(table: Mapping[str, Any], spec: DriveSpec) -> Mapping[str, Any]:
     """The table with the rows of a motor in place of their file: workers read no file."""
-    if spec.world.motor is None or spec.world.motor in MOTORS.values():
-        return table
-    return {**table, "motor": [list(row) for row in spec.world.motor.curve]}
+    curve, rotor = spec.world.motor or MotorSpec(())
+    return table if rotor or not curve else {**table, "motor": [list(row) for row in curve]}
 
 
 def read_drive(table: Mapping[str, Any], where: str, own_units: tuple[str, ...] = ()) -> DriveSpec:

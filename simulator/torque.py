@@ -45,15 +45,16 @@ class Torque:
     """The torque of one shaft. Profiles have `turn` steps a turn; `share` is the current, of the full one."""
 
     def __init__(self, spec: WorldSpec) -> None:
-        self.motor = spec.motor
         self._spec = spec
-        self._holding = spec.motor.curve[0][1] if spec.motor else 0.0
-        self._inertia = spec.inertia + (spec.motor.inertia if spec.motor else 0.0)
+        self._curve, rotor = spec.motor or MotorSpec(())
+        self.limited = bool(self._curve)
+        """There is a motor; without one there is any torque."""
+        self._holding = self._curve[0][1] if self._curve else 0.0
+        self._inertia = spec.inertia + rotor
 
     def available(self, speed: float) -> float:
         """The torque at full current and a speed, rev/s; none beyond the last row."""
-        assert self.motor is not None
-        curve = self.motor.curve
+        curve = self._curve
         n = bisect_right(curve, speed, key=lambda row: row[0])
         if n == len(curve):
             return curve[-1][1] if speed <= curve[-1][0] * (1 + LATE) else 0.0
@@ -67,11 +68,11 @@ class Torque:
 
     def starts(self, share: float) -> bool:
         """Whether the load lets a rotor at rest begin to turn."""
-        return self.motor is None or self.needed(0.0, 0.0) <= share * self._holding
+        return not self.limited or self.needed(0.0, 0.0) <= share * self._holding
 
     def fails_at(self, profile: Profile, after: float, share: float, turn: float) -> float:
         """Find the first time from `after` on at which a motion asks for more than there is; infinite: never."""
-        if self.motor is None or profile.end <= after:
+        if not self.limited or profile.end <= after:
             return inf
         for segment in profile.ahead(after):
             found = self._fails_in(segment, max(after, segment.start), share, turn)
@@ -81,7 +82,7 @@ class Torque:
 
     def used(self, profile: Profile, t: float, share: float, turn: float) -> float:
         """The part of the torque that a motion needs at a time, with the sign of its direction; 0 at rest."""
-        if self.motor is None or not profile.moving(t):
+        if not self.limited or not profile.moving(t):
             return 0.0
         direction = profile.direction(t)
         speed, rate = profile.velocity(t) * direction / turn, profile.acceleration(t) * direction / turn
@@ -124,8 +125,7 @@ class Torque:
         if segment.gain:
             yield from (begin + (segment.end - begin) * n / PARTS for n in range(1, PARTS))
         elif segment.acceleration:
-            assert self.motor is not None
-            for speed, _ in self.motor.curve:
+            for speed, _ in self._curve:
                 t = segment.start + (speed * turn * segment.direction - segment.velocity) / segment.acceleration
                 if begin < t < segment.end:
                     yield t

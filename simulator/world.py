@@ -206,7 +206,7 @@ class Shaft:
         self._stalled = self._stalled if self._command.moving(t) else 0.0
         self._command = command
         self._begin(self._coupling(place, t), place, t)
-        if self.world.torque.motor:
+        if self.world.torque.limited:
             self.settle(t)
 
     def settle(self, t: float) -> None:
@@ -248,7 +248,7 @@ class Shaft:
     def used(self, t: float) -> float:
         """The part of the motor's torque that the shaft needs; without a motor its load."""
         torque = self.world.torque
-        return abs(torque.used(self.path, t, self.current, self._turn)) if torque.motor else self.world.load
+        return abs(torque.used(self.path, t, self.current, self._turn)) if torque.limited else self.world.load
 
     def _fails_at(self, after: float) -> float:
         return self.world.torque.fails_at(self.path, after, self.current, self._turn)

@@ -12,12 +12,15 @@ from functools import lru_cache, partial
 from typing import NamedTuple
 
 from multidrop.dialects import Diagnostic
+from multidrop.dialects.family import Motion
 from multidrop.dialects.files import split_lines
 from multidrop.dialects.mcode.manual.errors import text as error_text
 from multidrop.dialects.mcode.manual.grammar import LineError, parse, strip
 from multidrop.simulator.cell.spec import DriveSpec
+from multidrop.simulator.family import Effort
 from multidrop.simulator.lexium.event_loop import EventLoop
 from multidrop.simulator.lexium.language.instructions import Instructions
+from multidrop.simulator.lexium.motion.feedback import FIXED, VARIABLE
 from multidrop.simulator.lexium.motion.motor import Motor
 from multidrop.simulator.lexium.motion.outputs import Outputs
 from multidrop.simulator.lexium.power import Nvm, Power
@@ -101,6 +104,19 @@ class MCodeDevice(EventLoop):
         """P at a time not before the last one."""
         counters = self.motor.counters
         return counters.shown(counters.source, now)
+
+    def motion(self, now: float) -> Motion:
+        """P and V, likewise."""
+        return Motion(self.position(now), self.velocity(now))
+
+    @property
+    def effort(self) -> Effort:
+        """What the axis commands now, and what P and LL tell of it."""
+        values, memory = self.memory.values, self.memory
+        closed, counting = values.get("AS") in (FIXED, VARIABLE), memory.counting
+        stalls = closed or (counting and not values["SM"])
+        current, lag = float(values["RC"]) / 100, "LL" if closed else ""
+        return Effort(self.motor.axis.profile, memory.steps_per_turn, memory.scale, current, counting, lag, stalls)
 
     def velocity(self, now: float) -> int:
         """V, likewise."""

@@ -31,9 +31,8 @@ from multidrop.simulator.cell.drive_keys import (
 from multidrop.simulator.cell.spec import DriveSpec, WorldSpec
 from multidrop.simulator.cell.table import Folder, Table, quoted, shown
 from multidrop.simulator.cell.writer import DriveText, Entry, plain, remark
-from multidrop.simulator.family import Effort, Family, Place, Shadow, Snapshots, StoredProgram, Unit
+from multidrop.simulator.family import Family, Place, Shadow, Snapshots, StoredProgram, Unit
 from multidrop.simulator.lexium.device import MCodeDevice
-from multidrop.simulator.lexium.motion.feedback import FIXED, VARIABLE
 from multidrop.simulator.lexium.ports.mcode import MCodePort
 from multidrop.simulator.lexium.ports.modbus import ModbusPort
 from multidrop.simulator.lexium.power import BAUDS
@@ -334,26 +333,12 @@ def _shadow(device: MCodeDevice, port: MCodePort) -> Shadow:
         port.sent(0.0)
 
     def motion(now: float) -> tuple[Motion, ...]:
-        return (Motion(device.position(now), device.velocity(now)),)
+        return (device.motion(now),)
 
     def align(_: str, position: int, now: float) -> None:
         device.execute(f"P={position}", now, immediate=True)
 
-    def efforts() -> dict[str, Effort]:
-        values, memory = device.memory.values, device.memory
-        closed, counting = values.get("AS") in (FIXED, VARIABLE), memory.counting
-        effort = Effort(
-            device.motor.axis.profile,
-            memory.steps_per_turn,
-            memory.scale,
-            float(values["RC"]) / 100,
-            counting,
-            "LL" if closed else "",
-            stalls=closed or (counting and not values["SM"]),
-        )
-        return {"": effort}
-
-    return Shadow(rest, motion, align, efforts)
+    return Shadow(rest, motion, align, lambda: {"": device.effort})
 
 
 def _at_baud(spec: DriveSpec, baud: int) -> DriveSpec:

@@ -246,16 +246,16 @@ def test_with_a_motor_a_sweep_over_current_acceleration_and_load_finds_what_stal
     (tmp_path / "motor.csv").write_text("0, 0.5\n20, 0.2\n")
     text = bus("line", drive("LMDCM", "a", EE=1) + 'motor = "motor.csv"\n', baud=0)
     (tmp_path / "motor.toml").write_text(text)
-    vary = ("--vary", "RC=20,90", "--vary", "A=50000,50000000", "--vary", "load=0,0.3")
+    vary = ("--vary", "RC=20,90", "--vary", "A=50000,40000000", "--vary", "load=0,0.3")
     *cases, _ = objects(sweep("--cell", "motor.toml", *vary, "--vary", "inertia=2e-5", "--json"))
     held = {tuple(each["set"].values())[:3]: each["ok"] for each in cases}
     assert held == {
         (20, 50000, 0): True,
         (20, 50000, 0.3): False,
-        (20, 50000000, 0): False,
-        (20, 50000000, 0.3): False,
+        (20, 40000000, 0): False,
+        (20, 40000000, 0.3): False,
         (90, 50000, 0): True,
         (90, 50000, 0.3): True,
-        (90, 50000000, 0): False,
-        (90, 50000000, 0.3): False,
+        (90, 40000000, 0): False,
+        (90, 40000000, 0.3): False,
     }
