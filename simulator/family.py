@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple, Protocol
+from typing import Protocol
 
 from multidrop.dialects.family import Motion
 from multidrop.dialects.values import Snapshot, Value
@@ -61,7 +61,8 @@ class Place:
     alone: bool = True
 
 
-class Effort(NamedTuple):
+@dataclass(frozen=True)
+class Effort:
     """The motion that an axis commands, and what its reports tell of the torque that it takes."""
 
     profile: Profile
