@@ -293,7 +293,7 @@ def build(spec: DriveSpec, place: Place) -> Unit:
     world = World(spec.world)
     device = MCodeDevice(_at_baud(spec, place.baud), world)
     device.prints()  # no client can be connected at its sign-on
-    model, ethernet = device.memory.model, spec.personality in ETHERNET
+    model, ethernet = MODELS[spec.personality], spec.personality in ETHERNET
     kind, connection = (LockedPort, LockedModbus) if spec.cse else (MCodePort, ModbusPort)
     port = kind(device, serial=not ethernet, baud=0 if model.waits_to_print else place.baud)
     return Unit(
