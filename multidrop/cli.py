@@ -35,6 +35,7 @@ EXTRAS = {
     "lsp": "pygls",
     "mqtt": "paho",
     "notebook": "ipykernel",
+    "prometheus": "prometheus_client",
     "pytest": "pytest",
     "rerun": "rerun",
     "usb": "usb1",

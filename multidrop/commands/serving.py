@@ -1,6 +1,6 @@
 """Commands that serve until interrupted, and small ones: each imports what it needs when it runs.
 
-`multidrop sim`, `share`, `relay`, `plot`, `poll`, `publish`, `lsp`, `ports`, `completion`.
+`multidrop sim`, `share`, `relay`, `plot`, `poll`, `publish`, `plant`, `lsp`, `ports`, `completion`.
 """
 
 from __future__ import annotations
@@ -72,7 +72,23 @@ def poll(chosen: argparse.Namespace) -> int:
 def publish(chosen: argparse.Namespace) -> int:
     from multidrop.shell.publishing import command
 
-    return command.run(chosen.urls, to=chosen.to, rate=chosen.rate, reconnect=not chosen.no_reconnect)
+    return command.run(
+        chosen.urls,
+        to=chosen.to,
+        rate=chosen.rate,
+        home_assistant=chosen.home_assistant,
+        reconnect=not chosen.no_reconnect,
+    )
+
+
+def plant(chosen: argparse.Namespace) -> int:
+    from multidrop.shell.publishing import watch
+
+    if chosen.json or not all(each.isatty() for each in (sys.stdin, sys.stdout, sys.stderr)):
+        return watch.run(chosen.url, as_json=chosen.json)
+    from multidrop.tui.plant import run
+
+    return run(chosen.url)
 
 
 def relay(chosen: argparse.Namespace) -> int:

@@ -86,7 +86,7 @@ function _shtab_multidrop_using
   test "$_shtab_multidrop_cmdpath" = "$argv"
 end
 
-set -g _shtab_multidrop_commands demo tui shell send run sim program 'program check' 'program test' 'program sweep' 'program convert' 'program list' 'program diff' 'program upload' 'program download' params 'params backup' 'params diff' 'params restore' macro 'macro list' 'macro show' 'macro play' 'macro edit' 'macro describe' 'macro rename' 'macro copy' 'macro delete' 'macro key' 'macro import' 'macro export' plot poll publish share snapshot certify ports relay scan rescue log 'log show' 'log follow' 'log grep' 'log judge' 'log replay' config 'config path' 'config show' 'config check' help lsp report completion
+set -g _shtab_multidrop_commands demo tui shell send run sim program 'program check' 'program test' 'program sweep' 'program convert' 'program list' 'program diff' 'program upload' 'program download' params 'params backup' 'params diff' 'params restore' macro 'macro list' 'macro show' 'macro play' 'macro edit' 'macro describe' 'macro rename' 'macro copy' 'macro delete' 'macro key' 'macro import' 'macro export' plot poll publish plant share snapshot certify ports relay scan rescue log 'log show' 'log follow' 'log grep' 'log judge' 'log replay' config 'config path' 'config show' 'config check' help lsp report completion
 set -g _shtab_multidrop_opts_with_value --against --allow --baud --break --cell --cluster --compare --csv --dialect --drive --every --expect --jobs --join --junit --language --on --other --output --page --parquet --personality --random --rate --resume --rfc2217 --role --rows --run --save --search --seed --serve --set --speed --svg --tcp --times --to --until --vary --watch --with -o
 
 complete -c multidrop -e
@@ -332,13 +332,19 @@ complete -c multidrop -n '_shtab_multidrop_using poll' -l json -d 'print one JSO
 complete -c multidrop -n '_shtab_multidrop_using poll' -l no-reconnect -d 'give up a lost connection, and do not try again'
 complete -c multidrop -n '_shtab_multidrop_using poll' -l no-config -d 'read no configuration file'
 complete -c multidrop -n '_shtab_multidrop_using poll; and test $_shtab_multidrop_npos -eq 0' -ka "(_multidrop_url)" -d 'what to open'
-complete -c multidrop -n '_shtab_multidrop_using; and test $_shtab_multidrop_npos -eq 0' -a publish -d 'Publish samples, states, errors and transcripts of all drives to an MQTT broker until interrupted.'
+complete -c multidrop -n '_shtab_multidrop_using; and test $_shtab_multidrop_npos -eq 0' -a publish -d 'Publish samples, states and errors of all drives until interrupted: to an MQTT broker, or for Prometheus.'
 complete -c multidrop -n '_shtab_multidrop_using publish' -s h -l help -d 'show this help message and exit'
-complete -c multidrop -n '_shtab_multidrop_using publish' -l to -x -d 'the broker, and the topic above all others; mqtts:// is encrypted'
+complete -c multidrop -n '_shtab_multidrop_using publish' -l to -x -d 'mqtt://[USER@]BROKER[:PORT]/PREFIX: a broker, and the topic above all others (mqtts:// is encrypted); prometheus://[HOST]:PORT: serve this machine, or at HOST; may be repeated'
+complete -c multidrop -n '_shtab_multidrop_using publish' -l home-assistant -d 'describe the values for the discovery of Home Assistant, at the broker'
 complete -c multidrop -n '_shtab_multidrop_using publish' -l rate -x -d 'samples a second of each drive, at most (default: 2)'
 complete -c multidrop -n '_shtab_multidrop_using publish' -l no-reconnect -d 'give up a lost connection, and do not try again'
 complete -c multidrop -n '_shtab_multidrop_using publish' -l no-config -d 'read no configuration file'
 complete -c multidrop -n '_shtab_multidrop_using publish; and test $_shtab_multidrop_npos -ge 0' -ka "(_multidrop_url)" -d 'what to open'
+complete -c multidrop -n '_shtab_multidrop_using; and test $_shtab_multidrop_npos -eq 0' -a plant -d 'Show every drive that is published under a topic of an MQTT broker, the worst first; commands nothing.'
+complete -c multidrop -n '_shtab_multidrop_using plant' -s h -l help -d 'show this help message and exit'
+complete -c multidrop -n '_shtab_multidrop_using plant' -l json -d 'print one JSON object a line'
+complete -c multidrop -n '_shtab_multidrop_using plant' -l no-config -d 'read no configuration file'
+complete -c multidrop -n '_shtab_multidrop_using plant; and test $_shtab_multidrop_npos -eq 0' -ka "(_multidrop_url)" -d 'mqtt://[USER@]BROKER[:PORT]/PREFIX: a broker, and the topic above all publishers; mqtts:// is encrypted'
 complete -c multidrop -n '_shtab_multidrop_using; and test $_shtab_multidrop_npos -eq 0' -a share -d 'Lend a port to several clients over the network (RFC 2217), of which one writes; a stop passes from any.'
 complete -c multidrop -n '_shtab_multidrop_using share' -s h -l help -d 'show this help message and exit'
 complete -c multidrop -n '_shtab_multidrop_using share' -l rfc2217 -x -d 'serve it here (host: 127.0.0.1 unless given; port 0: a free one)'

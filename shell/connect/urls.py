@@ -150,6 +150,9 @@ def _scheme(text: str) -> tuple[str, str]:
     found = re.match(r"([A-Za-z][A-Za-z0-9+.-]+):", text)
     if found and found[1].lower() in SCHEMES:
         return found[1].lower(), text[found.end() :]
+    if found and found[1].lower() in ("mqtt", "mqtts"):
+        hint = "it only shows what was published; `multidrop plant URL` shows it"
+        raise Diagnostic("a broker is no line, and no drive can be reached through one", text, hint)
     if found and text[found.end() :].startswith("//"):
         raise Diagnostic(f"no kind of connection {found[1]}://", text, f"valid: {sentence()}")
     path = text.partition("?")[0]

@@ -2,7 +2,7 @@
 
 Theory of operation. Each connection is a client of its own: paho's own reconnection gives no reason for a failure. paho
 has a thread; its events are handed to the event loop. Every message is sent at QoS 1. Those that the broker has not
-acknowledged are known, so that the next connection sends them again. A client never subscribes.
+acknowledged are known, so that the next connection sends them again. A client that publishes never subscribes.
 """
 
 from __future__ import annotations
@@ -11,9 +11,11 @@ import asyncio
 import contextlib
 import os
 import ssl
+import struct
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING, Any, NamedTuple
 from urllib.parse import unquote, urlsplit
 
@@ -52,45 +54,45 @@ class Target:
         return f"{'mqtts' if self.encrypted else 'mqtt'}://{host}:{self.port}/{self.prefix}"
 
 
-def parse_target(text: str) -> Target:
-    """Parse the URL of a broker. Raises Diagnostic, which never holds a password."""
+def parse_target(text: str, where: str = "--to") -> Target:
+    """Parse the URL of a broker, an argument `where`. Raises Diagnostic, which never holds a password."""
     scheme, mark, rest = text.partition("://")
     place, _, prefix = rest.partition("/")
     user, _, address = place.rpartition("@")
     if ":" in user or (":" in place and "@" in prefix):  # a password may hold a /
         hint = "write it in multidrop.toml: [mqtt] with password or password_file"
-        raise Diagnostic("a password in a URL can be seen by everybody on this machine", "--to", hint)
+        raise Diagnostic("a password in a URL can be seen by everybody on this machine", where, hint)
     if not mark or scheme not in PORTS:
-        raise Diagnostic("the URL of a broker begins with mqtt:// or mqtts://", "--to", FORM)
-    host, port = _address(scheme, address)
-    return Target(host, port, _prefix(prefix), scheme == "mqtts", unquote(user))
+        raise Diagnostic("the URL of a broker begins with mqtt:// or mqtts://", where, FORM)
+    host, port = _address(scheme, address, where)
+    return Target(host, port, _prefix(prefix, where), scheme == "mqtts", unquote(user))
 
 
-def _address(scheme: str, address: str) -> tuple[str, int]:
+def _address(scheme: str, address: str, where: str) -> tuple[str, int]:
     try:
         parts = urlsplit(f"//{address}")
         host, port = parts.hostname, parts.port
     except ValueError:
-        raise Diagnostic(f"no address {address!r} of a broker", "--to", FORM) from None
+        raise Diagnostic(f"no address {address!r} of a broker", where, FORM) from None
     whole = parts.netloc == address and port != 0
     if not (whole and host) or visible(host) != host or " " in host:
-        raise Diagnostic(f"no address {address!r} of a broker", "--to", FORM)
+        raise Diagnostic(f"no address {address!r} of a broker", where, FORM)
     return host, port or PORTS[scheme]
 
 
-def _prefix(text: str) -> str:
+def _prefix(text: str, where: str) -> str:
     """Check a prefix, which may have several levels."""
     prefix = text.removesuffix("/")
     if not prefix:
-        raise Diagnostic("no PREFIX of the topics", "--to", FORM)
+        raise Diagnostic("no PREFIX of the topics", where, FORM)
     wrong = next((each for each in prefix if each in "+#?" or visible(each) != each), "")
     if wrong:
-        raise Diagnostic(f"a PREFIX has no {visible(wrong)!s}", "--to", FORM)
+        raise Diagnostic(f"a PREFIX has no {visible(wrong)!s}", where, FORM)
     if prefix.startswith("$") or "" in prefix.split("/"):
         hint = "a PREFIX begins without $, and no level of it is empty"
-        raise Diagnostic(f"no PREFIX {prefix!r}", "--to", hint)
+        raise Diagnostic(f"no PREFIX {prefix!r}", where, hint)
     if len(prefix.encode()) > LONGEST_PREFIX:
-        raise Diagnostic(f"a PREFIX has at most {LONGEST_PREFIX} bytes", "--to")
+        raise Diagnostic(f"a PREFIX has at most {LONGEST_PREFIX} bytes", where)
     return prefix
 
 
@@ -107,13 +109,13 @@ LEAVE = 1.0
 """The longest time to disconnect, s."""
 
 
-def load() -> Any:
-    """Import paho. Raises Diagnostic where it is missing."""
+def load(who: str = "publish") -> Any:
+    """Import paho for a command. Raises Diagnostic where it is missing."""
     try:
         with importing():
             from paho.mqtt import client
     except ImportError:
-        raise Diagnostic("publish needs paho-mqtt, which is not installed", hint=INSTALL) from None
+        raise Diagnostic(f"{who} needs paho-mqtt, which is not installed", hint=INSTALL) from None
     return client
 
 
@@ -130,15 +132,22 @@ class Message(NamedTuple):
     bus: str = ""
 
 
+Take = Callable[[str, bytes, bool], None]
+"""Takes a topic, a payload, and whether the message was retained."""
+
+
 class Connection:
     """One connection to a broker. `connect` makes it; it ends once, by `close` or by a loss."""
 
-    def __init__(self, target: Target, settings: MqttSettings, will: Message, name: str) -> None:
+    def __init__(
+        self, target: Target, settings: MqttSettings, will: Message | None, name: str, take: Take | None = None
+    ) -> None:
         """Make a connection that is not connected yet.
 
         `name`: the client's name. A broker ends an earlier connection of that name first, so its will comes in time.
+        `take`: takes, in paho's thread, what is published under the prefix; without it nothing is subscribed to.
         """
-        self._target, self._settings, self._will, self._name = target, settings, will, name
+        self._target, self._settings, self._will, self._name, self._take = target, settings, will, name, take
         self._where = f"{target.host}:{target.port}"
         self._loop = asyncio.get_running_loop()
         self._accepted: asyncio.Future[None] = self._loop.create_future()
@@ -166,11 +175,28 @@ class Connection:
     def _begin(self) -> None:
         """Open the socket, and begin the thread. Blocks."""
         paho = load()
-        client = paho.Client(paho.CallbackAPIVersion.VERSION2, client_id=self._name, reconnect_on_failure=False)
+        ended = partial(self._call, self._ended)
+
+        class Careful(paho.Client):  # type: ignore[misc, name-defined]
+            """A client whose thread ends as with any loss where a broker sends what is not MQTT."""
+
+            def loop_forever(self, *arguments: Any, **named: Any) -> Any:
+                try:
+                    return super().loop_forever(*arguments, **named)
+                except (ValueError, LookupError, TypeError, AttributeError, struct.error, paho.MQTTException):
+                    return paho.MQTTErrorCode.MQTT_ERR_PROTOCOL
+                finally:
+                    ended()
+
+        client = Careful(paho.CallbackAPIVersion.VERSION2, client_id=self._name, reconnect_on_failure=False)
         _log_in(client, self._target, self._settings)
-        client.will_set(self._will.topic, self._will.text, 1, retain=True)
+        if self._will is not None:
+            client.will_set(self._will.topic, self._will.text, 1, retain=True)
+        if self._take is not None:
+            client.on_message = lambda _client, _data, message: self._taken(message)
+            client.on_subscribe = lambda _client, _data, _number, reasons, _: self._call(self._subscribed, reasons)
         client.max_inflight_messages_set(WINDOW)
-        client.on_connect = lambda _client, _data, _flags, reason, _properties: self._call(self._answered, reason)
+        client.on_connect = lambda client, _data, _flags, reason, _properties: self._connected(client, reason)
         client.on_disconnect = lambda *_: self._call(self._ended)
         client.on_publish = lambda *_: self._acknowledged()
         client.connect(self._target.host, self._target.port, KEEPALIVE)
@@ -185,6 +211,13 @@ class Connection:
         with contextlib.suppress(RuntimeError):  # the loop was closed meanwhile
             self._loop.call_soon_threadsafe(function, *arguments)
 
+    def _connected(self, client: Client, reason: Any) -> None:
+        """Read on, in paho's thread."""
+        if self._take is not None and not reason.is_failure:
+            client.subscribe(f"{self._target.prefix}/#")
+        else:
+            self._call(self._answered, reason)
+
     def _answered(self, reason: Any) -> None:
         if self._accepted.done():
             return
@@ -195,6 +228,21 @@ class Connection:
             )
         else:
             self._accepted.set_result(None)
+
+    def _subscribed(self, reasons: Sequence[Any]) -> None:
+        if self._accepted.done():
+            return
+        if any(each.is_failure for each in reasons):
+            hint = "its access list has to allow it"
+            self._accepted.set_exception(Unreachable(f"the broker at {self._where} does not let us read; {hint}"))
+        else:
+            self._accepted.set_result(None)
+
+    def _taken(self, message: Any) -> None:
+        """Hand on a message, in paho's thread."""
+        assert self._take is not None
+        with contextlib.suppress(UnicodeDecodeError):  # such a topic is none of ours
+            self._take(message.topic, message.payload, message.retain)
 
     def _ended(self) -> None:
         self.lost.set()

@@ -5,7 +5,6 @@ from __future__ import annotations
 import asyncio
 import sys
 from collections.abc import Callable, Sequence
-from ipaddress import ip_address
 
 from multidrop.dialects import Diagnostic
 from multidrop.dialects.text import counted
@@ -14,32 +13,100 @@ from multidrop.shell.batch import runner
 from multidrop.shell.events import FAILURES
 from multidrop.shell.publishing import broker
 from multidrop.shell.publishing.broker import Message, Target, parse_target
-from multidrop.shell.publishing.feed import BYE, LOST, ONLINE, Feed, Topics, parse_rate
+from multidrop.shell.publishing.feed import Feed, Topics
+from multidrop.shell.publishing.listening import Listening, parse_listening
+from multidrop.shell.publishing.prometheus import Endpoint
 from multidrop.shell.publishing.publisher import Publisher
+from multidrop.shell.publishing.registry import LOST, ONLINE, Outlet, Registry, parse_rate
 from multidrop.shell.secrets import url_without_secrets
 from multidrop.shell.session import Session
 from multidrop.shell.streams.stdout import report, write
 from multidrop.shell.workspace import Workspace
 from multidrop.transports import TransportLost
+from multidrop.transports.sockets import exposed
 
 AGAIN = 30.0
 """The time between two attempts to open a line that was not there, s."""
+SERVERS = {"prometheus": Endpoint}
+"""The outlets that listen, by scheme."""
 
 
-def run(urls: Sequence[str], *, to: str, rate: str, reconnect: bool = True) -> int:
-    """Publish until a signal, which ends it well; return the exit code. `reconnect`: a lost line is tried again."""
+def run(
+    urls: Sequence[str], *, to: Sequence[str], rate: str, home_assistant: bool = False, reconnect: bool = True
+) -> int:
+    """Publish until a signal, which ends it well; return the exit code.
+
+    `home_assistant`: describe the values for its discovery. `reconnect`: a lost line is tried again.
+    """
     try:
-        target, period = parse_target(to), parse_rate(rate)
-        broker.load()
+        targets, period = [*map(_parse, to)], parse_rate(rate)
+        if len({*targets}) < len(targets):
+            raise Diagnostic("given twice", "--to", "name each target once")
+        if home_assistant and not any(isinstance(each, Target) for each in targets):
+            raise Diagnostic(
+                "goes through a broker, and none is named", "--home-assistant", "--to mqtt://BROKER/PREFIX"
+            )
+        for each in targets:
+            (SERVERS[each.scheme] if isinstance(each, Listening) else broker).load()
     except Diagnostic as problem:
         write(sys.stderr, report(problem))
         return 2
 
     async def body(session: Session) -> None:
-        absent = await open_lines(session, urls, reconnect)
-        await _until_ended(session, target, period, absent)
+        registry = Registry(session, period)
+        registry.outlets += [_outlet(registry, each, home_assistant) for each in targets]
+        await _publish(registry, urls, reconnect)
 
     return runner.run([], body, interrupted=0, reconnect=reconnect, replies=False)
+
+
+def _parse(text: str) -> Target | Listening:
+    return parse_listening(text) if text.partition("://")[0] in SERVERS else parse_target(text)
+
+
+def _outlet(registry: Registry, target: Target | Listening, home_assistant: bool) -> Outlet:
+    session = registry.session
+    if isinstance(target, Listening):
+        return SERVERS[target.scheme](registry, target)
+    topics, settings, name = Topics(target.prefix), session.settings.mqtt, broker.fresh_name()
+    if not target.encrypted and (settings.password or settings.password_file) and exposed(target.host):
+        registry.warn(f"the password goes to {target.host} unencrypted; mqtts:// encrypts it")
+    publisher = Publisher(
+        lambda: broker.Connection(target, settings, Message(topics.status, LOST, retain=True), name),
+        Message(topics.status, ONLINE, retain=True),
+        registry.warn,
+        lambda numbers: feed.dropped(numbers),
+    )
+    feed = Feed(registry, publisher, topics, target.text, home_assistant)
+    return feed
+
+
+async def _publish(registry: Registry, urls: Sequence[str], reconnect: bool) -> None:
+    """Listen, open the lines, and publish until all of them are lost. Raises their loss."""
+    session, outlets = registry.session, registry.outlets
+    waits: list[asyncio.Task[None]] = []
+    try:
+        for outlet in outlets:
+            await outlet.listen()
+        absent = await open_lines(session, urls, reconnect)
+        for outlet in outlets:
+            await outlet.begin()
+        drives, lines = sum(len(bus.drives) for bus in session.buses.values()), len(session.buses)
+        what = f"{counted(drives, 'drive')} on {counted(lines, 'line')}"
+        where = " and ".join(outlet.text for outlet in outlets)
+        write(sys.stderr, f"publishing {what} to {where}; Ctrl+C ends it")
+        registry.begin()
+        waits += [asyncio.create_task(open_later(session, url, registry.add)) for url in absent]
+        await runner.until(session, lambda: _lost(session))
+        loss = _lost(session)
+        assert loss is not None
+        raise loss
+    finally:
+        for each in waits:
+            each.cancel()
+        registry.end()
+        for outlet in outlets:
+            write(sys.stderr, *filter(None, [await outlet.end()]))
 
 
 async def open_lines(session: Session, urls: Sequence[str], later: bool) -> list[str]:
@@ -72,47 +139,6 @@ async def open_later(session: Session, url: str, add: Callable[[Bus], None]) -> 
         for bus in opened:
             add(bus)
         return
-
-
-async def _until_ended(workspace: Session, target: Target, period: float, absent: Sequence[str]) -> None:
-    topics, settings, name = Topics(target.prefix), workspace.settings.mqtt, broker.fresh_name()
-    if not target.encrypted and (settings.password or settings.password_file) and not _here(target.host):
-        warning = f"the password goes to {target.host} unencrypted; mqtts:// encrypts it"
-        workspace.notify(warning, warning=True)  # others on the way to the broker can read it
-    publisher = Publisher(
-        lambda: broker.Connection(target, settings, Message(topics.status, LOST, retain=True), name),
-        Message(topics.status, ONLINE, retain=True),
-        lambda text: workspace.notify(text, warning=True),
-        lambda numbers: feed.dropped(numbers),
-    )
-    feed = Feed(workspace, publisher, topics, period)
-    await publisher.begin()
-    drives, lines = sum(len(bus.drives) for bus in workspace.buses.values()), len(workspace.buses)
-    what = f"{counted(drives, 'drive')} on {counted(lines, 'line')}"
-    write(sys.stderr, f"publishing {what} to {target.text}; Ctrl+C ends it")
-    feed.begin()
-    waits = [asyncio.create_task(open_later(workspace, url, feed.add)) for url in absent]
-    try:
-        await runner.until(workspace, lambda: _lost(workspace))
-        loss = _lost(workspace)
-        assert loss is not None
-        raise loss
-    finally:
-        for each in waits:
-            each.cancel()
-        feed.end()
-        await publisher.end(Message(topics.status, BYE, retain=True))
-        parts = [f"{counted(publisher.sent, 'message')} published"]
-        parts += [f"{publisher.lost} dropped, as they had no room"] if publisher.lost else []
-        parts += [f"{publisher.waiting} not sent: the broker is away"] if publisher.waiting else []
-        write(sys.stderr, "; ".join(parts))
-
-
-def _here(host: str) -> bool:
-    try:
-        return ip_address(host).is_loopback
-    except ValueError:
-        return host == "localhost"
 
 
 def _lost(workspace: Workspace) -> TransportLost | None:

@@ -1,27 +1,26 @@
-"""The feed of a publisher: samples, states, errors and transcripts of every drive of every open line."""
+"""The way of a registry to a broker: topics, texts, limits of what rests and of transcripts, the heartbeat."""
 
 from __future__ import annotations
 
 import asyncio
 import json
+import re
+import socket
 from collections import Counter, defaultdict
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 from datetime import datetime
-from functools import partial
-from typing import NamedTuple
 
-from multidrop.dialects import Diagnostic
+from multidrop.dialects.on_demand import imported
 from multidrop.dialects.text import counted, visible
-from multidrop.dialects.units import Takes
-from multidrop.dialects.values import UNREAD, Conditions
 from multidrop.drives.bus import Bus
-from multidrop.drives.events import Changed, Conditioned, Lost, Sample, Silent, Unsolicited
+from multidrop.drives.events import Unsolicited
 from multidrop.shell.events import Entered, Failed, Notified, OnBus, Printed, SessionEvent
 from multidrop.shell.log.files import Entry, line_of
 from multidrop.shell.publishing.broker import Message
+from multidrop.shell.publishing.home_assistant import sensor
 from multidrop.shell.publishing.publisher import Publisher
-from multidrop.shell.session import Session
+from multidrop.shell.publishing.registry import BYE, ONLINE, Fields, Key, Registry, Value
 from multidrop.shell.streams.stdout import shortened
 
 RESERVED = "+#/%"
@@ -65,6 +64,10 @@ class Topics:
     def status(self) -> str:
         return f"{self.prefix}/status"
 
+    @property
+    def about(self) -> str:
+        return f"{self.prefix}/about"
+
     def bus_status(self, bus: str) -> str:
         return f"{self.prefix}/{escape(bus)}/status"
 
@@ -75,12 +78,11 @@ class Topics:
         return f"{self.prefix}/{escape(bus)}/{escape(address)}/{what}"
 
 
-ONLINE, LOST, BYE = "online", "lost", "bye"
-"""Plain words: the states of this program, and of a line."""
-MOVING, AT_REST, NO_CURRENT, SILENT = "moving", "at rest", "no current", "silent"
-"""The states of a drive; or LOST, with its line. NO_CURRENT: an axis is at rest, and nothing holds its load."""
-Fields = Mapping[str, int | float | str]
-"""`value`, and more facts."""
+def shown_name(bus: Bus) -> str:
+    """The name of a line for a person elsewhere: host and port, where it was named after its host."""
+    place = bus.link.transport.name.partition("://")[2]
+    host = place.rpartition(":")[0]
+    return place if host and re.fullmatch(rf"{re.escape(host)}(-\d+)?", bus.name) else bus.name
 
 
 def value_text(time: datetime, fields: Fields) -> str:
@@ -89,27 +91,11 @@ def value_text(time: datetime, fields: Fields) -> str:
     return json.dumps({"time": time.isoformat(timespec="microseconds"), **found})
 
 
-def error_of(conditions: Iterable[Conditions]) -> Fields:
-    """A drive's error: that of the first axis that has one; 0: none."""
-    found = next((each for each in conditions if each.error), None)
-    if found is None:
-        return {"value": 0, "text": ""}
-    text = "set; to read its number would clear it" if found.error == UNREAD else found.error_text
-    return {"value": found.error, "text": text, "axis": found.axis}
-
-
-def program_of(conditions: Iterable[Conditions]) -> str:
-    return next((each.program for each in conditions if each.program), "")
-
-
 def line_text(entry: Entry) -> str:
     """A line of a transcript: an entry of the session log, shortened."""
     return line_of(replace(entry, text=shortened(entry.text))).decode().rstrip("\n")
 
 
-DEFAULT = "2"
-"""The usual rate, samples a second of each drive."""
-SLOWEST, FASTEST = 0.01, 50.0
 UNCHANGED = 5.0
 """The time after which a value that has not changed is published again, s."""
 LINES = 20.0
@@ -118,57 +104,23 @@ BURST = 100.0
 """Lines of one transcript that are published at once after a pause."""
 
 
-def parse_rate(text: str) -> float:
-    """The period between two samples of a drive, s. Raises Diagnostic."""
-    try:
-        rate = float(text)
-    except ValueError:
-        rate = 0.0
-    if not SLOWEST <= rate <= FASTEST:
-        valid = f"valid: {SLOWEST:g} to {FASTEST:g} samples a second of each drive"
-        raise Diagnostic(f"invalid rate {text!r}", "--rate", valid)
-    return 1 / rate
-
-
-class Point(NamedTuple):
-    """A value and its time."""
-
-    at: float
-    value: int
-
-
-@dataclass
-class SampleLimit:
-    """The limit of one drive's samples. A poll may come early by half a period; the rate stays."""
-
-    period: float
-    due: float = float("-inf")
-
-    def passes(self, at: float) -> bool:
-        """Whether a sample is published; count it if so."""
-        if at < self.due - self.period / 2:
-            return False
-        self.due = max(self.due, at) + self.period
-        return True
-
-
 @dataclass
 class Curve:
     """The published points of one value."""
 
-    shown: Point | None = None
-    held: Point | None = None
+    shown: Value | None = None
+    held: Value | None = None
     """The newest point that was not published, as its value was that of the one before."""
 
-    def take(self, point: Point) -> Iterator[Point]:
+    def take(self, point: Value) -> Iterator[Value]:
         """Yield the points to publish now.
 
         A change is published with the point before it, so that a chart shows when it began.
         """
-        if self.shown is not None and point.value == self.shown.value and point.at - self.shown.at < UNCHANGED:
+        if self.shown is not None and point.number == self.shown.number and point.at - self.shown.at < UNCHANGED:
             self.held = point
             return
-        if self.held is not None and point.value != self.held.value:
+        if self.held is not None and point.number != self.held.number:
             yield self.held
         self.shown, self.held = point, None
         yield point
@@ -202,83 +154,8 @@ class LineLimit:
         return dropped
 
 
-Put = Callable[[str, float, bool, Fields], None]
-"""Publishes a value: `position`, its time, whether it is retained, and its facts."""
-
-
-Given = Callable[[str, float, Takes], tuple[float, str] | None]
-
-
-class DriveFeed:
-    """The values of a drive that were published, and what is published next."""
-
-    def __init__(self, put: Put, period: float, given: Given = lambda axis, number, takes: None) -> None:
-        """`period`: between two samples, s. `given`: a number of an axis in its unit, and the unit."""
-        self._put, self._period, self._given = put, period, given
-        self._limits: dict[str, SampleLimit] = {}
-        self._curves: dict[tuple[str, str], Curve] = {}
-        """By what, and axis."""
-        self._moving: dict[str, bool] = {}
-        """By axis."""
-        self._program: str | None = None
-        """None: not known."""
-        self._no_current = False
-        """An axis has no current at rest, as last read."""
-        self._state: Fields = {}
-        self._error: Fields = {}
-
-    def take(self, event: Sample | Silent | Conditioned) -> None:
-        if isinstance(event, Sample):
-            self._sample(event)
-        elif isinstance(event, Silent):
-            self._say_state(event.at, SILENT)
-        else:
-            self._program = program_of(event.conditions)
-            self._no_current = any(each.no_current for each in event.conditions)
-            if self._state:
-                known = str(self._state["value"])
-                self._say_state(event.at, self._motion() if self._moving and known != SILENT else known)
-            if (error := error_of(event.conditions)) != self._error:
-                self._error = error
-                self._put("error", event.at, True, error)
-
-    def lost(self, at: float) -> None:
-        self._program = None
-        self._moving.clear()
-        self._say_state(at, LOST)
-
-    def _sample(self, sample: Sample) -> None:
-        at, axis = sample.at, sample.axis
-        self._moving[axis] = sample.velocity != 0
-        if sample.program is not None and sample.program != bool(self._program):
-            self._program = "running" if sample.program else ""
-        self._say_state(at, self._motion())
-        if not self._limits.setdefault(axis, SampleLimit(self._period)).passes(at):
-            return
-        for what, value, takes in (
-            ("position", sample.position, Takes.PLACE),
-            ("velocity", sample.velocity, Takes.VELOCITY),
-        ):
-            for point in self._curves.setdefault((what, axis), Curve()).take(Point(at, value)):
-                given = self._given(axis, point.value, takes)
-                fields: Fields = {} if given is None else {"quantity": given[0], "unit": given[1]}
-                self._put(what, point.at, False, {"value": point.value, "axis": axis, **fields})
-
-    def _motion(self) -> str:
-        if any(self._moving.values()):
-            return MOVING
-        return NO_CURRENT if self._no_current else AT_REST
-
-    def _say_state(self, at: float, word: str) -> None:
-        state: Fields = {"value": word} if self._program is None else {"value": word, "program": self._program}
-        if state != self._state:
-            self._state = state
-            self._put("state", at, True, state)
-
-
 KINDS = {Entered: "typed", Printed: "printed", Notified: "notice", Failed: "failed"}
-CONDITIONS = 1.0
-"""Seconds between two readings of conditions on a line, of one drive after the other."""
+RETAINED = ("state", "error")
 LOOK = 1.0
 """Seconds between two looks at what waits."""
 HEARTBEAT = 30.0
@@ -286,65 +163,89 @@ HEARTBEAT = 30.0
 
 
 class Feed:
-    """Makes messages for a publisher of the events of a workspace, from `begin` to `end`."""
+    """Makes messages for a publisher of the values of a registry and the lines of a session's transcript."""
 
-    def __init__(self, workspace: Session, publisher: Publisher, topics: Topics, period: float) -> None:
-        """`period`: between two samples of a drive, s."""
-        self._workspace, self._publisher, self._topics, self.period = workspace, publisher, topics, period
-        self._lines: dict[str, _Line] = {}
+    def __init__(
+        self, registry: Registry, publisher: Publisher, topics: Topics, text: str = "", home_assistant: bool = False
+    ) -> None:
+        """`text`: the URL of the broker. `home_assistant`: describe each value as a sensor, too."""
+        self._registry, self._session, self._described = registry, registry.session, home_assistant
+        self._publisher, self._topics, self.text = publisher, topics, text
+        self._named: dict[str, str] = {}
+        """The names of the lines, as a person knows them, by those in the topics."""
+        self._curves: defaultdict[Key, Curve] = defaultdict(Curve)
+        self._sensors: dict[Key, tuple[object, ...]] = {}
+        """What Home Assistant was told of each value: its unit, and the product."""
         self._limits: defaultdict[str, LineLimit] = defaultdict(LineLimit)
         self._leave: Callable[[], None] = lambda: None
         self._task: asyncio.Task[None] | None = None
-        self._time: tuple[float, datetime] | None = None
-        """The time of the last value on both clocks: all values of one sample have the same time."""
 
-    def begin(self) -> None:
-        self._leave = self._workspace.subscribe(self._take)
-        for bus in self._workspace.buses.values():
-            self.add(bus)
+    async def listen(self) -> None:
+        """Take nothing: the broker has the port."""
+
+    async def begin(self) -> None:
+        await self._publisher.begin()
+        self._say_about()
+        self._leave = self._session.subscribe(self._take)
         self._task = asyncio.get_running_loop().create_task(self._looking())
 
-    def add(self, bus: Bus) -> None:
-        self._lines[bus.name] = _Line(self, bus)
-
-    def end(self) -> None:
+    async def end(self) -> str:
+        if self._task is None:  # the broker was not there
+            return ""
         self._leave()
-        for line in self._lines.values():
-            line.close()
-        if self._task is not None:
-            self._task.cancel()
+        self._task.cancel()
+        publisher = self._publisher
+        await publisher.end(Message(self._topics.status, BYE, retain=True))
+        parts = [f"{counted(publisher.sent, 'message')} published"]
+        parts += [f"{publisher.lost} dropped, as they had no room"] if publisher.lost else []
+        parts += [f"{publisher.waiting} not sent: the broker is away"] if publisher.waiting else []
+        return "; ".join(parts)
+
+    def line(self, bus: str, word: str) -> None:
+        self._put(self._topics.bus_status(bus), word, bus, retain=True)
+        if bus not in self._named:
+            self._say_about()
+
+    def _say_about(self) -> None:
+        """Say which program publishes here, and the names of its lines."""
+        self._named = {each.name: shown_name(each) for each in self._session.buses.values()}
+        about = {"version": imported("multidrop:__version__"), "host": socket.gethostname(), "lines": self._named}
+        self._publisher.put(Message(self._topics.about, json.dumps(about), retain=True))
+
+    def value(self, key: Key, value: Value) -> None:
+        """Publish a value; state and error of the drive alone, and a number that rests now and then."""
+        retain = key.what in RETAINED
+        if retain and key.axis:
+            return
+        topic = self._topics.drive(key.bus, key.address, key.what)
+        if self._described:
+            self._describe(key, value, topic)
+        for each in (value,) if retain else self._curves[key].take(value):
+            self._put(topic, value_text(each.time, each.fields), key.bus, retain)
+
+    def _describe(self, key: Key, value: Value, topic: str) -> None:
+        drive = self._session.buses[key.bus].drives.get(key.address)
+        if drive is None or self._sensors.get(key) == (facts := (value.fields.get("unit"), drive.product)):
+            return
+        self._sensors[key] = facts
+        available = self._topics.status, self._topics.bus_status(key.bus)
+        self._publisher.put(sensor(key, value, topic, available, self._registry.period, drive.product))
 
     def dropped(self, numbers: Counter[str]) -> None:
-        for bus in self._lines:
+        for bus in self._registry.words:
             if number := numbers[bus]:
                 missing = counted(number, "message is", "messages are")
                 self._missing(bus, f"{missing} missing before this: no room was left while the broker was away")
 
-    def put(self, topic: str, text: str, bus: str, retain: bool = False) -> None:
+    def _put(self, topic: str, text: str, bus: str, retain: bool = False) -> None:
         self._publisher.put(Message(topic, text, retain, bus))
-
-    def drive_feed(self, bus: str, address: str) -> DriveFeed:
-        return DriveFeed(partial(self._put_value, bus, address), self.period, partial(self._in_units, bus, address))
-
-    def _in_units(self, bus: str, address: str, axis: str, number: float, takes: Takes) -> tuple[float, str] | None:
-        found = self._workspace.buses[bus].drives.get(address) if self._workspace.scaled else None
-        return None if found is None else self._workspace.units.given(found, axis, number, takes)
-
-    def _put_value(self, bus: str, address: str, what: str, at: float, retain: bool, fields: Fields) -> None:
-        topic = self._topics.drive(bus, address, what)
-        if self._time is None or self._time[0] != at:
-            self._time = (at, self._workspace.wall(at))
-        self.put(topic, value_text(self._time[1], fields), bus, retain)
-
-    def status(self, bus: str, word: str) -> None:
-        self.put(self._topics.bus_status(bus), word, bus, retain=True)
 
     async def _looking(self) -> None:
         """Look at what waits, and repeat the states now and then, until cancelled."""
         while True:
             for _ in range(round(HEARTBEAT / LOOK)):
                 await asyncio.sleep(LOOK)
-                now = self._workspace.now()
+                now = self._session.now()
                 for bus, limit in self._limits.items():
                     if number := limit.missing(now):
                         self._missing(
@@ -354,79 +255,29 @@ class Feed:
                 self._publisher.look()
             if self._publisher.connected:
                 self._publisher.put(Message(self._topics.status, ONLINE, retain=True))
-                for line in self._lines.values():
-                    line.repeat()
-
-    # Events
+                for bus, word in self._registry.words.items():
+                    self.line(bus, word)
 
     def _take(self, event: SessionEvent) -> None:
         if isinstance(event, OnBus):
             if isinstance(event.event, Unsolicited):
                 for text in event.event.lines:
                     self._line(event.bus, event.event.at, "unsolicited", text)
-            elif (line := self._lines.get(event.bus)) is not None:
-                line.take(event.event)
         elif isinstance(event, Entered | Printed | Notified | Failed):
             text = event.line if isinstance(event, Entered) else event.text
             by = event.by.value if isinstance(event, Entered) else ""
             warning = isinstance(event, Notified) and event.warning
-            for bus in [event.bus] if event.bus else list(self._lines):  # a stop, or a verb, is of every line
+            for bus in [event.bus] if event.bus else list(self._registry.words):  # a stop, or a verb, is of every line
                 self._line(bus, event.at, KINDS[type(event)], text, getattr(event, "address", ""), by, warning)
 
     def _line(
         self, bus: str, at: float, kind: str, text: str, drive: str = "", by: str = "", warning: bool = False
     ) -> None:
         """Publish a line of a transcript, within its limit."""
-        if bus in self._lines and self._limits[bus].passes(self._workspace.now()):
-            entry = Entry(self._workspace.wall(at), kind, text, bus, drive, by, warning=warning)
-            self.put(self._topics.transcript(bus), line_text(entry), bus)
+        if bus in self._registry.words and self._limits[bus].passes(self._session.now()):
+            entry = Entry(self._session.wall(at), kind, text, bus, drive, by, warning=warning)
+            self._put(self._topics.transcript(bus), line_text(entry), bus)
 
     def _missing(self, bus: str, text: str) -> None:
-        entry = Entry(self._workspace.wall(self._workspace.now()), "missing", text, bus, warning=True)
-        self.put(self._topics.transcript(bus), line_text(entry), bus)
-
-
-class _Line:
-    """One line: its state, and its drives, which are polled."""
-
-    def __init__(self, feed: Feed, bus: Bus) -> None:
-        self._feed, self._bus = feed, bus
-        self._drives: dict[str, DriveFeed] = {}
-        self._ends: list[Callable[[], None]] = []
-        self._word = ""
-        self._look()
-
-    def take(self, event: object) -> None:
-        """Publish what an event says about a drive, or about the line."""
-        if isinstance(event, Lost):
-            for drive in self._drives.values():
-                drive.lost(event.at)
-        elif isinstance(event, Changed):
-            self._look()
-        elif isinstance(event, Sample | Silent | Conditioned) and event.address in self._drives:
-            self._drives[event.address].take(event)
-
-    def repeat(self) -> None:
-        self._feed.status(self._bus.name, self._word)
-
-    def close(self) -> None:
-        while self._ends:
-            self._ends.pop()()
-
-    def _look(self) -> None:
-        word = ONLINE if self._bus.lost is None else LOST
-        if word != self._word:
-            self._word = word
-            self._feed.status(self._bus.name, word)
-        addresses = list(self._bus.drives)
-        if addresses == list(self._drives):
-            return
-        self.close()
-        for gone in self._drives.keys() - set(addresses):  # its retained state must not stay
-            self._drives[gone].lost(self._bus.now())
-        self._drives = {
-            each: self._drives.get(each) or self._feed.drive_feed(self._bus.name, each) for each in addresses
-        }
-        telemetry = self._bus.telemetry
-        self._ends.append(telemetry.subscribe(addresses, self._feed.period).close)
-        self._ends.append(telemetry.watch(addresses, len(addresses) * CONDITIONS).close)
+        entry = Entry(self._session.wall(self._session.now()), "missing", text, bus, warning=True)
+        self._put(self._topics.transcript(bus), line_text(entry), bus)

@@ -79,6 +79,27 @@ REMIND = 60.0
 """The time between two reports of what is dropped while it goes on, s."""
 
 
+async def connected(make: Callable[[], Connection]) -> Connection:
+    """Make a connection, and connect. Raises TransportLost or Diagnostic."""
+    connection = make()
+    await connection.connect()
+    return connection
+
+
+async def again(make: Callable[[], Connection], notify: Callable[[str], None]) -> Connection:
+    """Try until there is a connection; say each reason once."""
+    pause, said = FIRST, ""
+    while True:
+        await asyncio.sleep(pause)
+        pause = min(2 * pause, LONGEST)
+        try:
+            return await connected(make)
+        except (TransportLost, Diagnostic) as failure:
+            if str(failure) != said:
+                said = str(failure)
+                notify(f"the broker is still lost: {said}")
+
+
 class Publisher:
     """Messages on their way to a broker. `begin` connects, `end` says goodbye."""
 
@@ -107,7 +128,7 @@ class Publisher:
 
     async def begin(self) -> None:
         """Connect for the first time. Raises TransportLost or Diagnostic."""
-        connection = await self._connected()
+        connection = await connected(self._make)
         self._begun(connection)
         self._task = asyncio.get_running_loop().create_task(self._keep(connection))
 
@@ -165,11 +186,6 @@ class Publisher:
     def waiting(self) -> int:
         return len(self._backlog)
 
-    async def _connected(self) -> Connection:
-        connection = self._make()
-        await connection.connect()
-        return connection
-
     def _begun(self, connection: Connection) -> None:
         connection.on_room = self.pump
         self.sent += connection.publish(self._online)
@@ -193,19 +209,6 @@ class Publisher:
             self._give_back()
             self._notify("the broker is lost; messages wait for it, and it is tried again")
             await connection.close()
-            connection = await self._again()
+            connection = await again(self._make, self._notify)
             self._notify(f"the broker is back after {asyncio.get_running_loop().time() - begin:.1f} s")
             self._begun(connection)
-
-    async def _again(self) -> Connection:
-        """Try until there is a connection; say each reason once."""
-        pause, said = FIRST, ""
-        while True:
-            await asyncio.sleep(pause)
-            pause = min(2 * pause, LONGEST)
-            try:
-                return await self._connected()
-            except (TransportLost, Diagnostic) as failure:
-                if str(failure) != said:
-                    said = str(failure)
-                    self._notify(f"the broker is still lost: {said}")

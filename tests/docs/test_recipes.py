@@ -13,15 +13,16 @@ import pytest
 
 from multidrop.dialects.values import Conditions
 from multidrop.shell.log.files import Entry
-from multidrop.shell.publishing import feed
+from multidrop.shell.publishing import feed, registry
 from multidrop.shell.publishing.feed import Topics
+from multidrop.shell.publishing.registry import error_of
 from tests.support.paths import ROOT
 
 FOLDER = ROOT / "docs" / "recipes"
 CONSUMERS = tomllib.loads((FOLDER / "telegraf.conf").read_text())["inputs"]["mqtt_consumer"]
 BOARD = json.loads((FOLDER / "grafana-dashboard.json").read_text())
 TOPICS, NOW = Topics("plant/hall-2"), datetime(2026, 11, 22, 14, 3, 7, 123456, timezone(timedelta(hours=1)))
-ERROR = feed.error_of([Conditions(error=5, error_text="limit")])
+ERROR = error_of([Conditions(error=5, error_text="limit")])
 TEXTS = {
     TOPICS.status: "online",
     TOPICS.bus_status("a/b+"): "lost",
@@ -113,6 +114,6 @@ def test_the_dashboard_has_the_words_of_the_states() -> None:
         for word in mapping["options"]
     }
     assert words == {
-        getattr(feed, name) for name in ("ONLINE", "LOST", "BYE", "MOVING", "AT_REST", "NO_CURRENT", "SILENT")
+        getattr(registry, name) for name in ("ONLINE", "LOST", "BYE", "MOVING", "AT_REST", "NO_CURRENT", "SILENT")
     }
     assert len({panel["id"] for panel in BOARD["panels"]}) == len(BOARD["panels"])

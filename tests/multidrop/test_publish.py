@@ -9,11 +9,14 @@ import signal
 import socket
 import subprocess
 import sys
+import urllib.error
+import urllib.request
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
+from prometheus_client.parser import text_string_to_metric_families
 
 from multidrop.shell.configuration import MqttSettings
 from multidrop.shell.publishing import broker as broker_module
@@ -180,17 +183,128 @@ async def test_a_server_that_never_answers_is_given_up_and_nothing_stays(monkeyp
         (["--to", f"mqtt://{'m' * 70000}@127.0.0.1/p"], 2, "the login is too long"),
         (["--to", "mqtt://me:hunter2@127.0.0.1/p"], 2, "--to: a password in a URL"),
         ([], 2, "--to"),
+        (["--to", "prometheus://:0", "--home-assistant"], 2, "--home-assistant: goes through a broker"),
+        (["--to", "prometheus://:x"], 2, "--to: no address ':x' of a server"),
+        (["--to", "prometheus://:1", "--to", "prometheus://127.0.0.1:1"], 2, "--to: given twice"),
+        (
+            ["--to", "prometheus://:0", "--to", "prometheus://:{taken}"],
+            3,
+            "cannot listen there: Address already in use",
+        ),
+        (["--to", "prometheus://no-such-host.invalid:0"], 3, "unknown host name"),
     ],
 )
 def test_what_is_wrong_at_the_start_is_one_line(arguments: list[str], code: int, says: str, multidrop: Any) -> None:
-    typed = [each.format(free=free_port()) for each in arguments]
-    done = multidrop("publish", "sim:#eth", *typed)
+    with socket.create_server(("127.0.0.1", 0)) as taken:
+        typed = [each.format(free=free_port(), taken=taken.getsockname()[1]) for each in arguments]
+        done = multidrop("publish", "sim:#eth", *typed)
     assert (done.returncode, done.stderr.count("\n"), done.stdout) == (code, 1, "")
     assert says in done.stderr and "hunter2" not in done.stderr
 
 
-def test_without_paho_it_says_what_to_install(multidrop: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(sys.modules, "paho.mqtt", None)
-    done = multidrop("publish", "sim:#eth", "--to", "mqtt://h/p")
-    assert done.returncode == 2
-    assert done.stderr == "publish needs paho-mqtt, which is not installed; pip install 'multidrop[mqtt]'\n"
+@pytest.mark.parametrize(
+    ("to", "missing", "says"),
+    [
+        ("mqtt://h/p", "paho.mqtt", "publish needs paho-mqtt, which is not installed; pip install 'multidrop[mqtt]'\n"),
+        (
+            "prometheus://:0",
+            "prometheus_client",
+            "publish --to prometheus:// needs prometheus_client, which is not installed; "
+            "pip install 'multidrop[prometheus]'\n",
+        ),
+    ],
+)
+def test_without_its_library_it_says_what_to_install(
+    to: str, missing: str, says: str, multidrop: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, missing, None)
+    done = multidrop("publish", "sim:#eth", "--to", to)
+    assert (done.returncode, done.stderr) == (2, says)
+
+
+@pytest.mark.process
+def test_a_plant_shows_a_publisher_its_loss_and_its_return_and_is_no_line(
+    mosquitto: Mosquitto, tmp_path: Path, multidrop: Any
+) -> None:
+    broker = f"mqtt://127.0.0.1:{mosquitto.plain}/works"
+    arguments = ("publish", "sim:#press", "--to", f"{broker}/hall", "--rate", "5")
+    publisher, plant = Running(*arguments, folder=tmp_path), Running("plant", broker, "--json", folder=tmp_path)
+
+    def until(state: str) -> dict[str, Any]:
+        while True:
+            row: dict[str, Any] = json.loads(plant.lines.get(timeout=PATIENCE))
+            if row["drive"] == "a" and row["state"] == state and len(row["values"]) >= 3:
+                return row
+
+    try:
+        row = until("at rest")
+        assert (row["place"], row["publisher"], row["line"]) == ("hall", "works/hall", "press")
+        assert row["host"] == socket.gethostname() and row["program"] == "online"
+        ages = {each["what"]: each["age"] for each in row["values"]}
+        assert {"position", "velocity", "state"} <= set(ages) and 0 <= ages["position"] < PATIENCE
+        publisher.process.send_signal(signal.SIGKILL)
+        assert until("PC lost")["program"] == "PC lost"
+        publisher.end()
+        publisher = Running(*arguments, folder=tmp_path)
+        until("at rest")
+        plant.process.send_signal(signal.SIGINT)
+        assert plant.end() == 0 and all("Traceback" not in line for line in plant.errors)
+    finally:
+        publisher.kill()
+        plant.kill()
+    for command in (
+        ("send", broker, "PR P"),
+        ("publish", broker, "--to", "prometheus://:0"),
+        ("run", "x.mds", "--on", broker),
+    ):
+        done = multidrop(*command)
+        assert done.returncode == 2 and done.stderr.count("\n") == 1, done.stderr
+    done = multidrop("send", broker, "PR P")
+    assert done.stderr == (
+        f"{broker}: a broker is no line, and no drive can be reached through one; "
+        "it only shows what was published; `multidrop plant URL` shows it\n"
+    )
+
+
+@pytest.mark.parametrize(
+    ("url", "code", "says"),
+    [
+        ("mqtt://127.0.0.1:{free}/p", 3, "no broker at 127.0.0.1:"),
+        ("mqtt://127.0.0.1:1", 2, "plant: no PREFIX of the topics"),
+        ("mqtt://me:hunter2@h/p", 2, "plant: a password in a URL"),
+        ("press", 2, "plant: the URL of a broker begins with mqtt://"),
+    ],
+)
+def test_a_plant_that_cannot_be_had_is_one_line(url: str, code: int, says: str, multidrop: Any) -> None:
+    done = multidrop("plant", url.format(free=free_port()))
+    assert (done.returncode, done.stderr.count("\n"), done.stdout) == (code, 1, "")
+    assert says in done.stderr and "hunter2" not in done.stderr
+
+
+@pytest.mark.process
+def test_a_scraper_and_a_broker_read_the_same_values_and_other_machines_only_where_it_is_told(
+    mosquitto: Mosquitto, tmp_path: Path
+) -> None:
+    port, seen = free_port(), Subscriber(mosquitto.plain)
+    broker, open_to_all = f"mqtt://127.0.0.1:{mosquitto.plain}/both", f"prometheus://0.0.0.0:{port}"
+    running = Running("publish", "sim:#press", "--to", open_to_all, "--to", broker, folder=tmp_path)
+    try:
+        seen.until(lambda: bool(seen.texts("both/press/a/position")))
+        with urllib.request.urlopen(f"http://127.0.0.1:{port}/metrics", timeout=PATIENCE) as answer:
+            families = {each.name: each for each in text_string_to_metric_families(answer.read().decode())}
+        drives = {each.labels["drive"]: each.value for each in families["multidrop_position"].samples}
+        assert drives["a"] == json.loads(seen.texts("both/press/a/position")[-1])["value"]
+        with pytest.raises(urllib.error.HTTPError, match="405"):
+            urllib.request.urlopen(f"http://127.0.0.1:{port}/metrics", b"PR P", timeout=PATIENCE)
+        running.process.send_signal(signal.SIGINT)
+        assert running.end() == 0
+    finally:
+        running.kill()
+        seen.close()
+    warning, begun, ended = running.errors
+    assert (
+        warning
+        == f"everybody who reaches {open_to_all} can read what the drives do; without a HOST only this machine can"
+    )
+    assert begun == f"publishing 3 drives on 1 line to {open_to_all} and {broker}; Ctrl+C ends it"
+    assert ended.endswith("messages published")

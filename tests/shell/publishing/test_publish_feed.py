@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import asyncio
 import json
+import re
+import socket
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from pathlib import Path
 
 import pytest
 
+from multidrop import __version__
 from multidrop.dialects import Diagnostic
 from multidrop.drives.events import Unsolicited
 from multidrop.shell.configuration import Settings
@@ -18,6 +21,7 @@ from multidrop.shell.publishing.broker import Message
 from multidrop.shell.publishing.command import AGAIN, open_later, open_lines
 from multidrop.shell.publishing.feed import BURST, HEARTBEAT, LINES, Feed, Topics
 from multidrop.shell.publishing.publisher import Backlog, Publisher
+from multidrop.shell.publishing.registry import Registry
 from multidrop.shell.session import Session
 from multidrop.transports import TransportLost
 from tests.support.cell_session import ETHERNET, CellSession, bus, party, pmx
@@ -28,7 +32,7 @@ pytestmark = pytest.mark.virtual
 
 @asynccontextmanager
 async def published(
-    shop: CellSession, period: float = 0.5, backlog: Backlog | None = None
+    shop: CellSession, period: float = 0.5, backlog: Backlog | None = None, home_assistant: bool = False
 ) -> AsyncIterator[KeptBroker]:
     """Publish all of a session to a broker in memory."""
     broker, session = KeptBroker(), shop.session
@@ -39,14 +43,16 @@ async def published(
         lambda numbers: feed.dropped(numbers),
         backlog,
     )
-    feed = Feed(session, publisher, Topics("p"), period)
-    await publisher.begin()
-    feed.begin()
+    registry = Registry(session, period)
+    feed = Feed(registry, publisher, Topics("p"), "", home_assistant)
+    registry.outlets.append(feed)
+    await feed.begin()
+    registry.begin()
     try:
         yield broker
     finally:
-        feed.end()
-        await publisher.end(Message("p/status", "bye", True))
+        registry.end()
+        await feed.end()
 
 
 async def test_position_velocity_state_and_error_of_every_drive_are_published(tmp_path: Path) -> None:
@@ -63,7 +69,14 @@ async def test_position_velocity_state_and_error_of_every_drive_are_published(tm
             assert f"p/{drive}/position" not in retained
         assert [json.loads(text)["axis"] for text in broker.texts("p/pmx/00/position")[:2]] == ["x", "y"]
         topics = {each.topic.rpartition("/")[2] for each in broker.received}
-        assert topics == {"status", "state", "position", "velocity", "error"}
+        assert topics == {"status", "state", "position", "velocity", "error", "about"}
+        about = json.loads(retained["p/about"])
+        assert about == {
+            "version": __version__,
+            "host": socket.gethostname(),
+            "lines": {"press": "press", "eth": "eth", "pmx": "pmx"},
+        }
+        assert [each.topic for each in broker.received[:2]] == ["p/status", "p/about"]
     assert broker.retained()["p/status"] == "bye"
 
 
@@ -181,6 +194,46 @@ async def test_the_states_are_repeated_and_what_was_dropped_is_said_in_the_trans
         missing = [each["text"] for each in texts if each["kind"] == "missing"]
         assert len(missing) == 1 and "messages are missing" in missing[0]
         assert int(missing[0].split()[0]) > 30
+
+
+async def test_home_assistant_is_told_of_every_value_once_by_a_retained_message_and_of_no_command(
+    tmp_path: Path,
+) -> None:
+    cell = [bus("press", party("a"), baud=0), bus("pmx", pmx("00"))]
+    async with CellSession(tmp_path, *cell) as shop, published(shop, home_assistant=True) as broker:
+        await asyncio.sleep(20)
+        sensors = {topic: text for topic, text in broker.retained().items() if topic.startswith("homeassistant/")}
+        assert sum(each.topic in sensors for each in broker.received) == len(sensors) == 4 + 6
+        found = {each["unique_id"]: each for each in map(json.loads, sensors.values())}
+        position = found["multidrop p/press/a/position"]
+        online = "{{ 'online' if value == 'online' else 'offline' }}"
+        assert position == {
+            "name": "position",
+            "unique_id": "multidrop p/press/a/position",
+            "state_topic": "p/press/a/position",
+            "value_template": "{{ value_json.value }}",
+            "availability": [
+                {"topic": "p/status", "value_template": online},
+                {"topic": "p/press/status", "value_template": online},
+            ],
+            "availability_mode": "all",
+            "device": {"identifiers": ["multidrop p/press/a"], "name": "press a", "model": position["device"]["model"]},
+            "origin": {"name": "multidrop", "sw_version": __version__},
+            "state_class": "measurement",
+            "expire_after": 60,
+        }
+        assert "LMD" in position["device"]["model"]
+        of_axis = found["multidrop p/pmx/00/velocity y"]
+        assert of_axis["value_template"] == "{{ value_json.value if value_json.axis == \"y\" else '' }}"
+        assert not any("command" in key for each in found.values() for key in each)
+        for topic in sensors:
+            assert re.fullmatch("homeassistant/sensor/[a-zA-Z0-9_-]+/config", topic)
+
+
+async def test_without_the_option_home_assistant_is_told_nothing(tmp_path: Path) -> None:
+    async with CellSession(tmp_path, bus("press", party("a"))) as shop, published(shop) as broker:
+        await asyncio.sleep(6)
+        assert not any(topic.startswith("homeassistant/") for topic in broker.retained())
 
 
 async def test_nothing_is_polled_after_the_end(tmp_path: Path) -> None:

@@ -21,21 +21,19 @@ from multidrop.shell.configuration import MqttSettings
 from multidrop.shell.log.files import Entry
 from multidrop.shell.publishing import feed
 from multidrop.shell.publishing.broker import Message, Target, parse_target
-from multidrop.shell.publishing.feed import (
+from multidrop.shell.publishing.feed import BURST, LINES, UNCHANGED, Curve, LineLimit, Topics, escape
+from multidrop.shell.publishing.publisher import Backlog
+from multidrop.shell.publishing.registry import (
     AT_REST,
-    BURST,
-    LINES,
-    UNCHANGED,
-    Curve,
-    DriveFeed,
-    LineLimit,
-    Point,
+    LOST,
+    MOVING,
+    NO_CURRENT,
+    DriveValues,
     SampleLimit,
-    Topics,
-    escape,
+    Value,
+    error_of,
     parse_rate,
 )
-from multidrop.shell.publishing.publisher import Backlog
 
 # Topics
 
@@ -171,7 +169,7 @@ def test_a_poll_that_comes_a_little_early_passes() -> None:
 
 def test_a_value_that_rests_is_published_every_few_seconds_and_a_change_with_the_point_before_it() -> None:
     curve = Curve()
-    points = [Point(at / 2, 0 if at < 24 else at) for at in range(27)]
+    points = [Value(at / 2, datetime.now(UTC), {"value": 0 if at < 24 else at}) for at in range(27)]
     published = [point.at for each in points for point in curve.take(each)]
     assert published == [0.0, UNCHANGED, 2 * UNCHANGED, 11.5, 12.0, 12.5, 13.0]
 
@@ -231,9 +229,9 @@ def test_a_value_is_json_with_a_time_as_in_the_log() -> None:
 
 def test_the_error_is_that_of_the_first_axis_that_has_one() -> None:
     fine, wrong = Conditions(axis="x"), Conditions(axis="y", error=5, error_text="limit")
-    assert feed.error_of([fine]) == {"value": 0, "text": ""}
-    assert feed.error_of([fine, wrong]) == {"value": 5, "text": "limit", "axis": "y"}
-    assert "clear" in str(feed.error_of([Conditions(error=UNREAD)])["text"])
+    assert error_of([fine]) == {"value": 0, "text": ""}
+    assert error_of([fine, wrong]) == {"value": 5, "text": "limit", "axis": "y"}
+    assert "clear" in str(error_of([Conditions(error=UNREAD)])["text"])
 
 
 def test_a_line_is_an_entry_of_the_log_without_secrets_and_of_bounded_length() -> None:
@@ -284,14 +282,38 @@ def test_config_show_hides_the_password_and_config_check_finds_a_missing_file(tm
 
 def test_a_program_that_a_stop_has_ended_is_published_as_ended_before_the_conditions_are_read_again() -> None:
     said: list[Any] = []
-    feed = DriveFeed(lambda what, at, retain, fields: said.append((at, fields)) if what == "state" else None, 1.0)
-    feed.take(Sample(1.0, "a", 5, 0))
-    feed.take(Conditioned(1.0, "a", (Conditions(program="G1", runs=True),)))
-    feed.take(Sample(2.0, "a", 5, 0))
-    feed.take(Sample(3.0, "a", 5, 0, program=False))
+    drive = DriveValues(lambda what, axis, at, fields: said.append((at, fields)) if what == "state" else None, 1.0)
+    drive.take(Sample(1.0, "a", 5, 0))
+    drive.take(Conditioned(1.0, "a", (Conditions(program="G1", runs=True),)))
+    drive.take(Sample(2.0, "a", 5, 0))
+    drive.take(Sample(3.0, "a", 5, 0, program=False))
     rest = AT_REST
     assert said == [
         (1.0, {"value": rest}),
         (1.0, {"value": rest, "program": "G1"}),
         (3.0, {"value": rest, "program": ""}),
     ]
+
+
+def test_each_axis_has_a_state_and_an_error_beside_those_of_its_drive() -> None:
+    said: list[Any] = []
+
+    def put(what: str, axis: str, at: float, fields: Any) -> None:
+        if what in ("state", "error"):
+            said.append((what, axis, fields["value"]))
+
+    drive = DriveValues(put, 1.0)
+    for axis, velocity in (("x", 0), ("y", 7)):
+        drive.take(Sample(1.0, "00", 5, velocity, axis=axis))
+    rest = [("state", "", AT_REST), ("state", "x", AT_REST)]
+    assert said == [*rest, ("state", "", MOVING), ("state", "y", MOVING)]
+    said.clear()
+    drive.take(Conditioned(2.0, "00", (Conditions("x", disabled="EO=0"), Conditions("y", error=5))))
+    assert ("state", "x", NO_CURRENT) in said and ("error", "", 5) in said and ("error", "x", 0) in said
+    said.clear()
+    drive.lost(3.0)
+    drive.take(Conditioned(3.5, "00", (Conditions("x"), Conditions("y"))))
+    states = [each for each in said if each[0] == "state" and each[2] != LOST]
+    assert states == []
+    drive.take(Sample(4.0, "00", 5, 0, axis="x"))
+    assert said[-3:] == [("state", "", AT_REST), ("state", "x", AT_REST), ("state", "y", AT_REST)]
