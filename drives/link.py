@@ -22,6 +22,8 @@ OnAnswer = Callable[[events.Transaction | TransportLost], None]
 
 
 TERMINATORS = (b"\r", b"\n")
+HELD_UP = 0.01
+"""A timer that is later than this, s, was held up with the loop: what the wire has delivered meanwhile comes first."""
 LONGEST_HEARD = 60
 """Most characters shown of a reply that was destroyed."""
 
@@ -183,7 +185,7 @@ class Link:
             if self._timer is not None and self._timer.when() > deadline:
                 self._sleep()
             if self._timer is None:  # one that fires too early costs less than many timers
-                self._timer = self._loop.call_at(deadline, self._wake)
+                self._timer = self._loop.call_at(deadline, self._wake, deadline)
         self._news.tell()
 
     @contextmanager
@@ -201,9 +203,12 @@ class Link:
         finally:
             leave()
 
-    def _wake(self) -> None:
+    def _wake(self, due: float) -> None:
         self._timer = None
-        self.advance()
+        if self.now() - due > HELD_UP:  # a pipe delivers in the next turn
+            self._loop.call_soon(self.advance)
+        else:
+            self.advance()
 
     def _sleep(self) -> None:
         if self._timer is not None:

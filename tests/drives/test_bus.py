@@ -156,3 +156,19 @@ async def test_closing_leaves_nothing_behind(desk):
     desk.events.clear()
     await asyncio.sleep(5)
     assert desk.events == []
+
+
+@pytest.mark.parametrize("held_up", [0.6, 3.0])
+async def test_what_arrived_while_the_loop_was_held_up_comes_before_the_time_out(desk: SimulatedBus, held_up: float):
+    loop: Any = asyncio.get_running_loop()
+
+    def busy() -> None:
+        loop._impatient.skipped += held_up  # as the screen does that is laid out on a slow PC
+
+    whole = await desk.send("a", "PR IS")
+    for moment in range(60):
+        loop.call_later(moment / 1000, busy)
+        assert await desk.send("a", "PR IS") == whole
+        await asyncio.sleep(0.2)
+    assert desk.told == desk.heard == []
+    await desk.bus.close()
