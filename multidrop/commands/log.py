@@ -1,4 +1,4 @@
-r"""`multidrop log show|follow|grep|judge|replay`: session logs as text, searched, followed, judged, and taken again.
+r"""`multidrop log show|follow|grep|at|bisect|judge|replay`: session logs as text, searched, compared, taken again.
 
 2026-11-22 12:41:06.020 >  press:b PR P
 2026-11-22 12:41:06.020 >> press:b bPR P\n
@@ -21,7 +21,7 @@ from multidrop.dialects import Diagnostic
 from multidrop.dialects.text import counted, visible
 from multidrop.shell import configuration
 from multidrop.shell.line_syntax import join_target
-from multidrop.shell.log import files, steps
+from multidrop.shell.log import files, moments, steps
 from multidrop.shell.log.files import KINDS, TRAFFIC, Entry, Line
 from multidrop.shell.log.judge import RULES, judged
 from multidrop.shell.raw import text_of
@@ -32,6 +32,7 @@ if TYPE_CHECKING:
 
 NOTHING_FOUND = 1
 BROKEN = 1
+DIFFERENT = 1
 STAMP = 23
 """The length of a time in a shown entry."""
 PERIOD = 0.1
@@ -110,6 +111,55 @@ def judge(chosen: argparse.Namespace) -> int:
     broken = counted(len(found.breaches), "breach", "breaches") if found.breaches else f"all {len(RULES)} rules held"
     write(sys.stderr, f"{path}: {broken} ({counts})")
     return code or (BROKEN if found.breaches else 0)
+
+
+def at(chosen: argparse.Namespace) -> int:
+    """Print what was known at a time: the last entry of each kind and place, and the last polls."""
+    found = moments.known(_path(chosen), chosen.time)
+    session = "" if found.session is None else found.session.text
+    fact: dict[str, object] = {"at": found.at.isoformat(), "file": str(found.path), "session": session}
+    fact |= {"since": None if found.session is None else found.session.time.isoformat()}
+    fact |= {"stopped": None if found.stopped is None else found.stopped.time.isoformat()}
+
+    def work() -> None:
+        if chosen.json:
+            write(sys.stdout, json.dumps({"moment": fact}), *(line.data.decode().rstrip("\n") for line in found.lines))
+            return
+        begun = "" if found.session is None else f": {session} since {_stamp(found.session)}"
+        write(sys.stdout, f"{found.path} at {found.at.isoformat(' ', 'milliseconds')[:STAMP]}{begun}")
+        if found.last is not None:
+            write(sys.stdout, f"the log ends at {_stamp(found.last)}")
+        if found.stopped is not None:
+            write(sys.stdout, f"stopped since {_stamp(found.stopped)}")
+        write(sys.stdout, *(text(line.entry) for line in found.lines if line.entry is not None))
+
+    return _reported(work)
+
+
+def bisect(chosen: argparse.Namespace) -> int:
+    """Print the first difference between two runs; the exit code says whether there is any."""
+    runs = [moments.Run(Path(file)) for file in (chosen.file1, chosen.file2)]
+    found = moments.first_difference(*runs)
+    lines = [None if index is None else run.line(index) for run, index in zip(runs, found or (None, None), strict=True)]
+
+    def work() -> None:
+        if chosen.json:
+            both = [None if line is None else {"where": line.where, **json.loads(line.data)} for line in lines]
+            fact = {"differ": found is not None, "lines": [len(run.steps) for run in runs], "first": both}
+            write(sys.stdout, json.dumps(fact))
+        elif found is None:
+            write(sys.stdout, f"no difference in {counted(len(runs[0].steps), 'line')}")
+        else:
+            for file, run, line in zip((chosen.file1, chosen.file2), runs, lines, strict=True):
+                none = f"{file}: nothing: its run has {counted(len(run.steps), 'line')}"
+                entry = None if line is None else line.entry
+                write(sys.stdout, none if line is None or entry is None else f"{line.where}: {text(entry)}")
+
+    return _reported(work) or (DIFFERENT if found else 0)
+
+
+def _stamp(entry: Entry) -> str:
+    return text(entry)[:STAMP]
 
 
 def replay(chosen: argparse.Namespace) -> int:
