@@ -9,7 +9,7 @@ from __future__ import annotations
 import os
 import re
 from collections import defaultdict, deque
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 from datetime import datetime, time, timedelta
 from itertools import islice
@@ -29,13 +29,12 @@ POLLS, QUESTIONS = 2000, 4
 """The entries of polls before a moment in which samples are looked for; the questions of a drive that are shown."""
 COMPRESSED = (b"\x1f\x8b", b"BZh", b"\xfd7zXZ", b"\x28\xb5\x2f\xfd", b"PK\x03\x04")
 _SESSION = f'"kind": "log", "text": "{BEGIN} '.encode()
+_KIND = b'"kind": "'
 _RESUME = b'"kind": "typed", "text": "/resume"'
 _POLL = b'"poll": true}'
 _PLACE = rb'(?:, "bus": "(?:[^"\\]|\\.)*")?(?:, "drive": "(?:[^"\\]|\\.)*")?'
-_KEY = re.compile(
-    rb'"kind": "(?:bus|typed|printed|unsolicited|output|notice|failed|stop|missing)"' + _PLACE + rb', "text"'
-)
 _STEP = re.compile(rb'"kind": "(?:typed|printed|unsolicited|failed|stop)"[^\n]*')
+_KEPT = rb"(?:bus|typed|printed|unsolicited|output|notice|failed|stop|missing)"
 _STEP_PLACE = re.compile(rb'"kind": "[a-z]+"' + _PLACE)
 _BY = tuple(f', "by": "{word}"'.encode() for word in ("operator", "macro", "script"))
 
@@ -124,7 +123,7 @@ def known(path: Path, text: str) -> Known:
     polls: list[Line] = []
     session: Entry | None = None
     for block in _back(paths, end):
-        for key in {*_KEY.findall(block.data), _RESUME} - found.keys():
+        for key in {*_other_keys(found).findall(block.data), _RESUME} - found.keys():
             if (place := block.data.rfind(key)) >= 0 and (line := _line(block, place)) is not None:
                 found[key] = line
         place = len(block.data)
@@ -135,6 +134,12 @@ def known(path: Path, text: str) -> Known:
     if not found and session is None:
         raise Diagnostic(f"nothing was logged until {at.isoformat(' ', 'milliseconds')}", str(path))
     return _made(at, paths[-1], session, last if last.time <= at else None, found, polls)
+
+
+def _other_keys(found: Collection[bytes]) -> re.Pattern[bytes]:
+    """Matches the beginnings of entries, up to their texts, of kinds and places that are not found yet."""
+    known = b"|".join(re.escape(key.removeprefix(_KIND)) for key in found if key != _RESUME)
+    return re.compile(_KIND + (b"(?!" + known + b")") * bool(known) + _KEPT + b'"' + _PLACE + b', "text"')
 
 
 def _made(
@@ -232,16 +237,13 @@ class Run:
 
     def __init__(self, path: Path) -> None:
         """Read it. Raises Diagnostic."""
-        self._blocks: list[tuple[Path, int, int]] = []
-        """Of each block the part, its offset and its size."""
+        self._blocks: list[tuple[Path, int, int, int]] = []
+        """Of each block the part, its offset, its size and its lines."""
         found: list[list[bytes]] = []
         session = False
         for block in _back(parts(path)):
-            data = block.data
-            for word in _BY:
-                data = data.replace(word, b"")
-            found.append(_STEP.findall(data))
-            self._blocks.append((block.path, block.offset, len(block.data)))
+            found.append(_STEP.findall(block.data))
+            self._blocks.append((block.path, block.offset, len(block.data), block.data.count(b"\n")))
             session = block.first
         self._counts = [len(each) for each in reversed(found)]
         self._blocks.reverse()
@@ -251,26 +253,35 @@ class Run:
 
     def line(self, index: int) -> Line:
         """The line of a step."""
-        for (path, offset, size), count in zip(self._blocks, self._counts, strict=True):
+        before: dict[Path, int] = {}
+        for (path, offset, size, lines), count in zip(self._blocks, self._counts, strict=True):
+            if path not in before:
+                before[path] = _count(path, offset)
             if index < count:
+                number = before[path]
                 with _opened(path) as file:
-                    file.seek(0)
-                    number = _count(file, offset)
+                    file.seek(offset)
                     block = Block(path, offset, file.read(size), False)
                 match = next(islice(_STEP.finditer(block.data), index, None))
                 begin, data = block.line(match.start())
                 return Line(path, number + block.data.count(b"\n", 0, begin) + 1, data, entry_of(data))
             index -= count
+            before[path] += lines
         raise IndexError(index)
 
 
-def _count(file: IO[bytes], size: int) -> int:
-    """The lines in the next bytes of a file."""
-    number = 0
-    while size > 0 and (data := file.read(min(size, BLOCK))):
-        number += data.count(b"\n")
-        size -= len(data)
-    return number
+def _count(path: Path, size: int) -> int:
+    """The lines in the first bytes of a file."""
+    with _opened(path) as file:
+        file.seek(0)
+        return sum(file.read(min(BLOCK, size - begin)).count(b"\n") for begin in range(0, size, BLOCK))
+
+
+def _bare(step: bytes) -> bytes:
+    """A step without its origin."""
+    for word in _BY:
+        step = step.replace(word, b"")
+    return step
 
 
 def first_difference(one: Run, other: Run) -> tuple[int | None, int | None] | None:
@@ -292,7 +303,7 @@ def first_difference(one: Run, other: Run) -> tuple[int | None, int | None] | No
             queues = waiting[match[0].partition(b",")[2] if match else b""]
             if not queues[1 - side]:
                 queues[side].append(index)
-            elif runs[1 - side][before := queues[1 - side].popleft()] != steps[index]:
+            elif _bare(runs[1 - side][before := queues[1 - side].popleft()]) != _bare(steps[index]):
                 return (index, before) if side == 0 else (before, index)
     rests = [(queue[0], side) for queues in waiting.values() for side, queue in enumerate(queues) if queue]
     if not rests:
