@@ -86,7 +86,7 @@ function _shtab_multidrop_using
   test "$_shtab_multidrop_cmdpath" = "$argv"
 end
 
-set -g _shtab_multidrop_commands demo tui shell send run sim program 'program check' 'program test' 'program sweep' 'program convert' 'program list' 'program diff' 'program upload' 'program download' params 'params backup' 'params diff' 'params restore' macro 'macro list' 'macro show' 'macro play' 'macro edit' 'macro describe' 'macro rename' 'macro copy' 'macro delete' 'macro key' 'macro import' 'macro export' plot poll publish plant share snapshot certify ports relay scan rescue log 'log show' 'log follow' 'log grep' 'log judge' 'log replay' config 'config path' 'config show' 'config check' help lsp report completion
+set -g _shtab_multidrop_commands demo tui shell send run sim program 'program check' 'program test' 'program sweep' 'program convert' 'program list' 'program diff' 'program upload' 'program download' params 'params backup' 'params diff' 'params restore' macro 'macro list' 'macro show' 'macro play' 'macro edit' 'macro describe' 'macro rename' 'macro copy' 'macro delete' 'macro key' 'macro import' 'macro export' plot poll publish plant share snapshot certify ports relay scan rescue log 'log show' 'log follow' 'log grep' 'log at' 'log bisect' 'log judge' 'log replay' config 'config path' 'config show' 'config check' help lsp report completion
 set -g _shtab_multidrop_opts_with_value --against --allow --baud --break --cell --cluster --compare --csv --dialect --drive --every --expect --jobs --join --junit --language --on --other --output --page --parquet --personality --random --rate --resume --rfc2217 --role --rows --run --save --search --seed --serve --set --speed --svg --tcp --times --to --until --vary --watch --with -o
 
 complete -c multidrop -e
@@ -393,7 +393,7 @@ complete -c multidrop -n '_shtab_multidrop_using rescue' -l erase -d 'go as far 
 complete -c multidrop -n '_shtab_multidrop_using rescue' -l yes -d 'answer every question with yes beforehand'
 complete -c multidrop -n '_shtab_multidrop_using rescue' -l no-config -d 'read no configuration file'
 complete -c multidrop -n '_shtab_multidrop_using rescue; and test $_shtab_multidrop_npos -eq 0' -ka "(_multidrop_url)" -d 'the port to search; its baud rate is tried first'
-complete -c multidrop -n '_shtab_multidrop_using; and test $_shtab_multidrop_npos -eq 0' -a log -d 'Show, follow, search, judge and replay session logs, which /log begins.'
+complete -c multidrop -n '_shtab_multidrop_using; and test $_shtab_multidrop_npos -eq 0' -a log -d 'Show, follow, search, compare, judge and replay session logs, which /log begins.'
 complete -c multidrop -n '_shtab_multidrop_using log' -s h -l help -d 'show this help message and exit'
 complete -c multidrop -n '_shtab_multidrop_using log; and test $_shtab_multidrop_npos -eq 0' -a show -d 'Print a session log: typed lines, bytes both ways, replies, notices, failures.'
 complete -c multidrop -n '_shtab_multidrop_using log show' -s h -l help -d 'show this help message and exit'
@@ -417,6 +417,15 @@ complete -c multidrop -n '_shtab_multidrop_using log grep' -l json -d 'print the
 complete -c multidrop -n '_shtab_multidrop_using log grep' -s i -l ignore-case -d 'a and A are the same'
 complete -c multidrop -n '_shtab_multidrop_using log grep' -l no-config -d 'read no configuration file'
 complete -c multidrop -n '_shtab_multidrop_using log grep; and test $_shtab_multidrop_npos -eq 1' -ka "(__fish_complete_path (commandline -ct))" -d 'a session log (default: the newest)'
+complete -c multidrop -n '_shtab_multidrop_using log; and test $_shtab_multidrop_npos -eq 0' -a at -d 'Print what was known at a moment: states, and the last lines and samples of each drive.'
+complete -c multidrop -n '_shtab_multidrop_using log at' -s h -l help -d 'show this help message and exit'
+complete -c multidrop -n '_shtab_multidrop_using log at' -l json -d 'print one JSON object a line: the moment, then entries as they are in the file'
+complete -c multidrop -n '_shtab_multidrop_using log at' -l no-config -d 'read no configuration file'
+complete -c multidrop -n '_shtab_multidrop_using log at; and test $_shtab_multidrop_npos -eq 1' -ka "(__fish_complete_path (commandline -ct))" -d 'a session log (default: the newest)'
+complete -c multidrop -n '_shtab_multidrop_using log; and test $_shtab_multidrop_npos -eq 0' -a bisect -d 'Find the first difference between two runs; exit code 0: there is none, 1: there is one.'
+complete -c multidrop -n '_shtab_multidrop_using log bisect' -s h -l help -d 'show this help message and exit'
+complete -c multidrop -n '_shtab_multidrop_using log bisect' -l json -d 'print one JSON object'
+complete -c multidrop -n '_shtab_multidrop_using log bisect' -l no-config -d 'read no configuration file'
 complete -c multidrop -n '_shtab_multidrop_using log; and test $_shtab_multidrop_npos -eq 0' -a judge -d 'Check a session log by the rules of a session; exit code 0: all held, 1: one broke.'
 complete -c multidrop -n '_shtab_multidrop_using log judge' -s h -l help -d 'show this help message and exit'
 complete -c multidrop -n '_shtab_multidrop_using log judge' -l json -d 'print one JSON object a breach'
