@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import json
 from collections.abc import Awaitable, Callable
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -29,6 +30,18 @@ if TYPE_CHECKING:
 
 DIFFERS = 1
 """The exit code of a comparison where something differs, as where a drive did not reply or refused."""
+
+
+def twin_fit(chosen: argparse.Namespace) -> int:
+    """Fit a cell to a log, in virtual time; report a wrong file before anything is opened."""
+    from multidrop.shell.batch.replay import VirtualLoop
+    from multidrop.shell.log import steps
+    from multidrop.shell.twin_fit.work import fit
+
+    log, cell = Path(chosen.log), Path(chosen.cell.removeprefix("sim:"))
+    steps.read(log)
+    body = partial(fit, log=log, cell=cell, as_json=chosen.json)
+    return runner.run([f"sim:{cell}"], body, unsolicited=False, replies=False, loop=VirtualLoop)
 
 
 def list_(chosen: argparse.Namespace) -> int:

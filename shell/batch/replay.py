@@ -24,7 +24,7 @@ from multidrop.shell import waits
 from multidrop.shell.automation import outcome, settled
 from multidrop.shell.events import By, Printed, SessionEvent
 from multidrop.shell.line_syntax import EVERYONE, join_target
-from multidrop.shell.log.steps import WORLD, Step, Steps, compared, errors_differ
+from multidrop.shell.log.steps import WORLD, Exchange, Step, Steps, compared, errors_differ
 from multidrop.shell.openings import model
 from multidrop.shell.streams.stdout import write
 from multidrop.shell.workspace import LATCHED
@@ -158,7 +158,7 @@ class Replay:
         self._session, self._found, self._report = session, found, report
         self._simulated = all(name in session.cells for name in session.buses)
         self.steps = [step for step in found.steps if self._simulated or step.text.split()[:1] != [WORLD]]
-        self._targets = _targets(session, self.steps)
+        self._targets = targets(session, self.steps)
         self._moving: set[Drive] = set()
         """The drives that may move."""
         self._uncompared = 0
@@ -291,7 +291,7 @@ def _name(drive: Drive) -> str:
     return join_target(drive.link.name, drive.address) if drive.address else drive.link.name
 
 
-def _targets(session: Session, steps: Sequence[Step]) -> Mapping[tuple[str, str], Drive]:
+def targets(session: Session, steps: Sequence[Step | Exchange]) -> Mapping[tuple[str, str], Drive]:
     """The drive for each place in the log. Raises Diagnostic."""
     places = dict.fromkeys((step.bus, step.drive) for step in steps if step.bus)
     return {place: _target(session, place, list(places)) for place in places}

@@ -31,8 +31,8 @@ VERB_GROUPS = {
     "Simulated drives": "/sim",
 }
 """The verbs in the order and the groups of `/help`."""
-COMMAND_ORDER = """demo tui shell send run sim program params macro plot poll publish plant share snapshot certify ports
-    relay scan rescue log config help lsp report completion"""
+COMMAND_ORDER = """demo tui shell send run sim program params macro plot poll publish plant share snapshot twin certify
+    ports relay scan rescue log config help lsp report completion"""
 SCRIPT_WORDS = {
     "/set": "/set NAME EXPR",
     "/if": "/if EXPR",

@@ -1,0 +1,148 @@
+"""Least squares: what makes a rotor lag its field as it was measured, and how well that is known.
+
+Theory of operation. A rotor lags its field by the arc sine of the part of the torque that its load, friction and
+inertia take (`simulator.torque`). The speed and the acceleration of each point are those that the drive commanded. A
+position counts whole counts from a place that is not known either, to half a count: one more unknown, which moves in
+both directions tell from a load. A value is told where three standard deviations are at most `TOLD` of it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import asin, inf, pi, sqrt
+from typing import Any, NamedTuple
+
+from multidrop.dialects import Diagnostic
+from multidrop.simulator.cell.spec import MotorSpec, WorldSpec
+from multidrop.simulator.family import Effort
+from multidrop.simulator.torque import Torque
+
+TOLD = 0.05
+FEWEST = 12
+"""Points without which nothing is told."""
+SIGMAS = 3.0
+HALF_COUNT = 0.29
+"""The standard deviation of a rounding, in counts."""
+RELATIVE = 1e-6
+"""A combination of values that the points see this much less than the best one is not seen."""
+INSTALL = "pip install 'multidrop[fit]'"
+LOAD, FRICTION, INERTIA, MARGIN = "load", "friction", "inertia", "current margin"
+UNITS = {LOAD: "of the holding torque", FRICTION: "N m for each rev/s", INERTIA: "kg m2", MARGIN: "of the torque"}
+
+
+class Point(NamedTuple):
+    """A measured lag along the turn, full steps, at a speed and an acceleration along it, rev/s and rev/s2."""
+
+    lag: float
+    speed: float
+    acceleration: float
+    current: float
+    grain: float
+    """Full steps in a count."""
+    direction: float
+    """1 or -1; 0: the lag itself was read, so no counter begins anywhere."""
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """What a log has of one axis. `moves`: those that did not stall; `seen`: a stall would have been seen."""
+
+    points: Sequence[Point] = ()
+    moves: Sequence[Effort] = ()
+    stalled: int = 0
+    seen: bool = False
+
+
+class Estimate(NamedTuple):
+    """A value and three standard deviations of it; `most`: what it is at most, where it is not told."""
+
+    value: float
+    within: float
+    most: float = inf
+
+    @property
+    def told(self) -> bool:
+        return self.within <= TOLD * self.value
+
+
+def estimates(evidence: Evidence, motor: MotorSpec) -> dict[str, Estimate]:
+    """Estimate each value. Raises Diagnostic where scipy is missing."""
+    if len(evidence.points) >= FEWEST:
+        return _Fit(evidence, motor).estimates()
+    unknown = dict.fromkeys(UNITS, Estimate(0.0, inf))
+    if evidence.seen and evidence.moves:
+        torque = Torque(WorldSpec(motor=motor, load=1.0))
+        used = max(torque.most_used(each.profile, each.current, each.turn) for each in evidence.moves)
+        unknown[LOAD] = Estimate(0.0, inf, most=1 / used if used else inf)
+    return unknown
+
+
+class _Fit:
+    """The fit of one axis. The unknowns are in units in which they are near 1."""
+
+    def __init__(self, evidence: Evidence, motor: MotorSpec) -> None:
+        try:
+            from scipy.optimize import least_squares  # takes half a second to import
+        except ImportError:
+            raise Diagnostic("scipy is missing", "twin fit", INSTALL) from None
+        self._evidence, self._motor = evidence, motor
+        self._torque = Torque(WorldSpec(motor=motor))
+        holding, points = motor.curve[0][1], evidence.points
+        fastest = max(each.speed for each in points)
+        steepest = max(abs(each.acceleration) for each in points)
+        self._units = (1.0, holding / fastest, holding / (2 * pi * steepest) if steepest else 1.0)
+        found = least_squares(
+            self._residuals, (0.1, 0.01, 0.01, 0.0), bounds=((0, 0, 0, -1), (10, 100, 100, 1)), loss="soft_l1"
+        )
+        self._x: list[float] = found.x.tolist()
+        self._jacobian: Any = found.jac
+        residuals = self._residuals(self._x)
+        scatter = sqrt(sum(each * each for each in residuals) / (len(residuals) - len(self._x)))
+        self._sigma = max(scatter, HALF_COUNT)
+
+    def estimates(self) -> dict[str, Estimate]:
+        world = self._world(self._x)
+        values = {LOAD: world.load, FRICTION: world.friction, INERTIA: world.inertia}
+        found = {}
+        for n, (name, value) in enumerate(values.items()):
+            within = self._within([float(n == each) for each in range(4)]) * self._units[n]
+            found[name] = Estimate(value, within, value + within)
+        steps = [[x + (1e-4 if n == each else 0.0) for each, x in enumerate(self._x)] for n in range(4)]
+        margin = self._margin(self._x)
+        slope = [(self._margin(each) - margin) / 1e-4 for each in steps]
+        found[MARGIN] = Estimate(margin, self._within(slope))
+        return found
+
+    def _world(self, x: Sequence[float]) -> WorldSpec:
+        load, friction, inertia = (value * unit for value, unit in zip(x, self._units, strict=False))
+        return WorldSpec(motor=self._motor, load=load, friction=friction, inertia=inertia)
+
+    def _margin(self, x: Sequence[float]) -> float:
+        """What the hardest move leaves of the torque."""
+        torque = Torque(self._world(x))
+        return 1 - max(torque.most_used(each.profile, each.current, each.turn) for each in self._evidence.moves)
+
+    def _residuals(self, x: Sequence[float]) -> list[float]:
+        """In counts."""
+        torque, found = Torque(self._world(x)), [float(x[3])]
+        for each in self._evidence.points:
+            there = each.current * self._torque.available(each.speed)
+            used = torque.needed(each.speed, each.acceleration) / there if there else 1.0
+            lag = asin(max(-1.0, min(1.0, used))) * 2 / pi
+            found.append((lag - each.lag) / each.grain + each.direction * x[3])
+        return found
+
+    def _within(self, slope: Sequence[float]) -> float:
+        """Three standard deviations of a combination of the unknowns; infinite: the points do not see it."""
+        import numpy
+
+        _, sizes, rows = numpy.linalg.svd(self._jacobian, full_matrices=False)
+        variance, long = 0.0, max(map(abs, slope), default=0.0)
+        for size, row in zip(sizes.tolist(), rows.tolist(), strict=True):
+            part = sum(a * b for a, b in zip(row, slope, strict=True))
+            if size > RELATIVE * sizes[0]:
+                variance += (part / size) ** 2
+            elif abs(part) > RELATIVE * long:
+                return inf
+        return SIGMAS * self._sigma * sqrt(variance)
