@@ -137,7 +137,7 @@ $(VENV)/.run: pyproject.toml constraints.txt | $(VENV)/bin/python
 	touch $@
 
 $(VENV)/.dev: pyproject.toml constraints.txt requirements-dev.txt | $(VENV)/bin/python
-	$(PIP) -c constraints.txt -e '.[rerun,lsp,mqtt,prometheus,usb,cluster]' -r requirements-dev.txt
+	$(PIP) -c constraints.txt -e '.[rerun,lsp,mqtt,prometheus,usb,cluster,fit]' -r requirements-dev.txt
 	touch $@ $(VENV)/.run
 
 clean:

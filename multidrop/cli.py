@@ -32,6 +32,7 @@ EPILOG = (
 )
 EXTRAS = {
     "cluster": "distributed",
+    "fit": "scipy",
     "lsp": "pygls",
     "mqtt": "paho",
     "notebook": "ipykernel",

@@ -86,7 +86,7 @@ function _shtab_multidrop_using
   test "$_shtab_multidrop_cmdpath" = "$argv"
 end
 
-set -g _shtab_multidrop_commands demo tui shell send run sim program 'program check' 'program test' 'program sweep' 'program convert' 'program list' 'program diff' 'program upload' 'program download' params 'params backup' 'params diff' 'params restore' macro 'macro list' 'macro show' 'macro play' 'macro edit' 'macro describe' 'macro rename' 'macro copy' 'macro delete' 'macro key' 'macro import' 'macro export' plot poll publish plant share snapshot certify ports relay scan rescue log 'log show' 'log follow' 'log grep' 'log at' 'log bisect' 'log judge' 'log replay' config 'config path' 'config show' 'config check' help lsp report completion
+set -g _shtab_multidrop_commands demo tui shell send run sim program 'program check' 'program test' 'program sweep' 'program convert' 'program list' 'program diff' 'program upload' 'program download' params 'params backup' 'params diff' 'params restore' macro 'macro list' 'macro show' 'macro play' 'macro edit' 'macro describe' 'macro rename' 'macro copy' 'macro delete' 'macro key' 'macro import' 'macro export' plot poll publish plant share snapshot twin 'twin fit' certify ports relay scan rescue log 'log show' 'log follow' 'log grep' 'log at' 'log bisect' 'log judge' 'log replay' config 'config path' 'config show' 'config check' help lsp report completion
 set -g _shtab_multidrop_opts_with_value --against --allow --baud --break --cell --cluster --compare --csv --dialect --drive --every --expect --jobs --join --junit --language --on --other --output --page --parquet --personality --random --rate --resume --rfc2217 --role --rows --run --save --search --seed --serve --set --speed --svg --tcp --times --to --until --vary --watch --with -o
 
 complete -c multidrop -e
@@ -356,6 +356,13 @@ complete -c multidrop -n '_shtab_multidrop_using snapshot' -s h -l help -d 'show
 complete -c multidrop -n '_shtab_multidrop_using snapshot' -s o -l output -xka "(__fish_complete_path (commandline -ct))" -d 'the new file; -: standard output'
 complete -c multidrop -n '_shtab_multidrop_using snapshot' -l no-config -d 'read no configuration file'
 complete -c multidrop -n '_shtab_multidrop_using snapshot; and test $_shtab_multidrop_npos -ge 0' -ka "(_multidrop_url)" -d 'what to open'
+complete -c multidrop -n '_shtab_multidrop_using; and test $_shtab_multidrop_npos -eq 0' -a twin -d 'Fit the drives of a cell to a session log.'
+complete -c multidrop -n '_shtab_multidrop_using twin' -s h -l help -d 'show this help message and exit'
+complete -c multidrop -n '_shtab_multidrop_using twin; and test $_shtab_multidrop_npos -eq 0' -a fit -d 'Find load, friction, inertia and current margin of drives in a session log; put them into a cell.'
+complete -c multidrop -n '_shtab_multidrop_using twin fit' -s h -l help -d 'show this help message and exit'
+complete -c multidrop -n '_shtab_multidrop_using twin fit' -l cell -xka "(__fish_complete_path (commandline -ct))" -d 'the cell file (TOML) with the drives and their motors; the values go into it'
+complete -c multidrop -n '_shtab_multidrop_using twin fit' -l json -d 'print one JSON object a value'
+complete -c multidrop -n '_shtab_multidrop_using twin fit' -l no-config -d 'read no configuration file'
 complete -c multidrop -n '_shtab_multidrop_using; and test $_shtab_multidrop_npos -eq 0' -a certify -d 'Ask a drive the questions that our rulings leave open, for a report; or compare a drive with a report.'
 complete -c multidrop -n '_shtab_multidrop_using certify' -s h -l help -d 'show this help message and exit'
 complete -c multidrop -n '_shtab_multidrop_using certify' -l drive -xka "(_multidrop_drive)" -d 'the drive (default: the first); may be repeated'

@@ -46,12 +46,13 @@ function _multidrop_macro {
 
 # --- Completion data ---
 $_shtab_multidrop_subparsers = @{
-    '_shtab_multidrop' = @('demo', 'tui', 'shell', 'send', 'run', 'sim', 'program', 'params', 'macro', 'plot', 'poll', 'publish', 'plant', 'share', 'snapshot', 'certify', 'ports', 'relay', 'scan', 'rescue', 'log', 'config', 'help', 'lsp', 'report', 'completion')
+    '_shtab_multidrop' = @('demo', 'tui', 'shell', 'send', 'run', 'sim', 'program', 'params', 'macro', 'plot', 'poll', 'publish', 'plant', 'share', 'snapshot', 'twin', 'certify', 'ports', 'relay', 'scan', 'rescue', 'log', 'config', 'help', 'lsp', 'report', 'completion')
     '_shtab_multidrop_config' = @('path', 'show', 'check')
     '_shtab_multidrop_log' = @('show', 'follow', 'grep', 'at', 'bisect', 'judge', 'replay')
     '_shtab_multidrop_macro' = @('list', 'show', 'play', 'edit', 'describe', 'rename', 'copy', 'delete', 'key', 'import', 'export')
     '_shtab_multidrop_params' = @('backup', 'diff', 'restore')
     '_shtab_multidrop_program' = @('check', 'test', 'sweep', 'convert', 'list', 'diff', 'upload', 'download')
+    '_shtab_multidrop_twin' = @('fit')
 }
 $_shtab_multidrop_option_strings = @{
     '_shtab_multidrop' = @('-h', '--help', '--version', '--no-config')
@@ -113,6 +114,8 @@ $_shtab_multidrop_option_strings = @{
     '_shtab_multidrop_sim' = @('-h', '--help', '--allow', '--json', '--speed', '--no-config')
     '_shtab_multidrop_snapshot' = @('-h', '--help', '-o', '--output', '--no-config')
     '_shtab_multidrop_tui' = @('-h', '--help', '--raw', '--twin', '--no-reconnect', '--share', '--join', '--no-config')
+    '_shtab_multidrop_twin' = @('-h', '--help')
+    '_shtab_multidrop_twin_fit' = @('-h', '--help', '--cell', '--json', '--no-config')
 }
 $_shtab_multidrop_compgens = @{
     '_shtab_multidrop_certify___compare' = '_shtab_powershell_compgen_files'
@@ -200,6 +203,7 @@ $_shtab_multidrop_compgens = @{
     '_shtab_multidrop_snapshot__o' = '_shtab_powershell_compgen_files'
     '_shtab_multidrop_snapshot_pos_0' = '_multidrop_url'
     '_shtab_multidrop_tui_pos_0' = '_multidrop_url'
+    '_shtab_multidrop_twin_fit___cell' = '_shtab_powershell_compgen_files'
 }
 $_shtab_multidrop_choices = @{
     '_shtab_multidrop_completion_pos_0' = @('bash', 'zsh', 'fish', 'powershell')
@@ -209,7 +213,7 @@ $_shtab_multidrop_choices = @{
     '_shtab_multidrop_lsp___personality' = @('LMDOM', 'LMDCM', 'LMDOE', 'LMDCE', 'LMM', 'MDI', 'MDIE', 'MDIX')
     '_shtab_multidrop_macro_pos_0' = @('list', 'show', 'play', 'edit', 'describe', 'rename', 'copy', 'delete', 'key', 'import', 'export')
     '_shtab_multidrop_params_pos_0' = @('backup', 'diff', 'restore')
-    '_shtab_multidrop_pos_0' = @('demo', 'tui', 'shell', 'send', 'run', 'sim', 'program', 'params', 'macro', 'plot', 'poll', 'publish', 'plant', 'share', 'snapshot', 'certify', 'ports', 'relay', 'scan', 'rescue', 'log', 'config', 'help', 'lsp', 'report', 'completion')
+    '_shtab_multidrop_pos_0' = @('demo', 'tui', 'shell', 'send', 'run', 'sim', 'program', 'params', 'macro', 'plot', 'poll', 'publish', 'plant', 'share', 'snapshot', 'twin', 'certify', 'ports', 'relay', 'scan', 'rescue', 'log', 'config', 'help', 'lsp', 'report', 'completion')
     '_shtab_multidrop_program_check___language' = @('mcode', 'pmx', 'tmcl')
     '_shtab_multidrop_program_check___personality' = @('LMDOM', 'LMDCM', 'LMDOE', 'LMDCE', 'LMM', 'MDI', 'MDIE', 'MDIX')
     '_shtab_multidrop_program_convert___to' = @('lexium')
@@ -219,6 +223,7 @@ $_shtab_multidrop_choices = @{
     '_shtab_multidrop_program_test___personality' = @('LMDOM', 'LMDCM', 'LMDOE', 'LMDCE', 'LMM', 'MDI', 'MDIE', 'MDIX', 'PMX', 'TMCM', 'TMCM-1140', 'TMCM-1141', 'TMCM-1161', 'TMCM-1240', 'TMCM-1241', 'TMCM-1276', 'TMCM-3110', 'TMCM-6110')
     '_shtab_multidrop_rescue___dialect' = @('mcode', 'pmx')
     '_shtab_multidrop_scan___dialect' = @('mcode', 'pmx', 'tmcl')
+    '_shtab_multidrop_twin_pos_0' = @('fit')
 }
 $_shtab_multidrop_nargs = @{
     '_shtab_multidrop___help' = '0'
@@ -487,6 +492,13 @@ $_shtab_multidrop_nargs = @{
     '_shtab_multidrop_tui___twin' = '0'
     '_shtab_multidrop_tui__h' = '0'
     '_shtab_multidrop_tui_pos_0' = '*'
+    '_shtab_multidrop_twin___help' = '0'
+    '_shtab_multidrop_twin__h' = '0'
+    '_shtab_multidrop_twin_fit___help' = '0'
+    '_shtab_multidrop_twin_fit___json' = '0'
+    '_shtab_multidrop_twin_fit___no_config' = '0'
+    '_shtab_multidrop_twin_fit__h' = '0'
+    '_shtab_multidrop_twin_pos_0' = 'A...'
 }
 $_shtab_multidrop_help = @{
     '_shtab_multidrop___help' = 'show this help message and exit'
@@ -934,6 +946,16 @@ $_shtab_multidrop_help = @{
     '_shtab_multidrop_tui___twin' = 'run a simulated twin beside each drive; warn of differences'
     '_shtab_multidrop_tui__h' = 'show this help message and exit'
     '_shtab_multidrop_tui_pos_0' = 'what to open'
+    '_shtab_multidrop_twin' = 'Fit the drives of a cell to a session log.'
+    '_shtab_multidrop_twin___help' = 'show this help message and exit'
+    '_shtab_multidrop_twin__h' = 'show this help message and exit'
+    '_shtab_multidrop_twin_fit' = 'Find load, friction, inertia and current margin of drives in a session log; put them into a cell.'
+    '_shtab_multidrop_twin_fit___cell' = 'the cell file (TOML) with the drives and their motors; the values go into it'
+    '_shtab_multidrop_twin_fit___help' = 'show this help message and exit'
+    '_shtab_multidrop_twin_fit___json' = 'print one JSON object a value'
+    '_shtab_multidrop_twin_fit___no_config' = 'read no configuration file'
+    '_shtab_multidrop_twin_fit__h' = 'show this help message and exit'
+    '_shtab_multidrop_twin_fit_pos_0' = 'a session log; its last session is used'
 }
 
 # --- Helper functions ---

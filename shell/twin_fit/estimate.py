@@ -3,14 +3,15 @@
 Theory of operation. A rotor lags its field by the arc sine of the part of the torque that its load, friction and
 inertia take (`simulator.torque`). The speed and the acceleration of each point are those that the drive commanded. A
 position counts whole counts from a place that is not known either, to half a count: one more unknown, which moves in
-both directions tell from a load. A value is told where three standard deviations are at most `TOLD` of it.
+both directions tell from a load. A value is told where three standard deviations are at most `TOLD` of it; the current
+margin, where they are at most that of the torque that is used.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import asin, inf, pi, sqrt
+from math import inf, pi, sqrt
 from typing import Any, NamedTuple
 
 from multidrop.dialects import Diagnostic
@@ -22,6 +23,9 @@ TOLD = 0.05
 FEWEST = 12
 """Points without which nothing is told."""
 SIGMAS = 3.0
+TINY = 1e-9
+"""N m: as good as no torque."""
+MOST_STRANGE = 0.2
 HALF_COUNT = 0.29
 """The standard deviation of a rounding, in counts."""
 RELATIVE = 1e-6
@@ -52,29 +56,40 @@ class Evidence:
     moves: Sequence[Effort] = ()
     stalled: int = 0
     seen: bool = False
+    strange: int = 0
+    """Lags of more than a full step in a move that has lost none."""
+
+    @property
+    def fits(self) -> bool:
+        """The moves are those that the cell commands."""
+        return self.strange <= MOST_STRANGE * len(self.points)
 
 
 class Estimate(NamedTuple):
-    """A value and three standard deviations of it; `most`: what it is at most, where it is not told."""
+    """A value and three standard deviations of it; `most`: what it is at most, where it is not told.
+
+    `whole`: it is told where it is known to a part of this.
+    """
 
     value: float
     within: float
+    whole: float
     most: float = inf
 
     @property
     def told(self) -> bool:
-        return self.within <= TOLD * self.value
+        return self.within <= TOLD * self.whole
 
 
 def estimates(evidence: Evidence, motor: MotorSpec) -> dict[str, Estimate]:
     """Estimate each value. Raises Diagnostic where scipy is missing."""
-    if len(evidence.points) >= FEWEST:
+    if len(evidence.points) >= FEWEST and evidence.fits:
         return _Fit(evidence, motor).estimates()
-    unknown = dict.fromkeys(UNITS, Estimate(0.0, inf))
+    unknown = dict.fromkeys(UNITS, Estimate(0.0, inf, 0.0))
     if evidence.seen and evidence.moves:
         torque = Torque(WorldSpec(motor=motor, load=1.0))
         used = max(torque.most_used(each.profile, each.current, each.turn) for each in evidence.moves)
-        unknown[LOAD] = Estimate(0.0, inf, most=1 / used if used else inf)
+        unknown[LOAD] = Estimate(0.0, inf, 0.0, 1 / used if used else inf)
     return unknown
 
 
@@ -83,22 +98,33 @@ class _Fit:
 
     def __init__(self, evidence: Evidence, motor: MotorSpec) -> None:
         try:
+            import numpy  # comes with scipy
             from scipy.optimize import least_squares  # takes half a second to import
         except ImportError:
             raise Diagnostic("scipy is missing", "twin fit", INSTALL) from None
-        self._evidence, self._motor = evidence, motor
-        self._torque = Torque(WorldSpec(motor=motor))
+        self._evidence, self._motor, self._numpy = evidence, motor, numpy
         holding, points = motor.curve[0][1], evidence.points
         fastest = max(each.speed for each in points)
         steepest = max(abs(each.acceleration) for each in points)
         self._units = (1.0, holding / fastest, holding / (2 * pi * steepest) if steepest else 1.0)
+        # The torque of each point is that of the rotor alone and a part for each unknown: rows of a matrix.
+        torques = [Torque(self._world([float(n == each) for each in range(3)])) for n in range(4)]
+        alone = torques.pop()
+        there = [max(each.current * alone.available(each.speed), TINY) for each in points]
+        rotor = [alone.needed(each.speed, each.acceleration) for each in points]
+        parts = [[one.needed(each.speed, each.acceleration) for one in torques] for each in points]
+        self._there, self._rotor = numpy.array(there), numpy.array(rotor)
+        self._parts = numpy.array(parts) - self._rotor[:, None]
+        self._lags, self._grains, self._directions = (
+            numpy.array(each) for each in zip(*((p.lag, p.grain, p.direction) for p in points), strict=True)
+        )
         found = least_squares(
             self._residuals, (0.1, 0.01, 0.01, 0.0), bounds=((0, 0, 0, -1), (10, 100, 100, 1)), loss="soft_l1"
         )
         self._x: list[float] = found.x.tolist()
         self._jacobian: Any = found.jac
-        residuals = self._residuals(self._x)
-        scatter = sqrt(sum(each * each for each in residuals) / (len(residuals) - len(self._x)))
+        residuals = self._residuals(found.x)
+        scatter = sqrt(float(residuals @ residuals) / (len(residuals) - len(self._x)))
         self._sigma = max(scatter, HALF_COUNT)
 
     def estimates(self) -> dict[str, Estimate]:
@@ -107,11 +133,11 @@ class _Fit:
         found = {}
         for n, (name, value) in enumerate(values.items()):
             within = self._within([float(n == each) for each in range(4)]) * self._units[n]
-            found[name] = Estimate(value, within, value + within)
+            found[name] = Estimate(value, within, value, value + within)
         steps = [[x + (1e-4 if n == each else 0.0) for each, x in enumerate(self._x)] for n in range(4)]
         margin = self._margin(self._x)
         slope = [(self._margin(each) - margin) / 1e-4 for each in steps]
-        found[MARGIN] = Estimate(margin, self._within(slope))
+        found[MARGIN] = Estimate(margin, self._within(slope), 1 - margin)
         return found
 
     def _world(self, x: Sequence[float]) -> WorldSpec:
@@ -123,21 +149,16 @@ class _Fit:
         torque = Torque(self._world(x))
         return 1 - max(torque.most_used(each.profile, each.current, each.turn) for each in self._evidence.moves)
 
-    def _residuals(self, x: Sequence[float]) -> list[float]:
-        """In counts."""
-        torque, found = Torque(self._world(x)), [float(x[3])]
-        for each in self._evidence.points:
-            there = each.current * self._torque.available(each.speed)
-            used = torque.needed(each.speed, each.acceleration) / there if there else 1.0
-            lag = asin(max(-1.0, min(1.0, used))) * 2 / pi
-            found.append((lag - each.lag) / each.grain + each.direction * x[3])
-        return found
+    def _residuals(self, x: Any) -> Any:
+        """The differences of all points in counts, after that of the place of a count."""
+        numpy = self._numpy
+        used = (self._rotor + self._parts @ x[:3]) / self._there
+        lags = numpy.arcsin(numpy.clip(used, -1.0, 1.0)) * 2 / pi
+        return numpy.concatenate((x[3:], (lags - self._lags) / self._grains + self._directions * x[3]))
 
     def _within(self, slope: Sequence[float]) -> float:
         """Three standard deviations of a combination of the unknowns; infinite: the points do not see it."""
-        import numpy
-
-        _, sizes, rows = numpy.linalg.svd(self._jacobian, full_matrices=False)
+        _, sizes, rows = self._numpy.linalg.svd(self._jacobian, full_matrices=False)
         variance, long = 0.0, max(map(abs, slope), default=0.0)
         for size, row in zip(sizes.tolist(), rows.tolist(), strict=True):
             part = sum(a * b for a, b in zip(row, slope, strict=True))

@@ -144,7 +144,7 @@ def evidence(read: Sequence[Reading]) -> Evidence:
     for each in read:
         if each.lag is not None:
             steady = _steady(each)
-            points += [steady] if steady is not None and abs(steady.lag) <= 1 else []
+            points += [steady] if steady is not None else []
             moved += [each] if each.effort.profile.moving(each.at) else []
         elif each.position is not None and not _rests(each):
             moved.append(each)
@@ -160,7 +160,10 @@ def evidence(read: Sequence[Reading]) -> Evidence:
     if any(each.lag is not None for each in moved):
         moves |= {one.effort.profile: one.effort for one in moved}
     seen = any(each.effort.measured or each.effort.stalls for each in read)
-    return Evidence(points, list(moves.values()), stalled, seen)
+    moves = {profile: each for profile, each in moves.items() if each.measured or each.lag or each.stalls}
+    near = [each for each in points if abs(each.lag) <= 1]
+    strange = sum(bool(each.direction) for each in points if each not in near)
+    return Evidence(near, list(moves.values()), stalled, seen, strange)
 
 
 def _rests(reading: Reading) -> bool:

@@ -7,7 +7,7 @@ import sys
 from collections.abc import Mapping
 from math import inf
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from multidrop.dialects import Diagnostic, DriveError
 from multidrop.dialects.files import utf8_of, why
@@ -16,6 +16,7 @@ from multidrop.macros.atomic import write_atomically
 from multidrop.shell.batch.replay import targets
 from multidrop.shell.line_syntax import EVERYONE, join_target
 from multidrop.shell.log import steps
+from multidrop.shell.log.steps import Exchange, Step
 from multidrop.shell.streams.stdout import write
 from multidrop.shell.twin_fit.estimate import FEWEST, MARGIN, UNITS, Estimate, Evidence, estimates
 from multidrop.shell.twin_fit.evidence import Axis, evidence, readings
@@ -32,7 +33,7 @@ async def fit(session: Session, log: Path, cell: Path, as_json: bool) -> None:
     Raises Diagnostic for a log or a cell that is not one, DriveError where nothing can be told.
     """
     found, shop = steps.read(log), cells.load(cell, session.settings.allowed)
-    everything = [*found.steps, *found.polls]
+    everything: list[Step | Exchange] = [*found.steps, *found.polls]
     drives = {place: each for place, each in targets(session, everything).items() if place[1] not in EVERYONE}
     specs = {(bus.name, each.name): each for bus in shop.buses for each in bus.drives}
     motors = {place: motor for place, each in specs.items() if (motor := each.world.motor) is not None}
@@ -68,9 +69,11 @@ def _why(known: Estimate | None, seen: Evidence) -> str:
     if known is None:
         return "the drive has no motor in the cell"
     most = f"; at most {known.most:.3g}" if known.most < inf else ""
+    if not seen.fits:
+        return "the moves are not those that the cell commands; snapshot the drive, and log again"
     if len(seen.points) >= FEWEST:
         return f"the moves do not tell it from the others{most}"
-    if not seen.seen:
+    if not (seen.seen or seen.points):
         return "the drive reports the steps that it commands"
     stalled = f", {counted(seen.stalled, 'move')} stalled" if seen.stalled else ""
     return f"{counted(len(seen.points), 'lag')} in ramps, {FEWEST} are needed{stalled}{most}"
@@ -85,11 +88,11 @@ def _keep(path: Path, shop: Cell, told: Mapping[Axis, Mapping[str, float]]) -> N
     """Put values into a cell's file, with its remarks and its layout; it is replaced as a whole. Raises Diagnostic."""
     import tomlkit
 
-    document = tomlkit.parse(utf8_of(path))
+    document: Any = tomlkit.parse(utf8_of(path))
     for (bus, drive, axis), values in told.items():
         (at,) = (n for n, each in enumerate(shop.buses) if each.name == bus)
         (own,) = (n for n, each in enumerate(shop.buses[at].drives) if each.name == drive)
-        table = document["bus"][at]["drive"][own]  # type: ignore[index]
+        table = document["bus"][at]["drive"][own]
         for key in ("world", axis):
             if key:
                 if key not in table:

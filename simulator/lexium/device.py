@@ -114,9 +114,8 @@ class MCodeDevice(EventLoop):
         """What the axis commands now, and what P and LL tell of it."""
         values, memory = self.memory.values, self.memory
         closed, counting = values.get("AS") in (FIXED, VARIABLE), memory.counting
-        stalls = closed or (counting and not values["SM"])
         current, lag = float(values["RC"]) / 100, "LL" if closed else ""
-        return Effort(self.motor.axis.profile, memory.steps_per_turn, memory.scale, current, counting, lag, stalls)
+        return Effort(self.motor.axis.profile, memory.steps_per_turn, memory.scale, current, counting, lag)
 
     def velocity(self, now: float) -> int:
         """V, likewise."""

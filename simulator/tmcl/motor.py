@@ -69,7 +69,9 @@ class Motor:
     @property
     def effort(self) -> Effort:
         turn = REVOLUTION / FULL * 2 ** self.parameters[Axis.MICROSTEPS]
-        return Effort(self._profile, turn, current=self.shaft.current, stalls=self._stall_speed > 0)
+        fastest = max((abs(each.velocity) for each in self._profile.segments), default=0.0)
+        stalls = 0 < self._stall_speed <= fastest
+        return Effort(self._profile, turn, current=self.shaft.current, stalls=stalls)
 
     def position(self, t: float) -> int:
         """The actual position, within 32 bits."""
