@@ -281,6 +281,7 @@ def test_what_came_behind_a_doubtful_answer_stands_in_front_of_the_mark(first, o
     assert ended[-1].reply.lines == ("202", "?Q00001") and ended[-1].reply.end is End.DONE
 
 
+@pytest.mark.wide
 @pytest.mark.parametrize("checksum", [0, 1, 2])
 @pytest.mark.parametrize("em", [0, 1, 2, 3])
 def test_what_a_program_prints_instead_of_a_lost_reply_is_shown(em, checksum):

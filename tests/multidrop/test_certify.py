@@ -67,8 +67,8 @@ SETTINGS = 'PR EM," ",CK," ",PY," ",VM," ",R1'
 SET = {"EM": 1, "CK": 0, "VM": 500000, "R1": 7}
 KILLED = [
     ("CK=0", drive("LMDCM", "", **SET), ""),
-    ("PY=0", drive("LMDCM", "", **SET), ""),
-    ("EM=1", drive("MDI", "", **SET), ""),
+    pytest.param("PY=0", drive("LMDCM", "", **SET), "", marks=pytest.mark.nightly),
+    pytest.param("EM=1", drive("MDI", "", **SET), "", marks=pytest.mark.nightly),
     ("R1=7", party("a", **SET), "&drives=a&party=1"),
 ]
 

@@ -306,6 +306,7 @@ NEW_LINE = ("MR 24000", 'PR "v",/x', "VM=1")
 """A move, a print that the drive refuses, a setting that it refuses."""
 
 
+@pytest.mark.wide
 @pytest.mark.parametrize("em", [0, 1, 2, 3])
 @pytest.mark.parametrize("line", NEW_LINE)
 async def test_a_line_that_a_stop_cuts_off_is_reported_as_it_is_and_no_later_line_is_blamed_for_it(em, line, tmp_path):
