@@ -1,12 +1,17 @@
 """Why a drive is in trouble: two keys from the main screen, for every family; nothing is read that a reading clears."""
 
 import asyncio
+from contextlib import AsyncExitStack
 from pathlib import Path
 
 import pytest
 
 from multidrop.drives.events import Conditioned, Silent
 from multidrop.shell.events import OnBus
+from multidrop.simulator.cells import load
+from multidrop.simulator.floor import Floor
+from multidrop.simulator.serving.endpoints import serve_bus
+from multidrop.simulator.serving.running import RunningFloor
 from multidrop.tui.panels.view import View, glances_of
 from multidrop.tui.screen_model import ScreenModel
 from multidrop.tui.screens.why import WhyPage, error_lines, facts, helping
@@ -178,3 +183,24 @@ async def test_two_keys_on_a_real_session_read_no_error(tmp_path: Path) -> None:
         assert isinstance(app.screen, WhyPage)
         await until(pilot, lambda: "EF=1" in shown(app) and "lim+ ●" in shown(app))
         assert app.session.buses["press"].drives["b"].state.last_error == 0
+
+
+@pytest.mark.tui
+async def test_over_modbus_the_page_says_the_error_too_and_reads_none(tmp_path: Path) -> None:
+    served = bus("eth", f"{ETHERNET}\n{LIMIT}", baud=0, serve=["modbus://127.0.0.1:0"])
+    (tmp_path / "cell.toml").write_text(served)
+    async with AsyncExitStack() as stack:
+        floor = RunningFloor(Floor(load(tmp_path / "cell.toml")))
+        stack.callback(floor.close)
+        ((url, *_),) = [await serve_bus(floor, each, stack) for each in floor.floor.cell.buses]
+        pilot = await stack.enter_async_context(real_screen(tmp_path, url.endpoint, (120, 40)))
+        app = pilot.app
+        await until(pilot, lambda: app.session.buses and app.session.selected)
+        (name,) = app.session.buses
+        for line in ("IS=2,2,1", "MR 300000"):
+            await pilot.press(*line, "enter")
+        await until(pilot, lambda: app.model.bus(name).readout("").in_trouble)
+        await pilot.press(*KEYS)
+        assert isinstance(app.screen, WhyPage)
+        await until(pilot, lambda: "PR ER" in shown(app))
+        assert app.session.buses[name].drives[""].state.last_error == 0
