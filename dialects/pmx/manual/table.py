@@ -1,6 +1,6 @@
 """Every ASCII command of the controller: name, values and meaning; its replies in words.
 
-`commands.csv` has the commands. `shape` is the continuation of a name: `bare` nothing, `axis` X or Y, `sign` an axis
+`commands.csv` has the commands, `states.csv` the status numbers, `refusals.csv` the refusals. `shape` is the continuation of a name: `bare` nothing, `axis` X or Y, `sign` an axis
 and a direction, `both` a direction for both axes, `1-8` a number, `place` positions. `access` is R, W or RW for a value
 (`NAME` reads, `NAME=value` writes), `-` for an action. (PMX-2ED-SA manual, table 9.0, and the text for J+, J- and
 CLRS.)
@@ -56,16 +56,7 @@ class Command:
 
 
 ROWS: tuple[Command, ...] = tuple(
-    Command(
-        row["name"],
-        row["shape"],
-        row["access"],
-        row["meaning"],
-        row["takes"],
-        row["section"],
-        row["note"],
-        bool(row["starts"]),
-    )
+    Command(**{**row, "starts": bool(row["starts"])})  # type: ignore[arg-type]
     for row in rows(__file__, "commands.csv")
 )
 COMMANDS: Mapping[str, Command] = {row.name: row for row in ROWS}
@@ -132,41 +123,19 @@ MOVING = 0b111
 LIMIT_PLUS, LIMIT_MINUS = 1 << 7, 1 << 8
 LIMIT_ERROR = LIMIT_PLUS | LIMIT_MINUS
 
-BITS: tuple[tuple[int, str], ...] = (
-    (1 << 0, "accelerating"),
-    (1 << 1, "decelerating"),
-    (1 << 2, "at constant speed"),
-    (LIMIT_PLUS, "plus limit error"),
-    (LIMIT_MINUS, "minus limit error"),
-    (1 << 4, "plus limit switch on"),
-    (1 << 5, "minus limit switch on"),
-    (1 << 6, "home switch on"),
-    (1 << 9, "on the Z index"),
-    (1 << 10, "joystick on"),
-    (1 << 11, "communication time-out"),
-)
+
+def _states(word: str) -> dict[int, str]:
+    return {int(row["value"], 0): row["meaning"] for row in rows(__file__, "states.csv") if row["of"] == word}
+
+
+BITS = tuple(_states("MST").items())
 """The bits of MSTX and MSTY, the most important for a person first."""
 
-LOOP: dict[int, str] = {
-    0: "idle",
-    1: "moving",
-    2: "correcting",
-    3: "stopping",
-    4: "aborting",
-    5: "jogging",
-    6: "homing",
-    7: "homing on the Z index",
-    8: "error: beyond the correction range",
-    9: "error: too many corrections",
-    10: "error: stalled",
-    11: "error: limit",
-    12: "off",
-    13: "homing on a limit",
-}
+LOOP = _states("SLS")
 """The values of SLSX and SLSY."""
 LOOP_ERRORS = frozenset({8, 9, 10, 11})
 
-PROGRAM: dict[int, str] = {0: "idle", 1: "running", 2: "paused", 4: "stopped by an error"}
+PROGRAM = _states("SASTAT")
 """The values of SASTAT0 and SASTAT1."""
 
 
@@ -190,25 +159,7 @@ def program_words(state: int) -> str:
     return PROGRAM.get(state, f"state {state}")
 
 
-MEANINGS: dict[str, tuple[str, str]] = {
-    "?ABS/INC is not in operation": (
-        "the axis makes no positional move whose target could be changed",
-        "T is for X and Y moves under way",
-    ),
-    "?Clear SNL Error": ("StepNLoop of the axis is in error", "SLSX and SLSY show it; CLRX and CLRY clear it"),
-    "?ICommandOn": ("an interpolated move is under way", "its speed cannot be changed on the fly"),
-    "?Index out of Range": ("nothing has that number", "/help NAME lists them"),
-    "?Invalid Answer": ("it does not take that value", "/help NAME shows the range"),
-    "?Low speed out of range": ("the low speed does not fit", "raise LSPD, or LSPDX and LSPDY, for this HSPD"),
-    "?Moving": ("the motor is moving", "wait until it is at rest, or STOP or ABORT it"),
-    "?S-curve on": ("no speed is changed on the fly with S-curves", "SCVX=0, SCVY=0 switch them off"),
-    "?Speed out of range": (
-        "the speed is outside the window of SSPDM",
-        "choose another window while the axis is at rest",
-    ),
-    "?SSPD Mode not Initialized": ("no speed window is selected", "SSPDMX=1 to 9 while the axis is at rest"),
-    "?Sub not Initialized": ("no subroutine of that number is stored", "download a program that has it"),
-}
+MEANINGS = {row["reply"]: (row["meaning"], row["remedy"]) for row in rows(__file__, "refusals.csv")}
 """Meaning and remedy by the reply, in the manual's spelling."""
 _FOLDED = {reply.casefold().replace(" ", ""): meaning for reply, meaning in MEANINGS.items()}
 

@@ -10,11 +10,11 @@ from __future__ import annotations
 import difflib
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from enum import IntEnum
-from types import MappingProxyType
 
 from multidrop.dialects.codec import Command as TypedCommand
+from multidrop.dialects.rows import rows
 from multidrop.dialects.text import counted
 
 
@@ -96,10 +96,9 @@ class Row:
     command: Command
     fields: tuple[str, ...]
     title: str
-    unit: str = ""
-    types: Mapping[str, int] = field(default_factory=lambda: MappingProxyType({}))
-    prints: bool = False
-    moves: bool = False
+    types: Mapping[str, int]
+    prints: bool
+    moves: bool
 
     @property
     def word(self) -> str:
@@ -113,41 +112,17 @@ class Row:
 
 MOVES: Mapping[str, int] = {each.name: each.value for each in Move}
 SEARCHES: Mapping[str, int] = {each.name: each.value for each in Search}
-_AXIS, _GLOBAL = (TYPE, MOTOR), (TYPE, BANK)
-
-ROWS = (
-    Row(Command.ROR, (MOTOR, VALUE), "Rotate right at a velocity; a negative one turns left", moves=True),
-    Row(Command.ROL, (MOTOR, VALUE), "Rotate left at a velocity; a negative one turns right", moves=True),
-    Row(Command.MST, (MOTOR,), "Stop a motor with the deceleration of its ramp"),
+_TYPES = {"MVP": MOVES, "RFS": SEARCHES}
+ROWS = tuple(
     Row(
-        Command.MVP,
-        (TYPE, MOTOR, VALUE),
-        "Move to a position, or by a distance (from where: axis parameter 127)",
-        types=MOVES,
-        moves=True,
-    ),
-    Row(Command.SAP, (TYPE, MOTOR, VALUE), "Set an axis parameter; 0 and 2 start a motion", moves=True),
-    Row(Command.GAP, _AXIS, "Print an axis parameter", prints=True),
-    Row(Command.STAP, _AXIS, "Store an axis parameter in EEPROM"),
-    Row(Command.RSAP, _AXIS, "Restore an axis parameter from EEPROM", moves=True),
-    Row(Command.SGP, (TYPE, BANK, VALUE), "Set a global parameter"),
-    Row(Command.GGP, _GLOBAL, "Print a global parameter", prints=True),
-    Row(Command.STGP, _GLOBAL, "Store a global parameter in EEPROM"),
-    Row(Command.RSGP, _GLOBAL, "Restore a global parameter from EEPROM"),
-    Row(
-        Command.RFS,
-        (TYPE, MOTOR),
-        "Start or stop a reference search, or print whether one runs",
-        types=SEARCHES,
-        moves=True,
-    ),
-    Row(Command.SIO, (TYPE, BANK, VALUE), "Set an output: type is its port, bank 2, value 0 or 1"),
-    Row(
-        Command.GIO,
-        (TYPE, BANK),
-        "Print a port, its number is the type: bank 0 digital, 1 analog, 2 output",
-        prints=True,
-    ),
+        Command[row["word"]],
+        tuple(row["fields"].split()),
+        row["title"],
+        types=_TYPES.get(row["word"], {}),
+        prints=bool(row["prints"]),
+        moves=bool(row["moves"]),
+    )
+    for row in rows(__file__, "direct.csv")
 )
 WORDS: Mapping[str, Row] = {row.word: row for row in ROWS}
 

@@ -15,6 +15,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import IntEnum
 
+from multidrop.dialects.rows import rows
 from multidrop.dialects.tmcl.manual import commands
 from multidrop.dialects.tmcl.manual.commands import BYTE, INT32, MOTOR, STARTING_PARAMETERS, TYPE, VALUE, Call, Command
 
@@ -181,62 +182,25 @@ def _words(of: type[IntEnum], *without: IntEnum) -> Mapping[str, int]:
 
 
 _NUMBER = re.compile(r"[+-]?(?:\d{1,11}|0[xX][0-9A-Fa-f]{1,8})", re.ASCII)
-_MOTOR, _BANK = Field("motor", MOTOR, BYTE), Field("bank", MOTOR, BYTE)
-_PARAMETER, _PORT, _VALUE = Field("parameter", TYPE, BYTE), Field("port", TYPE, BYTE), Field("value", VALUE, INT32)
-_COORDINATE, _INTERRUPT = Field("coordinate", TYPE, range(21)), Field("interrupt", TYPE, BYTE)
-_ADDRESS = Field("label", VALUE, range(MEMORY), label=True)
-_VARIABLE, _OTHER = Field("variable", MOTOR, BYTE), Field("variable", VALUE, BYTE)
-_COUNTER = Field("variable", TYPE, BYTE)
-_CONDITION = Field("condition", TYPE, BYTE, _words(Condition))
-_ALL = Field("operation", TYPE, BYTE, _words(Operation))
-_NO_SWAP = Field("operation", TYPE, BYTE, _words(Operation, Operation.SWAP))
-_WITH_X = Field("operation", TYPE, BYTE, _words(Operation, Operation.COMP))
-_WITH_VALUE = Field("operation", TYPE, BYTE, _words(Operation, Operation.SWAP, Operation.COMP))
-_MOVE = Field("move", TYPE, BYTE, commands.MOVES)
-
-_TABLE: tuple[tuple[Word, tuple[Field, ...], str], ...] = (
-    (Word.SIO, (_PORT, _BANK, _VALUE), "Set an output; port 255: all of them, value -1: as the accumulator says"),
-    (Word.GIO, (_PORT, _BANK), "Read an input or an output into the accumulator"),
-    (Word.CALC, (_WITH_VALUE, _VALUE), "Calculate with the accumulator and a value"),
-    (Word.COMP, (_VALUE,), "Compare the accumulator with a value"),
-    (Word.JC, (_CONDITION, _ADDRESS), "Jump where a condition is met"),
-    (Word.JA, (_ADDRESS,), "Jump"),
-    (Word.CSUB, (_ADDRESS,), f"Call a subroutine; {STACK} deep at most"),
-    (Word.RSUB, (), "Return from a subroutine"),
-    (Word.EI, (_INTERRUPT,), "Enable an interrupt; 255: interrupts as a whole"),
-    (Word.DI, (_INTERRUPT,), "Disable an interrupt; 255: interrupts as a whole"),
-    (
-        Word.WAIT,
-        (Field("condition", TYPE, BYTE, _words(Wait)), _MOTOR, Field("ticks", VALUE, range(-1, INT32.stop))),
-        "Wait for a time or an event: ticks of 10 ms, 0: without an end, -1: as the accumulator says",
-    ),
-    (Word.STOP, (), "End the program"),
-    (Word.SCO, (_COORDINATE, _MOTOR, _VALUE), "Set a coordinate"),
-    (Word.GCO, (_COORDINATE, _MOTOR), "Read a coordinate into the accumulator"),
-    (Word.CCO, (_COORDINATE, _MOTOR), "Store the actual position as a coordinate"),
-    (Word.CALCX, (_WITH_X,), "Calculate with the accumulator and the X register; LOAD copies to X"),
-    (Word.AAP, (_PARAMETER, _MOTOR), "Set an axis parameter to the accumulator; 0 and 2 start a motion"),
-    (Word.AGP, (_PARAMETER, _BANK), "Set a global parameter to the accumulator"),
-    (Word.CLE, (Field("flag", TYPE, BYTE, _words(Flag)),), "Clear an error flag"),
-    (Word.VECT, (_INTERRUPT, _ADDRESS), "Name the routine of an interrupt"),
-    (Word.RETI, (), "Return from an interrupt"),
-    (Word.ACO, (_COORDINATE, _MOTOR), "Set a coordinate to the accumulator"),
-    (Word.CALCVV, (_ALL, _VARIABLE, _OTHER), "Calculate with two user variables; the first takes the result"),
-    (Word.CALCVA, (_ALL, _VARIABLE), "Calculate with a user variable and the accumulator; the variable takes it"),
-    (Word.CALCAV, (_ALL, _VARIABLE), "Calculate with the accumulator and a user variable; the accumulator takes it"),
-    (Word.CALCVX, (_ALL, _VARIABLE), "Calculate with a user variable and the X register; the variable takes it"),
-    (Word.CALCXV, (_ALL, _VARIABLE), "Calculate with the X register and a user variable; X takes it"),
-    (Word.CALCV, (_NO_SWAP, _VARIABLE, _VALUE), "Calculate with a user variable and a value"),
-    (Word.MVPA, (_MOVE, _MOTOR), "Move to the position, or by the distance, in the accumulator"),
-    (Word.RST, (_ADDRESS,), "Reset the program, and begin again at a label"),
-    (Word.DJNZ, (_COUNTER, _ADDRESS), "Count a user variable down, and jump unless it is 0"),
-    (Word.ROLA, (_MOTOR,), "Rotate left at the velocity in the accumulator"),
-    (Word.RORA, (_MOTOR,), "Rotate right at the velocity in the accumulator"),
-    (Word.SIV, (_VALUE,), "Set the user variable whose number is in X"),
-    (Word.GIV, (), "Read the user variable whose number is in X into the accumulator"),
-    (Word.AIV, (), "Set the user variable whose number is in X to the accumulator"),
-    (Word.CALL, (_CONDITION, _ADDRESS), f"Call a subroutine where a condition is met; {STACK} deep at most"),
-)
+_FIELDS: Mapping[str, Field] = {
+    **{name: Field(name, TYPE, BYTE) for name in ("parameter", "port", "interrupt")},
+    **{name: Field(name, MOTOR, BYTE) for name in ("motor", "bank", "variable")},
+    "counter": Field("variable", TYPE, BYTE),
+    "other": Field("variable", VALUE, BYTE),
+    "value": Field("value", VALUE, INT32),
+    "ticks": Field("ticks", VALUE, range(-1, INT32.stop)),
+    "coordinate": Field("coordinate", TYPE, range(21)),
+    "address": Field("label", VALUE, range(MEMORY), label=True),
+    "condition": Field("condition", TYPE, BYTE, _words(Condition)),
+    "event": Field("condition", TYPE, BYTE, _words(Wait)),
+    "flag": Field("flag", TYPE, BYTE, _words(Flag)),
+    "move": Field("move", TYPE, BYTE, commands.MOVES),
+    "all": Field("operation", TYPE, BYTE, _words(Operation)),
+    "no_swap": Field("operation", TYPE, BYTE, _words(Operation, Operation.SWAP)),
+    "with_x": Field("operation", TYPE, BYTE, _words(Operation, Operation.COMP)),
+    "with_value": Field("operation", TYPE, BYTE, _words(Operation, Operation.SWAP, Operation.COMP)),
+}
+"""The fields that `program.csv` names."""
 _STARTS = frozenset({Word.MVPA, Word.ROLA, Word.RORA, Word.AAP})
 
 
@@ -250,7 +214,15 @@ def _direct(row: commands.Row) -> Row:
 
 
 ROWS: Mapping[int, Row] = {
-    int(number): Row(int(number), fields, title, number.name, number in _STARTS) for number, fields, title in _TABLE
+    int(number): Row(
+        int(number),
+        tuple(_FIELDS[each] for each in row["fields"].split()),
+        row["title"],
+        number.name,
+        number in _STARTS,
+    )
+    for row in rows(__file__, "program.csv")
+    for number in (Word[row["word"]],)
 } | {int(row.command): _direct(row) for row in commands.ROWS}
 """Every word by its number."""
 WORDS: Mapping[str, Row] = {row.word: row for row in ROWS.values()}
@@ -258,7 +230,7 @@ JUMPS = frozenset(number for number, row in ROWS.items() if any(each.label for e
 """The lines whose value is an address."""
 ENDS = frozenset({EMPTY, Word.JA, Word.RSUB, Word.STOP, Word.RETI, Word.RST})
 """The lines after which the next one is not executed."""
-BY_NUMBER = (Field("type", TYPE, BYTE), Field("motor", MOTOR, BYTE), _VALUE)
+BY_NUMBER = (Field("type", TYPE, BYTE), Field("motor", MOTOR, BYTE), _FIELDS["value"])
 WEARS = frozenset({Command.STAP, Command.STGP})
 """The lines that write to the EEPROM."""
 
