@@ -1,9 +1,9 @@
 """Every ASCII command of the controller: name, values and meaning; its replies in words.
 
-`commands.csv` has the commands, `states.csv` the status numbers, `refusals.csv` the refusals. `shape` is the continuation of a name: `bare` nothing, `axis` X or Y, `sign` an axis
-and a direction, `both` a direction for both axes, `1-8` a number, `place` positions. `access` is R, W or RW for a value
-(`NAME` reads, `NAME=value` writes), `-` for an action. (PMX-2ED-SA manual, table 9.0, and the text for J+, J- and
-CLRS.)
+`commands.csv` has the commands, `states.csv` the status numbers, `refusals.csv` the refusals. `shape` is the
+continuation of a name: `bare` nothing, `axis` X or Y, `sign` an axis and a direction, `both` a direction for both axes,
+`1-8` a number, `place` positions. `access` is R, W or RW for a value (`NAME` reads, `NAME=value` writes), `-` for an
+action. (PMX-2ED-SA manual, table 9.0, and the text for J+, J- and CLRS.)
 """
 
 from __future__ import annotations
