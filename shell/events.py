@@ -129,11 +129,12 @@ class Diverged(NamedTuple):
 
 
 class Agreed(NamedTuple):
-    """A drive and its twin agree again after they diverged."""
+    """A drive and its twin agree again after they diverged; `after`: the twin took the position, as of this."""
 
     at: float
     address: str
     axis: str = ""
+    after: str = ""
 
 
 class TwinEnded(NamedTuple):

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from types import MappingProxyType
 from typing import Protocol
 
 from multidrop.dialects.family import Motion
@@ -14,7 +15,7 @@ from multidrop.simulator.cell.table import Folder, Table
 from multidrop.simulator.cell.writer import DriveText
 from multidrop.simulator.kinematics import Profile
 from multidrop.simulator.wire import Port
-from multidrop.simulator.world import World
+from multidrop.simulator.world import Shaft, World
 
 
 class Device(Protocol):
@@ -89,9 +90,13 @@ class Shadow:
     motion: Callable[[float], tuple[Motion, ...]]
     """Position and velocity of each axis at a time, as the drive reports them."""
     align: Callable[[str, int, float], None]
-    """Set the position counter of an axis at rest."""
+    """Let an axis stand, whatever it does, and set its position counter."""
+    awaits: Callable[[str, float], str | None]
+    """What the homing of an axis awaits: `home`, `limit_plus`, `limit_minus`; empty: no switch. None: it has none."""
     efforts: Callable[[], Mapping[str, Effort]]
     """What each axis commands now."""
+    shafts: Mapping[str, Shaft] = field(default_factory=lambda: MappingProxyType({}))
+    """The shafts of the axes whose switches are no inputs, by the name of the axis."""
 
 
 @dataclass(frozen=True)

@@ -36,8 +36,7 @@ class World:
         self.index = index
         self.pushed = 0.0
         self._locks = spec.locked
-        edges = (*(self.home or ()), self.limit_plus, self.limit_minus)
-        self._edges = tuple(each for each in edges if each is not None and each > -inf)
+        self._edges = self._find_edges()
         self._held = False
         self._schedule = sorted(
             [(at, n, level) for at, n, level in spec.inputs] + [(at, 0, counts) for at, counts in spec.analog],
@@ -99,6 +98,18 @@ class World:
         """Turn the rotor from outside; the drive reads `pushed` and sees it in its encoder."""
         self._catch_up(now)
         self.pushed += steps
+
+    def learn(self, switch: str, place: float | None, way: float = 0.0) -> None:
+        """Have `home`, `limit_plus` or `limit_minus` close here for a shaft that turns this way; None: have none."""
+        if switch == "home":
+            self.home = None if place is None else (place, inf) if way > 0 else (-inf, place)
+        else:
+            setattr(self, switch, place)
+        self._edges = self._find_edges()
+
+    def _find_edges(self) -> tuple[float, ...]:
+        edges = (*(self.home or ()), self.limit_plus, self.limit_minus)
+        return tuple(each for each in edges if each is not None and abs(each) < inf)
 
     def hold(self, held: bool) -> None:
         self._held = held

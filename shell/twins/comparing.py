@@ -3,8 +3,13 @@
 Theory of operation. The limit at rest is in steps. A move adds `SKEW` seconds of the faster velocity, because the time
 of requests and replies on their way is not measured. A reading in several requests adds the time that it takes. A
 command or an input in the middle of a move adds as much once more, until both are at rest (`slack`): the place of the
-end depends on the moment then. A difference beyond the limit counts once it has lasted for `LASTING`, and is over in
-the same way.
+end depends on the moment then. A reply that came late, or a gap between two readings, adds its time until both are at
+rest or were seen to agree without it (`lag`): what was delayed may have been the command. A difference beyond the limit
+counts once it has lasted for `LASTING`, and is over in the same way. Where the drive stands and its twin has moved on,
+it lasts for `HELD`: meanwhile the lamps of the drive are read.
+
+What a twin cannot follow (`lost`), it leaves uncompared until the drive has been at rest for `SETTLED`, or both have
+agreed for as long; then it takes the position.
 
 A cause is named of what was measured and predicted since the two last agreed. A drive at rest while its twin moves is
 held up: by a limit, a stall or its load. Equal velocities with positions apart are a slip. Other velocities are other
@@ -26,6 +31,8 @@ LOAD = "load"
 AT_LIMIT = "a limit"
 SETTINGS = "settings changed"
 UNSEEN = "a command not seen here"
+PUSHED = "a push by hand"
+HOMING = "homing"
 EQUAL = 0.02
 """Velocities that differ by less than this part are equal."""
 
@@ -78,9 +85,8 @@ def causes(pairs: Sequence[Pair], doubtful: str = "", limits: Sequence[str] = ()
 
 
 def _likely(pairs: Sequence[Pair], limits: Sequence[str]) -> Iterator[str]:
-    if not any(each.expected for each in pairs) and len({each.predicted for each in pairs}) <= 1:
-        # The twin was at rest all the time: a drive that reports velocity 0 was pushed.
-        yield from (UNSEEN, SETTINGS) if any(each.velocity for each in pairs) else (SLIP, UNSEEN)
+    if unmoved(pairs):  # a drive that reports velocity 0 was pushed
+        yield from (UNSEEN, SETTINGS) if any(each.velocity for each in pairs) else (SLIP, PUSHED, UNSEEN)
     elif _left_behind([(each.position, each.predicted) for each in pairs]):
         yield from _obstacles(pairs, limits)
     elif _fell_short(pairs):
@@ -93,6 +99,11 @@ def _likely(pairs: Sequence[Pair], limits: Sequence[str]) -> Iterator[str]:
         yield from (LOAD, SETTINGS, STALL)
     else:
         yield from (SETTINGS, LOAD, SLIP)
+
+
+def unmoved(pairs: Sequence[Pair]) -> bool:
+    """Whether the twin was at rest all the time."""
+    return not any(each.expected for each in pairs) and len({each.predicted for each in pairs}) <= 1
 
 
 def _left_behind(places: Sequence[tuple[int, int]]) -> bool:
@@ -148,6 +159,14 @@ LIMIT = 50
 """Default limit at rest, steps."""
 LASTING = 0.1
 """Seconds after which a difference, or an agreement, counts."""
+HELD = 0.7
+"""Seconds after which the difference of a drive counts that stands while its twin has moved on."""
+SETTLED = 1.0
+"""Seconds of rest, or of agreement, after which a twin takes a position that it could not follow."""
+GAP = 3
+"""A time between two readings is a gap if it is more than so many times the usual one."""
+FADING = 0.95
+"""The part of a delay that is still expected after a further reading without it."""
 KEPT = 400
 """Pairs that are kept to find a cause."""
 
@@ -173,17 +192,35 @@ class Comparison:
     """Seconds that the last reading took: its parts are of different times."""
     pairs: deque[Pair] = field(default_factory=lambda: deque(maxlen=KEPT))
     """From the last two that agreed well to the present one."""
-    _doubted: Pair | None = None
+    doubted: Pair | None = None
     """The first pair that contradicts the state."""
+    since: Pair | None = None
+    """The first pair of the present state."""
     furthest: Pair | None = None
     """The pair with the largest difference."""
+    lost: str = ""
+    """The reason for which the twin cannot follow; empty: it can."""
+    learned: bool = False
+    """The twin was shown where a switch is since it could not follow."""
+    _usual: float = 0.0
+    """Seconds between two readings; 0: not known."""
+    _undisturbed: int = 0
+    """The pairs since the last command or input."""
+    _still: Pair | None = None
+    """The first pair at the present place of the drive."""
+    _beyond_at: float = 0.0
 
     def limit(self, pair: Pair, rest: int) -> int:
         """The limit for a pair, steps. `rest`: the limit at rest."""
-        return round(rest + self.slack + pair.fastest * (SKEW + self.took + self.lag))
+        return round(self._limit(pair, rest, self.lag))
+
+    def _limit(self, pair: Pair, rest: int, lag: float) -> float:
+        fastest = max([each.fastest for each in [*self.pairs][-1:]], default=0)  # a reading may begin while it moves
+        return rest + self.slack + max(pair.fastest, fastest) * (SKEW + self.took + lag)
 
     def take(self, pair: Pair, rest: int) -> Verdict | None:
         """Take a pair; return the news."""
+        self._time(pair, rest)
         beyond = abs(pair.difference) > self.limit(pair, rest)
         if self.furthest is None or abs(pair.difference) > abs(self.furthest.difference):
             self.furthest = pair
@@ -191,38 +228,80 @@ class Comparison:
             while len(self.pairs) > 1:
                 self.pairs.popleft()
         self.pairs.append(pair)
-        if beyond == self.apart:
-            self._doubted = None
+        self._undisturbed += 1
+        if self._still is None or pair.velocity or abs(pair.position - self._still.position) > JITTER:
+            self._still = pair
+        if beyond:
+            self._beyond_at = pair.at
+        if beyond == self.apart or self.lost:
+            self.doubted = None
             return None
-        self._doubted = self._doubted or pair
-        return self.settle() if pair.at - self._doubted.at >= LASTING else None
+        self.doubted = self.doubted or pair
+        return self.settle() if pair.at - self.doubted.at >= (HELD if self.held else LASTING) else None
+
+    def _time(self, pair: Pair, rest: int) -> None:
+        """Take the time since the reading before into the limit."""
+        if not self.pairs:
+            return
+        interval = pair.at - self.pairs[-1].at
+        if self._usual and interval > GAP * self._usual:
+            self.lag = max(self.lag, interval - self._usual)
+        else:
+            self._usual = FADING * self._usual + (1 - FADING) * interval if self._usual else interval
+            if self.steady and pair.equally_fast and abs(pair.difference) <= self._limit(pair, rest, 0.0):
+                self.lag *= FADING
+
+    @property
+    def held(self) -> bool:
+        """Whether a difference is in doubt of a drive that stands, and that its twin has moved explains it."""
+        standing = self.doubted is not None and not self.apart and not self.pairs[-1].velocity
+        return standing and causes(self.pairs)[0] not in (SLIP, UNSEEN)
+
+    def lose(self, why: str, at: float) -> None:
+        """Note that the twin cannot follow from here on."""
+        self.lost = self.lost or why
+        self._still, self._beyond_at, self.doubted = None, at, None
+
+    def over(self, searching: bool) -> bool:
+        """Whether what the twin could not follow is over. `searching`: the twin is homing."""
+        last, still = self.pairs[-1], self._still
+        rested = still is not None and last.at - still.at >= SETTLED
+        return bool(self.lost) and (rested or (not searching and last.at - self._beyond_at >= SETTLED))
+
+    def begin_again(self) -> None:
+        """Begin anew, once the twin has the position of the drive."""
+        self.lost, self.learned, self.apart, self.doubted = "", False, False, None
+        self.pairs.clear()
+        self.calm()
 
     def settle(self) -> Verdict | None:
         """Let what was seen last count, however short it lasted."""
-        if self._doubted is None:
+        if self.doubted is None:
             return None
         self.apart = not self.apart
-        self._doubted = None
+        self.since, self.doubted = self.doubted, None
         return Verdict.DIVERGED if self.apart else Verdict.AGREED
 
     @property
     def steady(self) -> bool:
         """Whether both move, agree, and are equally fast in the last two readings."""
         last = list(self.pairs)[-2:]
-        if len(last) < 2 or self._doubted is not None or self.apart:
+        if len(last) < 2 or self.doubted is not None or self.apart:
             return False
         return all(each.velocity and each.equally_fast for each in last) and last[0].predicted != last[1].predicted
 
     def rests(self, rest: int) -> bool:
         """Whether both are at rest and agree, so that the uncertainty of the last move is over."""
         last = list(self.pairs)[-2:]
-        settled = len(last) == 2 and all(each.at_rest for each in last) and last[0].difference == last[1].difference
+        settled = self._undisturbed > 1 and len(last) == 2 and all(each.at_rest for each in last)
+        settled = settled and last[0].difference == last[1].difference
         return settled and not self.apart and abs(last[1].difference) <= self.limit(last[1], rest)
 
     def disturbed(self, velocity: float, late: float = 0.0) -> None:
         """Note a command or an input during a move of this velocity, seen up to `late` s after it acted."""
-        self.slack += abs(velocity) * (SKEW + late)
+        self.slack += abs(velocity) * (SKEW + late + self.lag)  # it may have begun late, too
         self.lag = max(self.lag, late)
+        self._undisturbed = 0
 
     def calm(self) -> None:
         """Note that the drive and its twin are at rest: the next move is as certain as the first."""

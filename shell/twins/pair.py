@@ -12,9 +12,9 @@ from collections.abc import Callable, Iterator
 from math import copysign, inf
 from typing import Generic, Protocol, TypeVar
 
-from multidrop.dialects import End, Inexpressible, Priority
+from multidrop.dialects import End, Priority
 from multidrop.dialects.family import Motion
-from multidrop.dialects.values import Conditions, Levels, Snapshot
+from multidrop.dialects.values import Conditions, Snapshot
 from multidrop.drives.bus import Bus
 from multidrop.drives.conversations import ASKING
 from multidrop.drives.drive import Drive
@@ -33,92 +33,8 @@ from multidrop.drives.events import (
 from multidrop.drives.port_journal import GLOBAL
 from multidrop.drives.telemetry import Subscription, Value
 from multidrop.shell.events import Agreed, Diverged, Predicted, TwinEnded, TwinEvent
-from multidrop.shell.twins.comparing import Comparison, Pair, Verdict, causes
-from multidrop.simulator import cells
-from multidrop.simulator.cell.writer import BusText, write
-from multidrop.simulator.families import FAMILIES, family_of, snapshots_of
-from multidrop.simulator.family import Place, Shadow, Unit
-from multidrop.simulator.wire import Transmission
-
-NAME = "twin"
-
-
-class Twin:
-    """The simulated drive. `registers`: the real one is reached through its registers, by a connection of its own."""
-
-    def __init__(self, unit: Unit, shadow: Shadow, levels: Levels | None, begun: float, registers: bool) -> None:
-        self.levels = levels
-        self._unit, self._shadow, self._begun = unit, shadow, begun
-        self._connection = unit.connect() if registers and unit.connect is not None else None
-        self._world = next(iter(unit.worlds.values()))
-        self._now = 0.0
-        self._inputs: dict[int, int] = {}
-        self._overheard: list[Transmission] = []
-        shadow.rest()
-
-    def shift(self, seconds: float) -> None:
-        """Let it be ahead by so much more from now on; its own time never goes back."""
-        self._begun -= seconds
-
-    def live(self, at: float) -> float:
-        """Live up to a time of the host's clock; return the drive's own time."""
-        self._now = max(self._now, at - self._begun)
-        self._overheard += [each for each in self._unit.port.sent(self._now) if each.overheard]
-        return self._now
-
-    def hear(self, data: bytes, at: float) -> None:
-        """Take bytes of the host; the replies go nowhere."""
-        now = self.live(at)
-        if self._connection is not None:
-            self._connection.receive(data, now)
-        else:
-            self._unit.port.receive(data, now)
-        self.live(at)
-
-    def overhear(self, data: bytes, at: float) -> None:
-        self._unit.port.overhear(data, self.live(at))
-
-    def printed(self) -> list[bytes]:
-        """The bytes for other drives of its line that it has sent since the last call."""
-        printed, self._overheard = self._overheard, []
-        return [each.data for each in printed]
-
-    def put(self, value: int, at: float) -> bool:
-        """Set the inputs as they were read; return whether one has changed."""
-        if self.levels is None:
-            return False
-        levels = dict(self.levels.of(value))
-        changed, self._inputs = levels != self._inputs and bool(self._inputs), levels
-        now = self.live(at)
-        for number, level in levels.items():
-            if self._world.level(number, now) != level:
-                self._world.set_input(number, level, now)
-        self._unit.device.advance(now)
-        return changed
-
-    def motion(self, at: float) -> dict[str, Motion]:
-        return {each.axis: each for each in self._shadow.motion(self.live(at))}
-
-    def align(self, axis: str, position: int, at: float) -> None:
-        self._shadow.align(axis, position, self.live(at))
-        self.live(at)
-
-
-def make(snapshot: Snapshot, begun: float, registers: bool, alone: bool) -> tuple[Twin, tuple[str, ...]]:
-    """Make the twin of a drive that was read, with its gaps. Raises Inexpressible, or Diagnostic.
-
-    `begun`: the time of the host's clock from which it lives. `alone`: no other drive is on the line.
-    """
-    described = snapshots_of(FAMILIES[snapshot.kind]).describe(snapshot)
-    spec = cells.read(write([BusText(NAME, [described])]), NAME).buses[0].drives[0]
-    unit = family_of(spec.personality).build(spec, Place(alone=alone))
-    if unit.shadow is None:
-        raise Inexpressible(f"the simulator has no twin of an {spec.personality}")
-    gaps = [*described.remarks]
-    if described.unread:
-        gaps.append(f"not read, so as in a new drive: {', '.join(name for name, _ in described.unread)}")
-    return Twin(unit, unit.shadow, snapshot.levels, begun, registers), tuple(gaps)
-
+from multidrop.shell.twins.comparing import FADING, HOMING, PUSHED, UNSEEN, Comparison, Pair, Verdict, causes, unmoved
+from multidrop.shell.twins.twin import LIMITS, Twin
 
 # The requests of a conversation that the drive has taken: only these reach its twin.
 #
@@ -154,8 +70,6 @@ DRIFT = 0.005
 """The part of the time by which a program may run faster or slower than in the twin."""
 LONGEST = 30.0
 """Seconds without a steady move whose drift is made good at once, at most."""
-FADING = 0.95
-"""The part of a delay that is still expected after a further reply."""
 SWITCHES = {"lim+": "limit+", "lim-": "limit-"}
 """Limits by the function of their lamps."""
 
@@ -239,7 +153,7 @@ class Compared(Generic[T]):
             self.doubtful = ""
             self._causes.pop(axis, None)
             return Agreed(pairs[-1].at, address, axis)
-        first = next((each for each in pairs if abs(each.difference) > comparison.limit(each, rest)), pairs[-1])
+        first = comparison.since or pairs[-1]
         last, self._causes[axis] = pairs[-1], causes(pairs, self.doubtful, self._limits.get(axis, ()))
         return Diverged(first.at, address, last.difference, comparison.limit(last, rest), self._causes[axis], axis)
 
@@ -253,16 +167,68 @@ class Beside(Compared[Twin]):
         self._read_at = begun
         """When the inputs were last read."""
         self._in_step_at = begun
+        self._stopped: dict[str, int] = {}
+        """The velocities at a stop, until a reply shows how late it may have been."""
         self._quickest = inf
         """The shortest time from a reading's request to its reply, s."""
         self._delay = 0.0
         """Seconds by which the last replies came later than that: a request or a stop may take as much on its way."""
 
     def sample(self, sample: Sample, rest: int) -> Iterator[TwinEvent]:
-        """Compare a sample with the twin, and keep the twin in step."""
-        yield from super().sample(sample, rest)
-        if (comparison := self.axes.get(sample.axis)) is not None:
-            self._keep_step(comparison)
+        """Compare a sample with the twin, keep that in step, and let it take a position that it could not follow."""
+        name, at, axis = sample.axis, sample.at, self.comparison(sample.axis)
+        if name not in self.twin.motion(at):  # a motor that the simulated module does not have
+            return
+        awaited = self.twin.awaits(name, at)
+        if awaited is not None and not axis.lost:
+            axis.lose(HOMING, at)
+        if sample.velocity:
+            self._limits.pop(name, None)
+            axis.lag = max(axis.lag, self._delay)
+        for news in super().sample(sample, rest):
+            yield news
+            if isinstance(news, Diverged) and unmoved(axis.pairs):
+                axis.lose(UNSEEN if any(each.velocity for each in axis.pairs) else PUSHED, at)
+        pair = axis.pairs[-1]
+        if abs(pair.difference) > axis.limit(pair, rest):
+            self._meet(name, axis, pair, awaited)
+        if axis.over(awaited is not None):
+            yield from self._take_position(sample, axis, rest, awaited)
+        else:
+            self._keep_step(axis)
+
+    def _meet(self, name: str, axis: Comparison, pair: Pair, awaited: str | None) -> None:
+        """Learn of a difference where a switch is: one that homing awaits, or a limit that is seen to be active."""
+        if axis.lost:
+            axis.learned = self.twin.meet(name, awaited or "", pair.at) or axis.learned
+        elif not pair.velocity and (limits := self._limits.get(name)):
+            for each in limits:
+                self.twin.meet(name, LIMITS[each], pair.at)
+            self.twin.align(name, pair.position, pair.at)
+            axis.lose(f"a limit ({', '.join(limits)})", pair.at)
+            axis.learned = True
+        elif pair.velocity and not pair.expected and self.twin.at_learned(name, pair.at):
+            self.twin.forget(name)
+            axis.lose("a limit that is not where it was", pair.at)
+
+    def _take_position(self, sample: Sample, axis: Comparison, rest: int, awaited: str | None) -> Iterator[TwinEvent]:
+        """Take the position of a drive at rest; say so unless the twin was there."""
+        pair, why = axis.pairs[-1], axis.lost
+        beyond = abs(pair.difference) > axis.limit(pair, rest)
+        if why == HOMING and (awaited is not None or beyond):
+            self.twin.forget(sample.axis)  # what it has learned is not so
+        if axis.apart or axis.learned or beyond or awaited is not None:
+            self.doubtful = ""
+            self._causes.pop(sample.axis, None)
+            yield Agreed(sample.at, sample.address, sample.axis, why)
+        if not pair.velocity and (pair.difference or awaited is not None):
+            self.twin.align(sample.axis, sample.position, sample.at)
+        axis.begin_again()
+
+    @property
+    def asks(self) -> bool:
+        """Whether the lamps of the drive would tell why it stands."""
+        return any(each.held for each in self.axes.values() if each.pairs)
 
     def _keep_step(self, comparison: Comparison) -> None:
         """Shift the twin's time a little where a drive is early or late at an equal velocity.
@@ -274,12 +240,14 @@ class Beside(Compared[Twin]):
         before, pair = list(comparison.pairs)[-2:]
         most = DRIFT * min(pair.at - self._in_step_at, LONGEST)
         late = pair.difference / copysign(pair.fastest, pair.predicted - before.predicted)
+        late = copysign(max(0.0, abs(late) - comparison.took), late)  # what the reading took is not the drive's
         self.twin.shift(max(-most, min(most, late)))
         self._in_step_at = pair.at
 
     # What reaches the twin
 
     def concluded(self, concluded: Concluded) -> None:
+        """Take a conversation that is over."""
         if (took := reading_took(concluded)) is not None:
             last = concluded.transactions[-1]
             self._quickest = min(self._quickest, last.ended_at - last.transmitted_at)
@@ -291,16 +259,23 @@ class Beside(Compared[Twin]):
             if disturbs and each.reply.acknowledged:
                 self._note_delay(each)
             self._acts(data, each.transmitted_at, disturbs)
+            found = self.drive.family.referencing(self.drive.state, each.request.text) if disturbs else None
+            if found is not None and found.homing:
+                self.comparison(found.axis).lose(HOMING, each.transmitted_at)
         if concluded.unproven:
             self.doubtful = concluded.unproven
 
     def _note_delay(self, transaction: Transaction) -> None:
         """Note how late a reply came. A delay that was seen fades with further replies."""
         delay = transaction.ended_at - transaction.transmitted_at - self._quickest
+        for axis, velocity in self._stopped.items():  # the stop was as late as this request, at most
+            self.comparison(axis).disturbed(velocity, max(0.0, delay - self._delay))
+        self._stopped = {}
         self._delay = max(0.0, delay, FADING * self._delay)
 
     def stopped(self, data: bytes, at: float) -> None:
         """Take the bytes of a stop, or those that a person typed in raw mode."""
+        self._stopped = self.velocities(at)
         self._acts(data, at)
 
     def inputs(self, value: int, at: float) -> None:
@@ -341,6 +316,8 @@ class BusTwins:
         """The addresses that are read."""
         self._samples: Subscription[str] | None = None
         self._inputs: Subscription[Value] | None = None
+        self._asked: dict[str, Subscription[str]] = {}
+        """The drives whose lamps are read once, by address."""
 
     def set_limit(self, steps: int) -> None:
         self._limit = steps
@@ -376,6 +353,8 @@ class BusTwins:
         for drive in list(self.besides):
             self.remove(drive)
         self._poll()
+        for asked in self._asked.values():
+            asked.close()
         while self._ends:
             self._ends.pop()()
 
@@ -400,6 +379,8 @@ class BusTwins:
             if (beside := self._at(event.address)) is not None:
                 for news in beside.sample(event, self._limit):
                     self._publish(news)
+                if beside.asks and event.address not in self._asked:
+                    self._asked[event.address] = self.bus.telemetry.watch([event.address])
                 for data in beside.twin.printed():  # the other twins overhear what one has printed for them
                     for other in self.besides.values():
                         if other is not beside:
@@ -418,6 +399,8 @@ class BusTwins:
         elif isinstance(event, Conditioned):
             if (beside := self._at(event.address)) is not None:
                 beside.conditions(event.conditions)
+                if (asked := self._asked.pop(event.address, None)) is not None:
+                    asked.close()
         elif isinstance(event, Changed) and self._polled != [each.address for each in self.besides]:  # DN, PY
             self._poll()
         elif isinstance(event, Lost):

@@ -110,7 +110,8 @@ class Twins:
     async def _start(self, twins: BusTwins, drive: Drive) -> tuple[str, ...]:
         """Read a drive, and run a twin beside it; return the gaps of the twin."""
         from multidrop.shell import snapshots
-        from multidrop.shell.twins.pair import Beside, make
+        from multidrop.shell.twins.pair import Beside
+        from multidrop.shell.twins.twin import make
 
         name, bus = self._workspace.display_name(drive), twins.bus
         twins.expect(drive)
@@ -157,9 +158,8 @@ class Twins:
         addresses = [each.address for each in self._buses[bus].drives]
         self.stop(bus)
         self._paused[bus] = addresses
-        self._workspace.notify(
-            f"{bus.name}: its twins end with the line; they begin again once it is back", bus=bus.name
-        )
+        back = "; they begin again once it is back" if self._workspace.reconnections.tries(bus.name) else ""
+        self._workspace.notify(f"{bus.name}: its twins end with the line{back}", bus=bus.name, outcome=True)
 
     # Messages
 
@@ -183,7 +183,8 @@ class Twins:
         name = f"{name}.{event.axis}" if event.axis else name
         when = f"{self._workspace.wall(event.at):%H:%M:%S.%f}"[:-5]
         if isinstance(event, Agreed):
-            self._workspace.notify(f"{name}: agrees with its twin again, {when}", bus=bus.name)
+            what = f"its twin takes its position after {event.after}" if event.after else "agrees with its twin again"
+            self._workspace.notify(f"{name}: {what}, {when}", bus=bus.name, outcome=True)
             return
         drive, steps = bus.at(event.address), abs(event.difference)
         units = self._in_units(drive, event.axis, steps)

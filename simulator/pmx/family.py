@@ -33,6 +33,7 @@ from multidrop.simulator.cell.spec import Value as Setting
 from multidrop.simulator.cell.table import Folder, Table, quoted
 from multidrop.simulator.cell.writer import DriveText, Entry, plain, remark
 from multidrop.simulator.family import Effort, Family, Place, Shadow, Snapshots, StoredProgram, Unit
+from multidrop.simulator.pmx.axis import Until
 from multidrop.simulator.pmx.commands import MODEL
 from multidrop.simulator.pmx.controller import BAUDS
 from multidrop.simulator.pmx.device import PROGRAMS, PmxDevice, PmxPort
@@ -178,13 +179,25 @@ def _shadow(device: PmxDevice) -> Shadow:
         )
 
     def align(name: str, position: int, now: float) -> None:
-        if not axes[name].loop.on:  # where it follows the encoder and cannot be set (8.1.2)
-            axes[name].set_position(position, now)
+        axis = axes[name]
+        axis.halt(now)
+        if axis.loop.on:  # it follows the encoder, and cannot be set (8.1.2)
+            axis.set_encoder(position, now)
+            axis.loop.stay(now)
+        else:
+            axis.set_position(position, now)
 
     def efforts() -> dict[str, Effort]:
         return {name: Effort(axis.pulses.profile, TURN, axis.unit, stalls=axis.loop.on) for name, axis in axes.items()}
 
-    return Shadow(rest, motion, align, efforts)
+    def awaits(name: str, now: float) -> str | None:  # noqa: ARG001
+        homing = axes[name].homing
+        if homing is None:
+            return None
+        limit = "limit_plus" if homing.direction > 0 else "limit_minus"
+        return {Until.HOME: "home", Until.LIMIT: limit}.get(homing.awaited or Until.END, "")
+
+    return Shadow(rest, motion, align, awaits, efforts, {name: axis.rotor for name, axis in axes.items()})
 
 
 PMX = Family(

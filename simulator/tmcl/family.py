@@ -232,7 +232,16 @@ def _shadow(device: TmclModule, names: Sequence[str]) -> Shadow:
     def efforts() -> dict[str, Effort]:
         return {name: motor.effort for name, motor in motors.items()}
 
-    return Shadow(device.unwatch, motion, lambda name, position, now: motors[name].stand_at(position, now), efforts)
+    def align(name: str, position: int, now: float) -> None:
+        motors[name].end_search()
+        motors[name].put(position, now)
+
+    def awaits(name: str, now: float) -> str | None:  # noqa: ARG001
+        search = motors[name].search
+        return None if search is None else search.awaited
+
+    shafts = {name: motor.shaft for name, motor in motors.items()}
+    return Shadow(device.unwatch, motion, align, awaits, efforts, shafts)
 
 
 TMCL = Family(

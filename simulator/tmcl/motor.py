@@ -119,6 +119,15 @@ class Motor:
         self._profile = halt(t, float(position))
         self._hand_on(t)
 
+    def put(self, position: int, t: float) -> None:
+        """Stand, and give its place this position. MVP REL counts on from a target that was not reached."""
+        if self.reached(t):
+            self._target = position
+        else:
+            self.freeze(t)
+        self._profile = halt(t, float(position))
+        self._hand_on(t)
+
     def freeze(self, t: float) -> None:
         """Stand at once, without a ramp."""
         self.positioning = False
@@ -263,6 +272,12 @@ class ReferenceSearch:
         self.number = 0
         motor.passes_limits = base in PASSING
         self._enter(t)
+
+    @property
+    def awaited(self) -> str:
+        """The switch that ends its step by closing; empty: none."""
+        step = self._steps[0]
+        return ("home", "limit_plus", "limit_minus")[step.switch] if step.closed else ""
 
     def over(self, t: float) -> bool:
         """Take the steps that are due; whether none is left."""

@@ -10,7 +10,7 @@ import pytest
 
 from multidrop.dialects import Diagnostic, DriveError, NoAnswer, Refused
 from multidrop.drives.events import Sent
-from multidrop.shell.events import Diverged, OnBus, Predicted, TwinEnded
+from multidrop.shell.events import Diverged, Notified, OnBus, Predicted, TwinEnded
 from tests.support.cell_session import ETHERNET, CellSession, bus, party, pmx
 from tests.support.twin_cell import of, run
 
@@ -121,12 +121,23 @@ async def test_a_line_that_comes_back_is_read_again(tmp_path: Path) -> None:
         cell.world("unplug press")
         await asyncio.sleep(1)
         assert len(of(cell, TwinEnded)) == 1
+        (said,) = [each for each in cell.events if isinstance(each, Notified) and "its twins end" in each.text]
+        assert said.outcome and said.text.endswith("they begin again once it is back"), "the piped shell shows outcomes"
         assert not cell.session.twins.running(cell.session.buses["press"])
         cell.device("press:a").execute("MR 400", cell.floor.now())
         cell.world("plug press")
         cell.events.clear()
         await asyncio.sleep(7)
         assert of(cell, Predicted)[-1][2:5] == (5400, 0, 0)
+
+
+async def test_a_line_that_is_not_tried_again_begins_no_twin(tmp_path: Path) -> None:
+    async with CellSession(tmp_path, bus("press", party("a"))) as cell:
+        await run(cell, "/twin on")
+        cell.world("unplug press")
+        await asyncio.sleep(1)
+        (said,) = [each for each in cell.events if isinstance(each, Notified) and "its twins end" in each.text]
+        assert said.outcome and said.text == "press: its twins end with the line"
 
 
 async def test_a_drive_that_moves_gets_no_twin(tmp_path: Path) -> None:
