@@ -19,7 +19,7 @@ from multidrop.simulator.cell.drive_keys import check_inside
 from multidrop.simulator.cell.spec import BusSpec, Cell, DriveSpec, Endpoint, Faults, MotorSpec
 from multidrop.simulator.cell.table import Folder, Source, Table, quoted
 from multidrop.simulator.families import BY_PERSONALITY
-from multidrop.simulator.torque import with_motor
+from multidrop.simulator.motor_files import with_motor
 
 if TYPE_CHECKING:
     from multidrop.simulator.family import Family

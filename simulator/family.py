@@ -13,7 +13,7 @@ from multidrop.dialects.values import Snapshot, Value
 from multidrop.simulator.cell.spec import DriveSpec
 from multidrop.simulator.cell.table import Folder, Table
 from multidrop.simulator.cell.writer import DriveText
-from multidrop.simulator.kinematics import Profile
+from multidrop.simulator.kinematics import Effort as Effort
 from multidrop.simulator.wire import Port
 from multidrop.simulator.world import Shaft, World
 
@@ -60,25 +60,6 @@ class Place:
 
     baud: int = 0
     alone: bool = True
-
-
-@dataclass(frozen=True)
-class Effort:
-    """The motion that an axis commands, and what its reports tell of the torque that it takes."""
-
-    profile: Profile
-    turn: float
-    """Steps of the profile in a turn."""
-    count: float = 1.0
-    """Steps of the profile in a count of the reported position."""
-    current: float = 1.0
-    """Of the full one."""
-    measured: bool = False
-    """The reported position is that of an encoder."""
-    lag: str = ""
-    """The word that reads how far the rotor lags, in steps of the profile; empty: none."""
-    stalls: bool = False
-    """A stall ends the motion."""
 
 
 @dataclass(frozen=True)

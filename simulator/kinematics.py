@@ -24,6 +24,7 @@ meet the later one counts: at its start a motion already has VI, at its end the 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
 from math import copysign, cos, inf, nextafter, pi, sin, sqrt
 from typing import NamedTuple
 
@@ -444,3 +445,22 @@ def _stretches(one: Profile, other: Profile, after: float) -> Iterator[tuple[flo
     if one.end == inf or other.end == inf:
         for n in range(40):
             yield begin + 2.0**n - 1, begin + 2.0 ** (n + 1) - 1
+
+
+@dataclass(frozen=True)
+class Effort:
+    """The motion that an axis commands, and what its reports tell of the torque that it takes."""
+
+    profile: Profile
+    turn: float
+    """Steps of the profile in a turn."""
+    count: float = 1.0
+    """Steps of the profile in a count of the reported position."""
+    current: float = 1.0
+    """Of the full one."""
+    measured: bool = False
+    """The reported position is that of an encoder."""
+    lag: str = ""
+    """The word that reads how far the rotor lags, in steps of the profile; empty: none."""
+    stalls: bool = False
+    """A stall ends the motion."""

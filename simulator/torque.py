@@ -12,15 +12,11 @@ from __future__ import annotations
 
 from bisect import bisect_right
 from collections.abc import Iterator, Mapping
-from dataclasses import replace
 from itertools import pairwise
 from math import asin, inf, pi
 from types import MappingProxyType
 
-from multidrop.dialects.files import LARGEST, split_lines
-from multidrop.simulator.cell.drive_keys import read_file
-from multidrop.simulator.cell.spec import DriveSpec, MotorSpec, WorldSpec
-from multidrop.simulator.cell.table import Folder, Table, quoted
+from multidrop.simulator.cell.spec import MotorSpec, WorldSpec
 from multidrop.simulator.kinematics import Profile, Segment
 
 MOTORS: Mapping[str, MotorSpec] = MappingProxyType(
@@ -31,10 +27,6 @@ MOTORS: Mapping[str, MotorSpec] = MappingProxyType(
     }
 )
 """Figures of our own for a common motor of each size on 48 V; none is measured."""
-VALID = ", ".join((*MOTORS, "FILE.csv"))
-MOST_ROWS = 1000
-FASTEST, STRONGEST = 1000.0, 10_000.0
-"""The highest speed and torque of a row."""
 FULL_STEPS = 200
 PARTS = 16
 LATE = 1e-9
@@ -129,58 +121,3 @@ class Torque:
                 t = segment.start + (speed * turn * segment.direction - segment.velocity) / segment.acceleration
                 if begin < t < segment.end:
                     yield t
-
-
-def read_motor(table: Table, folder: Folder) -> MotorSpec | None:
-    """Read `motor` of a drive: a class, a CSV file, or its rows. Raises Diagnostic."""
-    given = table.values.get("motor")
-    if given is None:
-        return None
-    if isinstance(given, list):
-        columns = (("rev/s", 0.0, FASTEST), ("N m", 0.0, STRONGEST))
-        return MotorSpec(_checked(table, "motor", table.rows("motor", columns)))
-    name = table.text("motor")
-    if name in MOTORS:
-        return MOTORS[name]
-    if not name.lower().endswith(".csv"):
-        raise table.wrong("motor", f"cannot be {quoted(name)}", f"valid: {VALID}")
-    return MotorSpec(_checked(table, f"motor: {name}", tuple(_rows(table, folder, name))))
-
-
-def with_motor(drive: DriveSpec, table: Table, folder: Folder) -> DriveSpec:
-    """Give a drive the motor of its table, on each axis. Raises Diagnostic."""
-    motor = read_motor(table, folder)
-    worlds = [replace(each, motor=motor) for each in (drive.world, *drive.further)]
-    if motor is None and any(each.friction or each.inertia for each in worlds):
-        raise table.wrong("motor", "is missing, and the world has friction or inertia", f"valid: {VALID}")
-    return replace(drive, world=worlds[0], further=tuple(worlds[1:]))
-
-
-def _rows(table: Table, folder: Folder, name: str) -> Iterator[tuple[float, ...]]:
-    text = read_file(name, "motor", table, folder, LARGEST).decode("utf-8-sig", "replace")
-    for number, line in enumerate(split_lines(text), 1):
-        text = line.partition("#")[0].strip()
-        fields = [each.strip() for each in text.split(",")]
-        if not text or (number == 1 and fields == ["rev/s", "N m"]):
-            continue
-        where = f"motor: {name}:{number}"
-        try:
-            speed, torque = map(float, fields)
-        except ValueError:
-            raise table.wrong(where, f"cannot be {quoted(text)}", "valid: rev/s, N m, as in 5, 0.38") from None
-        if not (0 <= speed <= FASTEST and 0 <= torque <= STRONGEST):
-            hint = f"valid: 0 to {FASTEST:g} rev/s, 0 to {STRONGEST:g} N m"
-            raise table.wrong(where, f"is out of range: {quoted(text)}", hint)
-        yield speed, torque
-
-
-def _checked(table: Table, key: str, rows: tuple[tuple[float, ...], ...]) -> tuple[tuple[float, float], ...]:
-    """Check the rows of a curve. Raises Diagnostic."""
-    if not 2 <= len(rows) <= MOST_ROWS:
-        raise table.wrong(key, f"has {len(rows)} rows", f"valid: 2 to {MOST_ROWS}, each a speed and a torque")
-    if rows[0][0] or not rows[0][1]:
-        raise table.wrong(key, f"begins at {rows[0][0]:g}, {rows[0][1]:g}", "the first row is 0 and the holding torque")
-    for (low, _), (high, _) in pairwise(rows):
-        if low >= high:
-            raise table.wrong(key, f"must go up in speed, not from {low:g} to {high:g} rev/s")
-    return tuple((speed, torque) for speed, torque in rows)

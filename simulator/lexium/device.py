@@ -17,7 +17,7 @@ from multidrop.dialects.files import split_lines
 from multidrop.dialects.mcode.manual.errors import text as error_text
 from multidrop.dialects.mcode.manual.grammar import LineError, parse, strip
 from multidrop.simulator.cell.spec import DriveSpec
-from multidrop.simulator.family import Effort
+from multidrop.simulator.kinematics import Effort
 from multidrop.simulator.lexium.event_loop import EventLoop
 from multidrop.simulator.lexium.language.instructions import Instructions
 from multidrop.simulator.lexium.motion.feedback import FIXED, VARIABLE

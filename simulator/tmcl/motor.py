@@ -20,8 +20,7 @@ from typing import NamedTuple
 
 from multidrop.dialects.tmcl.manual.commands import Axis
 from multidrop.dialects.tmcl.manual.modules import INVERTED, MIRRORED, Module
-from multidrop.simulator.family import Effort
-from multidrop.simulator.kinematics import halt, move, slew
+from multidrop.simulator.kinematics import Effort, halt, move, slew
 from multidrop.simulator.world import REVOLUTION, Shaft, World
 
 FULL = 256
