@@ -87,12 +87,17 @@ class Answer:
     def __init__(self, plan: Plan, results: Mapping[int, Result], search: str = "") -> None:
         self._names = [visible(key.text) for key in plan.job.keys]
         self._search = search
+        expects = plan.job.expects
         columns = [each.removeprefix(MARGIN) for each in bench(plan.job).columns if each.startswith(MARGIN)]
         self._cases = [
             (
                 tuple(visible(spelled(value)) for value in plan.values_of(number)),
                 result.ok,
-                [(name, float(cell)) for name, cell in zip(columns, result.cells, strict=False) if cell],
+                [
+                    (name, float(cell))
+                    for name, cell in zip(columns, result.cells, strict=False)
+                    if cell and (result.ok or result.failed >= expects.index(name))  # what failed before decided it
+                ],
             )
             for number, result in sorted(results.items())
         ]
@@ -193,7 +198,8 @@ class Answer:
         """The boundary in words: the values of one key at which a case fails, for those of the other."""
         if self._search:
             first = self._names.index(self._search)
-            said = self._said(first, [at for at in range(len(self._names)) if at != first])
+            others = [at for at, axis in enumerate(self._axes) if at != first and len(axis.at) > 1]
+            said = self._said(first, others)
         elif self._pair:
             said = self._said(self._pair[0], self._pair[1:])
             if all(" every " in begin for (begin, _), _ in said):  # the other key decides

@@ -22,6 +22,7 @@ from multidrop.dialects.files import program_text_of
 from multidrop.shell import configuration
 from multidrop.shell.sweeps.trial import Case, Job, Result, bench, version
 from multidrop.shell.sweeps.variation import (
+    DRIVE,
     OWN_KEYS,
     SEED,
     Drive,
@@ -36,6 +37,7 @@ from multidrop.shell.sweeps.variation import (
 from multidrop.simulator import cells
 from multidrop.simulator.cells import Placed
 from multidrop.simulator.families import PROGRAMS
+from multidrop.simulator.torque import MOTORS
 
 MOST = 100_000
 """The largest number of cases."""
@@ -241,6 +243,8 @@ def _check_value(plan: Plan, index: int, key: Key, value: Value) -> None:
         if not isinstance(value, int):
             raise Diagnostic("must be a whole number", "seed")
         return
+    if key.part == DRIVE and value not in MOTORS:  # a file would be read in each process, here or elsewhere
+        raise Diagnostic(f"is not one of {', '.join(MOTORS)}", key.name, "name a file in the cell")
     ready = bench(plan.job)
     others: list[list[Value | None]] = [[None, *each.samples()] for each in plan.values]
     refusals = []

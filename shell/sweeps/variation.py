@@ -197,6 +197,8 @@ class _Between(Sequence[Value]):
 
 SEED = "seed"
 WORLD, SETTINGS = "world", "set"
+DRIVE, MOTOR = "", "motor"
+"""The part of a key of the drive's table itself, and the only such key."""
 AXES = ("x", "y")
 """The axes that have a world of their own; keys without an axis belong to the first."""
 OWN_KEYS = ("program", "program_text")
@@ -207,7 +209,7 @@ Drive = Mapping[str, Any]
 
 @dataclass(frozen=True)
 class Key:
-    """A key as it is written, and its place: `world` or `set`, the axis, the name in a drive's table; or the seed."""
+    """A key as it is written, and its place: `world`, `set` or none, the axis, the name in the table; or the seed."""
 
     text: str
     part: str
@@ -218,6 +220,8 @@ class Key:
         """The value in a drive's table; None: it has none."""
         if self.part == SEED:
             return None
+        if self.part == DRIVE:
+            return drive.get(self.name)
         table = _table(drive, self.part)
         if self.part == SETTINGS:
             return next((value for name, value in table.items() if name.upper() == self.name), None)
@@ -228,6 +232,8 @@ class Key:
     def put(self, drive: Drive, value: Value) -> Drive:
         if self.part == SEED:
             return drive
+        if self.part == DRIVE:
+            return {**drive, self.name: value}
         table = dict(_table(drive, self.part))
         if self.part == SETTINGS:
             table = {name: each for name, each in table.items() if name.upper() != self.name}
@@ -252,6 +258,8 @@ def parse_key(text: str, names: Container[str]) -> tuple[str, Key]:
     of_an_axis = axis in AXES and _in_world(name)
     if not name or (dot and not of_an_axis):
         raise Diagnostic("is not a key", f"--vary {text}", "valid: seed, DRIVE.KEY, or KEY with one drive")
+    if name.lower() == MOTOR:
+        return drive, Key(text, DRIVE, MOTOR)
     if axis or _in_world(name):
         return drive, Key(text, WORLD, name.lower(), axis)
     return drive, Key(text, SETTINGS, name.upper())

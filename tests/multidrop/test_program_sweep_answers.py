@@ -344,3 +344,16 @@ def test_nothing_else_writes_the_files(sweep: Sweep, tmp_path: Path, monkeypatch
     monkeypatch.setattr(results, "SHARE", 0)
     sweep(*GRID, "--csv", "all.csv")
     assert seen == [1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 10]
+
+
+def test_the_motor_is_varied_and_a_margin_leaves_out_what_an_error_ended(sweep: Sweep) -> None:
+    vary = ("--vary", "b.motor=nema17,nema34", "--vary", "b.load=0.1,0.9", "--vary", "b.A=100000")
+    done = sweep(*vary, "--expect", "errors == []", "--expect", "virtual_s < 60", "--until", "50")
+    assert done.stdout.splitlines()[:2] == [
+        "b.motor=nema17   50%  1 of 2  margin 58.46 of virtual_s < 60; 2 of position == 51200 +- 2",
+        "b.motor=nema34    0%  0 of 2",
+    ]
+    refused = sweep("--vary", "b.motor=nema17,own.csv")
+    assert refused.returncode == 2 and refused.stderr == (
+        "--vary b.motor=own.csv: motor: is not one of nema17, nema23, nema34; name a file in the cell\n"
+    )

@@ -62,6 +62,23 @@ def test_an_interrupted_sweep_reports_what_is_done_and_leaves_no_process(folder:
     assert gone(process.pid)
 
 
+@pytest.mark.fork
+def test_a_killed_sweep_leaves_a_table_and_goes_on_with_it(folder: Path, home: Home) -> None:
+    sweep = ["program", "sweep", "slow.mxt", "--vary", "seed=1..40", "--jobs", "2", "--json"]
+    process = home.start(*sweep, "--csv", "t.csv")
+    until = time.monotonic() + PATIENCE
+    while (table := (folder / "t.csv")).exists() is False or table.read_bytes().count(b"\n") < 3:
+        assert process.poll() is None and time.monotonic() < until
+        time.sleep(0.01)
+    process.kill()
+    process.wait(PATIENCE)
+    kept = table.read_bytes().count(b"\n") - 1
+    whole = home.process(*sweep, "--resume", "t.csv")
+    assert whole.returncode == 1 and f"{kept} cases of 40 are in the file already" in whole.stderr, whole
+    cases = [json.loads(line).get("case") for line in whole.stdout.splitlines()]
+    assert cases == [*range(1, 41), None] and table.read_bytes().count(b"\n") == 41
+
+
 def found(*arguments: str) -> list[str]:
     """The numbers of processes."""
     return subprocess.run(["pgrep", *arguments], capture_output=True, text=True).stdout.split()
