@@ -21,7 +21,7 @@ from multidrop.dialects import Diagnostic
 from multidrop.dialects.text import counted, visible
 from multidrop.shell import configuration
 from multidrop.shell.line_syntax import join_target
-from multidrop.shell.log import files, moments, steps
+from multidrop.shell.log import files, steps
 from multidrop.shell.log.files import KINDS, TRAFFIC, Entry, Line
 from multidrop.shell.log.judge import RULES, judged
 from multidrop.shell.raw import text_of
@@ -115,15 +115,25 @@ def judge(chosen: argparse.Namespace) -> int:
 
 def at(chosen: argparse.Namespace) -> int:
     """Print what was known at a time: the last entry of each kind and place, and the last polls."""
+    from multidrop.shell.log import moments
+
     found = moments.known(_path(chosen), chosen.time)
     session = "" if found.session is None else found.session.text
     fact: dict[str, object] = {"at": found.at.isoformat(), "file": str(found.path), "session": session}
     fact |= {"since": None if found.session is None else found.session.time.isoformat()}
     fact |= {"stopped": None if found.stopped is None else found.stopped.time.isoformat()}
 
+    measured = [(place, each) for place, motions in found.motions.items() for each in motions]
+    samples = [
+        {"time": each.at.isoformat(), "bus": bus, "drive": drive, "axis": each.axis, "position": each.position}
+        | {"velocity": each.velocity}
+        for (bus, drive), each in measured
+    ]
+
     def work() -> None:
         if chosen.json:
             write(sys.stdout, json.dumps({"moment": fact}), *(line.data.decode().rstrip("\n") for line in found.lines))
+            write(sys.stdout, *(json.dumps({"sample": each}) for each in samples))
             return
         begun = "" if found.session is None else f": {session} since {_stamp(found.session)}"
         write(sys.stdout, f"{found.path} at {found.at.isoformat(' ', 'milliseconds')[:STAMP]}{begun}")
@@ -132,12 +142,19 @@ def at(chosen: argparse.Namespace) -> int:
         if found.stopped is not None:
             write(sys.stdout, f"stopped since {_stamp(found.stopped)}")
         write(sys.stdout, *(text(line.entry) for line in found.lines if line.entry is not None))
+        for place, each in measured:
+            velocity = "" if each.velocity is None else f", velocity {each.velocity}"
+            axis = each.axis and f" {each.axis}"
+            moment = each.at.isoformat(" ", "milliseconds")[:STAMP]
+            write(sys.stdout, f"{moment} =  {visible(join_target(*place))}{axis} position {each.position}{velocity}")
 
     return _reported(work)
 
 
 def bisect(chosen: argparse.Namespace) -> int:
     """Print the first difference between two runs; the exit code says whether there is any."""
+    from multidrop.shell.log import moments
+
     runs = [moments.Run(Path(file)) for file in (chosen.file1, chosen.file2)]
     found = moments.first_difference(*runs)
     lines = [None if index is None else run.line(index) for run, index in zip(runs, found or (None, None), strict=True)]

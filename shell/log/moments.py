@@ -9,24 +9,38 @@ from __future__ import annotations
 import os
 import re
 from collections import defaultdict, deque
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import datetime, time, timedelta
-from itertools import islice
+from itertools import islice, product
 from pathlib import Path
 from typing import IO, NamedTuple
 
 from multidrop.dialects import Diagnostic
+from multidrop.dialects.codec import copy_with
+from multidrop.dialects.families import FAMILIES
 from multidrop.dialects.files import opened, why
 from multidrop.shell.log import files
+from multidrop.shell.log.decoding import Assumed, Decoding, Measured
 from multidrop.shell.log.files import BEGIN, LONGEST, Entry, Line, entry_of, parts
+from multidrop.shell.log.steps import Exchange
 
 BLOCK = 4 * LONGEST
 """The bytes that are searched at once; no entry is as long."""
 NEAR = 1 << 16
 """The bytes in which a moment is looked for line by line."""
-POLLS, QUESTIONS = 2000, 4
-"""The entries of polls before a moment in which samples are looked for; the questions of a drive that are shown."""
+POLLS, QUESTIONS, DECODED = 2000, 4, 16
+"""The entries of polls before a moment in which samples are looked for; the questions of a drive that are shown; and
+those that are decoded."""
+SETTINGS: Mapping[str, Sequence[object]] = {
+    "party": (False, True),
+    "checksum": (0, 1, 2),
+    "em": (0, 1, 2, 3),
+    "addressed": (True, False),
+}
+"""The settings of a codec that a poll's bytes depend on, and that the log does not say."""
+STATES: Mapping[str, Sequence[object]] = {"signs": (True, False), "motors": (6, 3, 2, 1)}
+"""The same of the state of a drive."""
 COMPRESSED = (b"\x1f\x8b", b"BZh", b"\xfd7zXZ", b"\x28\xb5\x2f\xfd", b"PK\x03\x04")
 _SESSION = f'"kind": "log", "text": "{BEGIN} '.encode()
 _KIND = b'"kind": "'
@@ -103,6 +117,8 @@ class Known:
     """The stop that held."""
     lines: list[Line]
     """The last entry of each kind and place, and the last polls; by place, then in the order of time."""
+    motions: dict[tuple[str, str], list[Measured]]
+    """The last position and velocity of each axis, by bus and drive, where its polls have them."""
 
 
 def known(path: Path, text: str) -> Known:
@@ -154,7 +170,42 @@ def _made(
     closed = {each.bus for each in entries.values() if each.kind == "bus" and each.text == "closed"}
     shown = [line for line in lines if entries[line.data].bus not in closed or entries[line.data].kind == "bus"]
     shown.sort(key=lambda line: ((each := entries[line.data]).bus, each.drive, each.kind != "bus", each.time))
-    return Known(at, path, session, last, stop, shown)
+    moved = {place: _motion(place[1], polled) for place, polled in _exchanges(polls).items()}
+    return Known(at, path, session, last, stop, shown, {place: each for place, each in moved.items() if each})
+
+
+def _exchanges(polls: Sequence[Line]) -> dict[tuple[str, str], list[Exchange]]:
+    """The last polls of each drive with their replies, in their order. `polls` has the newest first."""
+    found: dict[tuple[str, str], list[Exchange]] = defaultdict(list)
+    replies: dict[str, bytes] = defaultdict(bytes)
+    for line in polls:
+        if (entry := line.entry) is None:
+            continue
+        data, place = entry.text.encode("latin-1"), (entry.bus, entry.drive)
+        if entry.kind == "received":
+            replies[entry.bus] = data + replies[entry.bus]
+        elif len(found[place]) < DECODED:
+            found[place].append(Exchange("", entry.time, *place, data, replies.pop(entry.bus, b"")))
+        else:
+            replies.pop(entry.bus, None)
+    return {place: each[::-1] for place, each in found.items()}
+
+
+def _motion(address: str, polled: Sequence[Exchange]) -> list[Measured]:
+    """The last motion of each axis, by the first family and settings whose polls these are."""
+    for family in FAMILIES.values():
+        unknown = family.new_state(family.codec, address)
+        names = [name for name in SETTINGS if hasattr(family.codec, name)]
+        more = [name for name in STATES if hasattr(unknown, name)]
+        for values in product(*(SETTINGS[name] for name in names), *(STATES[name] for name in more)):
+            codec = copy_with(family.codec, **dict(zip(names, values, strict=False)))
+            state = family.new_state(codec, address)
+            for name, value in zip(more, values[len(names) :], strict=True):
+                setattr(state, name, value)
+            decoding = Decoding(Assumed(family, state))
+            if found := {each.axis: each for exchange in polled for each in decoding.take(exchange)}:
+                return [*found.values()]
+    return []
 
 
 def _samples(polls: Sequence[Line]) -> Iterator[Line]:

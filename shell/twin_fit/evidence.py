@@ -20,9 +20,10 @@ from typing import NamedTuple
 from multidrop.dialects.text import whole
 from multidrop.drives.drive import Drive
 from multidrop.shell.log import files
+from multidrop.shell.log.decoding import Decoding, printed
 from multidrop.shell.log.files import BEGIN
 from multidrop.shell.log.steps import Exchange, Step
-from multidrop.shell.log.twin_comparison import Decoding, Place, printed
+from multidrop.shell.log.twin_comparison import Place
 from multidrop.shell.twin_fit.estimate import Evidence, Point
 from multidrop.simulator.cell.spec import Cell, DriveSpec, Faults
 from multidrop.simulator.family import Effort, Shadow

@@ -236,3 +236,36 @@ def test_two_drives_may_take_turns_in_another_order(folder: Path) -> None:
         b'"kind": "printed", "bus": "p", "drive": "a", "text": "1"}',
         b'"kind": "printed", "bus": "p", "drive": "a", "text": "2"}',
     ]
+
+
+@pytest.mark.parametrize(
+    ("drive", "polls", "expected"),
+    [
+        ("a", [("aPR P,DN,V\n", 'aPR P,DN,V\r\n18"a"6114\r\n>')], [("", 18, 6114)]),
+        ("a", [("aPR P,DN,V\n", "damage")], []),
+        (
+            "00",
+            [("@00PX\r", "1\r"), ("@00MSTX\r", "0\r"), ("@00PY\r", "2\r"), ("@00MSTY\r", "0\r")],
+            [("x", 1), ("y", 2)],
+        ),
+        (
+            "1",
+            [
+                ("\1\6\1\0\0\0\0\0\x08", "\2\1d\6\0\0\2\0o"),
+                ("\1\6\3\0\0\0\0\0\n", "\2\1d\6\0\0\0\5r"),
+            ],
+            [("", 512, 5)],
+        ),
+        ("é", [("x", "y")], []),
+    ],
+)
+def test_the_last_position_of_a_drive_is_decoded_without_the_drive(
+    folder: Path, drive: str, polls: list[tuple[str, str]], expected: list[tuple[object, ...]]
+) -> None:
+    entries = [Entry(AT, "log", "session of process 1")]
+    for sent, received in polls:
+        entries.append(Entry(AT, "sent", sent, "p", drive, poll=True))
+        entries.append(Entry(AT, "received", received, "p", drive, poll=True))
+    motions = known(written(folder / "motion.jsonl", entries), AT.isoformat()).motions
+    found = [(each.axis, each.position, each.velocity) for each in motions.get(("p", drive), [])]
+    assert [each[: len(wanted)] for each, wanted in zip(found, expected, strict=True)] == expected

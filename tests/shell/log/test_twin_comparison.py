@@ -17,8 +17,8 @@ from multidrop.dialects import DriveError, Priority
 from multidrop.dialects.families import FAMILIES
 from multidrop.drives.drive import Drive
 from multidrop.shell.batch.replay import ReplayReport, replay
+from multidrop.shell.log.decoding import Decoding
 from multidrop.shell.log.steps import Exchange, read
-from multidrop.shell.log.twin_comparison import Decoding
 from multidrop.shell.log.writer import SessionLog
 from tests.support.cell_session import ETHERNET, CellSession, bus, party, pmx
 from tests.support.procedure import ProcedureRunner

@@ -1,0 +1,91 @@
+"""The positions that a log holds: polls as their bytes, decoded by the conversation that once made them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from copy import copy
+from datetime import datetime
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from multidrop.dialects import DriveError, Priority, Procedure, Request
+from multidrop.dialects.codec import copy_with
+from multidrop.dialects.family import Family, Motion
+from multidrop.dialects.state import DriveState
+from multidrop.dialects.text import whole
+from multidrop.shell.log.steps import Exchange, Step
+
+if TYPE_CHECKING:
+    from multidrop.drives.drive import Drive
+
+WORDS = {"P": "", "PX": "x", "PY": "y"}
+"""The axis of the words that print a position."""
+
+
+class Measured(NamedTuple):
+    """The measured position of an axis of a drive."""
+
+    where: str
+    at: datetime
+    axis: str
+    position: int
+    velocity: int | None
+    """None: only the position was read."""
+
+
+class Assumed(NamedTuple):
+    """A drive of which only a log is known."""
+
+    family: Family[Any]
+    state: DriveState
+
+
+class Decoding:
+    """Decodes the polls of one drive, in their order."""
+
+    def __init__(self, drive: Drive | Assumed) -> None:
+        self._drive = drive
+        self._procedure: Procedure[tuple[Motion, ...]] | None = None
+        self._request: Request | None = None
+
+    def take(self, poll: Exchange) -> Iterator[Measured]:
+        """Take a request with its reply; yield what the drive's motion was once that is known."""
+        try:
+            result = self._step(poll)
+        except DriveError:  # it is in program mode now, or the reply was damaged then, too
+            self._request, result = None, ()
+        for each in result:
+            yield Measured(poll.where, poll.at, each.axis, each.position, each.velocity)
+
+    def _step(self, poll: Exchange) -> tuple[Motion, ...]:
+        """Go on with the conversation that the request belongs to, or begin one; return its result at its end."""
+        try:
+            if self._request is None or not self._fits(self._request, poll):
+                self._procedure = self._drive.family.motion(copy(self._drive.state), Priority.POLL)
+                self._request = next(self._procedure)
+            request, self._request = self._request, None
+            if self._fits(request, poll) and self._procedure is not None:
+                numbered = copy_with(request, tag=int.from_bytes(poll.sent[:2], "big"))
+                codec, received = request.codec, poll.received
+                if (found := codec.decode(numbered, received) or codec.on_quiet(numbered, received)) is not None:
+                    self._request = self._procedure.send(copy_with(found.reply, raw=received[: found.used]))
+        except StopIteration as done:
+            motion: tuple[Motion, ...] = done.value
+            return motion
+        return ()
+
+    @staticmethod
+    def _fits(request: Request | None, poll: Exchange) -> bool:
+        """Whether a request has these bytes. The number of one that has a number begins its bytes."""
+        if request is None:
+            return False
+        numbered = copy_with(request, tag=int.from_bytes(poll.sent[:2], "big"))
+        return request.codec.encode(numbered) == poll.sent
+
+
+def printed(step: Step, drive: Drive) -> Iterator[Measured]:
+    """Yield the position that a line has printed."""
+    questions = {drive.family.question(word): axis for word, axis in WORDS.items()}
+    axis = questions.get(" ".join(step.text.upper().split()))
+    position = whole(step.printed[0].strip(), -(2**31), 2**31 - 1) if len(step.printed) == 1 else None
+    if axis is not None and position is not None:
+        yield Measured(step.where, step.at, axis, position, None)
