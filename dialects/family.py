@@ -127,8 +127,8 @@ class Programs(Generic[S]):
     """List the drive's program from a label or an address; empty: all of it."""
     readable: Callable[[Held], Sequence[str]]
     """List what the drive holds in its most readable form."""
-    upload: Callable[[S, bool], Printed]
-    """Read the drive's program as a file that can be downloaded; True: in its stored form."""
+    who: Callable[[S], str]
+    """Name a drive for a person."""
     read: Callable[[S, Sequence[SourceLine], Progress], Procedure[Held]]
     """Read what the drive holds, at least where these lines would go."""
     file: Callable[[S, Held, bool], Sequence[str]]
@@ -167,6 +167,12 @@ class Programs(Generic[S]):
     """Read labels and variables without the program; None: the drives give none."""
     offered: Callable[[Held, str], Sequence[tuple[str, str]]] = lambda held, line: ()
     """Return the labels and variables that may end a line being typed, each with its meaning."""
+
+    def upload(self, state: S, raw: bool) -> Procedure[Sequence[str]]:
+        """Read the drive's program as a file that can be downloaded; `raw`: in its stored form. Raises Refused."""
+        held = yield from self.read(state, (), lambda done, total: None)
+        held.check_program(self.who(state))
+        return self.file(state, held, raw)
 
 
 @dataclass(frozen=True)

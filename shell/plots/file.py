@@ -35,11 +35,50 @@ class SinkBroken(Exception):
     """The failure of a plot's file or viewer, in one line for a person."""
 
 
-class RecordingFile:
+class Locked:
+    """The file of a plot, which is made if there is none, and locked until `release`."""
+
+    def __init__(self, path: Path) -> None:
+        """Open and lock it. Raises Diagnostic."""
+        self.path = path
+        self._made = not os.path.exists(path)  # Path's own method raises for a name that is too long
+        try:
+            lock = os.open(path, os.O_RDWR | os.O_CREAT, 0o666)
+        except OSError as error:
+            raise Diagnostic(f"cannot write {path} ({error.strerror})") from None
+        if sys.platform == "win32":  # an open file is not replaced there: one beside it, which goes with its process
+            os.close(lock)
+            flags = os.O_RDWR | os.O_CREAT | os.O_EXCL | os.O_TEMPORARY
+            try:
+                lock = os.open(path.with_name(f".{path.name}.lock"), flags)
+            except (FileExistsError, PermissionError):
+                raise Diagnostic(f"another plot writes {path}", hint="use another file") from None
+        else:
+            try:
+                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except BlockingIOError:
+                os.close(lock)
+                raise Diagnostic(f"another plot writes {path}", hint="use another file") from None
+            except OSError:
+                pass  # the file system has no locks
+        self._lock = lock
+
+    def release(self) -> None:
+        """Unlock the file; delete it if this plot made it and wrote nothing. May be called again."""
+        if self._lock < 0:
+            return
+        with contextlib.suppress(OSError):
+            if self._made and not self.path.stat().st_size:
+                self.path.unlink()
+        os.close(self._lock)
+        self._lock = -1
+
+
+class RecordingFile(Locked):
     """One file of a plot. Raises Diagnostic if it cannot be used, and leaves it unchanged then."""
 
     def __init__(self, rr: Any, path: Path) -> None:
-        self._rr, self.path = rr, path
+        self._rr = rr
         self.part = path.with_name(f"{path.stem}.part.rrd")
         self.identity = ""
         """The recording in it, which the plot continues; empty: a new file."""
@@ -48,8 +87,7 @@ class RecordingFile:
         self.paths: set[str] = set()
         """The entities in the file."""
         self._good = 0
-        self._made = not os.path.exists(path)  # Path's own method raises for a name that is too long
-        self._lock = take_lock(path)
+        super().__init__(path)
         try:
             self._look()
         except Diagnostic:
@@ -128,40 +166,6 @@ class RecordingFile:
             reason = "the disk is full"
         kept = f"{self.part} has what was added to {self.path}" if self.adds else "what came before is in it"
         return f"cannot write {self.writes}: {reason}; {kept}"
-
-    def release(self) -> None:
-        """Unlock the file; delete it if this plot made it and wrote nothing. May be called again."""
-        if self._lock < 0:
-            return
-        with contextlib.suppress(OSError):
-            if self._made and not self.path.stat().st_size:
-                self.path.unlink()
-        os.close(self._lock)
-        self._lock = -1
-
-
-def take_lock(path: Path) -> int:
-    """Open and lock the file of a plot, which is made if there is none. Raises Diagnostic."""
-    try:
-        lock = os.open(path, os.O_RDWR | os.O_CREAT, 0o666)
-    except OSError as error:
-        raise Diagnostic(f"cannot write {path} ({error.strerror})") from None
-    if sys.platform == "win32":  # an open file is not replaced there: one beside it, which goes with its process
-        os.close(lock)
-        flags = os.O_RDWR | os.O_CREAT | os.O_EXCL | os.O_TEMPORARY
-        try:
-            lock = os.open(path.with_name(f".{path.name}.lock"), flags)
-        except (FileExistsError, PermissionError):
-            raise Diagnostic(f"another plot writes {path}", hint="use another file") from None
-    else:
-        try:
-            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            os.close(lock)
-            raise Diagnostic(f"another plot writes {path}", hint="use another file") from None
-        except OSError:
-            pass  # the file system has no locks
-    return lock
 
 
 def _identity(path: Path) -> str:

@@ -18,7 +18,7 @@ from typing import Any
 
 from multidrop.dialects import Diagnostic
 from multidrop.dialects.text import visible
-from multidrop.shell.plots.file import GAP, SinkBroken, disk_full, pyarrow, synced, take_lock
+from multidrop.shell.plots.file import GAP, Locked, SinkBroken, disk_full, pyarrow, synced
 from multidrop.shell.plots.request import PlotTarget
 from multidrop.shell.plots.rerun_calls import TWIN, Batch
 
@@ -31,27 +31,26 @@ LAST = 1 << 16
 BLOCK = 1 << 20
 
 
-class TableSink:
+class TableSink(Locked):
     """An open table. Every method may block; one thread at a time."""
 
     def __init__(self, target: PlotTarget) -> None:
         """Open the file. Raises Diagnostic if that fails, and leaves the file unchanged then."""
         assert target.file is not None
-        self.target, self.path = target, target.file
-        self._parquet = pyarrow("plot to FILE.csv") if self.path.suffix == ".parquet" else None
-        self.writes = self.path.with_name(f"{self.path.stem}.part.csv") if self._parquet else self.path
-        self._made = not os.path.exists(self.path)
-        self._lock = take_lock(self.path)
+        self.target, path = target, target.file
+        self._parquet = pyarrow("plot to FILE.csv") if path.suffix == ".parquet" else None
+        self.writes = path.with_name(f"{path.stem}.part.csv") if self._parquet else path
+        super().__init__(path)
         try:
             end = max(_end(self.writes), _parquet_end(self._parquet, self.path) if self._parquet else -GAP)
             self._file = self.writes.open("a", encoding="utf-8", newline="")
             if not self._file.tell():
                 self._file.write(HEADER.decode())
         except OSError as error:
-            self._release()
+            self.release()
             raise Diagnostic(f"cannot write {self.writes} ({error.strerror})") from None
         except Diagnostic:
-            self._release()
+            self.release()
             raise
         self.offset = end + GAP
         """The first `elapsed`, s: after the rows that exist already."""
@@ -80,7 +79,7 @@ class TableSink:
         except (OSError, ValueError) as error:
             raise SinkBroken(self.why(error)) from None
         finally:
-            self._release()
+            self.release()
 
     def leave_behind(self) -> None:
         """Nothing of a file blocks."""
@@ -94,21 +93,11 @@ class TableSink:
         with contextlib.suppress(OSError):
             if self._good:
                 os.truncate(self.writes, self._good)
-        self._release()
+        self.release()
 
     def why(self, error: Exception) -> str:
         reason = "the disk is full" if disk_full(self.path.parent) else str(error)
         return f"cannot write {self.path}: {reason}; {self.writes} has what came before"
-
-    def _release(self) -> None:
-        """Unlock the file; delete it if this plot made it and wrote nothing. May be called again."""
-        if self._lock < 0:
-            return
-        with contextlib.suppress(OSError):
-            if self._made and not self.path.stat().st_size:
-                self.path.unlink()
-        os.close(self._lock)
-        self._lock = -1
 
 
 def _rows(batch: Batch) -> Iterator[tuple[Any, ...]]:

@@ -213,15 +213,8 @@ def end_program(state: MCodeState) -> Procedure[bool]:
 # The program of an MCode drive as a file, with the remarks of the file that it came from.
 
 
-def upload(state: MCodeState, raw: bool) -> Procedure[tuple[str, ...]]:
-    """Return a file that reproduces a drive's program and variables: VA, PG, the lines, PG, S."""
-    held = yield from read(state, (), lambda done, total: None)
-    held.check_program(who(state))
-    return file_of(state, held, raw)
-
-
 def file_of(state: MCodeState, held: Held, raw: bool) -> tuple[str, ...]:  # noqa: ARG001
-    """Return the lines of a file that reproduces what a drive holds; none where that is nothing."""
+    """Return a file that reproduces what a drive holds: VA, PG, the lines, PG, S; none where that is nothing."""
     made = [f"VA {name}={called.value}" for name, called in names_of(held).items() if called.kind == GLOBAL]
     for program in programs(held.lines, state.product, fine=True):
         made += [f"PG {program.start}", *(line.text for line in program.lines), "PG"]

@@ -28,7 +28,6 @@ from multidrop.dialects.mcode.host.program_readout import (
     refreshed,
     size,
     size_of_file,
-    upload,
 )
 from multidrop.dialects.mcode.host.state import MCodeState, who
 from multidrop.dialects.mcode.manual import guards
@@ -200,7 +199,7 @@ def _as_number(text: str) -> float | None:
 PROGRAMS: Programs[MCodeState] = Programs(
     listing=operations.listing,
     readable=readable,
-    upload=upload,
+    who=who,
     read=program_readout.read,
     file=file_of,
     executed=program_readout.immediate_lines,

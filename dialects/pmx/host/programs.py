@@ -220,13 +220,6 @@ def readable(held: Held) -> tuple[str, ...]:
         return (f"; compiled lines, as they are stored: {problem}", *listed)
 
 
-def upload(state: PmxState, raw: bool) -> Procedure[tuple[str, ...]]:
-    """Return a file that can be downloaded: A-SCRIPT, or compiled lines (`raw`, or without A-SCRIPT)."""
-    held = yield from read(state, (), lambda done, total: None)
-    held.check_program(who(state))
-    return file_of(state, held, raw)
-
-
 def file_of(_: PmxState, held: Held, raw: bool) -> tuple[str, ...]:
     """Return the lines of a file that reproduces what a controller holds."""
     return tuple(f"SA{line.at}={line.text}" for line in held.lines) if raw else readable(held)
@@ -235,7 +228,7 @@ def file_of(_: PmxState, held: Held, raw: bool) -> tuple[str, ...]:
 PROGRAM_FILES: Programs[PmxState] = Programs(
     listing=listing,
     readable=readable,
-    upload=upload,
+    who=who,
     read=read,
     file=file_of,
     size=lambda lines: len(program_file.compiled(lines)),

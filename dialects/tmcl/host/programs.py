@@ -96,12 +96,6 @@ def readable(held: Held) -> tuple[str, ...]:
     )
 
 
-def upload(state: TmclState, raw: bool) -> Procedure[tuple[str, ...]]:
-    held = yield from read_held(state, (), lambda done, total: None)
-    held.check_program(who(state))
-    return file_of(state, held, raw)
-
-
 def file_of(_: TmclState, held: Held, raw: bool) -> tuple[str, ...]:
     """The lines of a file that gives this memory: with labels, or `raw` with addresses."""
     calls = calls_of(held)
@@ -244,7 +238,7 @@ def annotated(text: str, held: Held) -> tuple[str, ...]:
 PROGRAM_FILES: Programs[TmclState] = Programs(
     listing=listing,
     readable=readable,
-    upload=upload,
+    who=who,
     read=read_held,
     file=file_of,
     size=lambda lines: len(program_file.compiled(lines)),

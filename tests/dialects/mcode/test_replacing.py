@@ -6,7 +6,6 @@ from hypothesis import strategies as st
 
 from multidrop.dialects import NoAnswer, Refused
 from multidrop.dialects.mcode.family import MCODE
-from multidrop.dialects.mcode.host import program_readout
 from multidrop.dialects.mcode.host.download import plan
 from multidrop.dialects.mcode.host.program_readout import GLOBAL, LABEL, LOCAL
 from multidrop.dialects.mcode.manual import program_file
@@ -192,11 +191,11 @@ def test_what_was_uploaded_can_be_downloaded_again(bench):
     download(desk, state, PROGRAM)
     desk.type(state, "EX G1")
     desk.wait(0.2)
-    kept = desk.run(program_readout.upload(state, raw=False), state)
+    kept = desk.run(MCODE.programs.upload(state, raw=False), state)
     assert kept[:3] == ("VA Q1=25", "VA Q2=0", "PG 1")
     for _ in range(3):
         download(desk, state, "\n".join(kept))
-    assert desk.run(program_readout.upload(state, raw=False), state) == kept
+    assert desk.run(MCODE.programs.upload(state, raw=False), state) == kept
 
 
 def test_factory_defaults_in_a_file_make_every_name_free():

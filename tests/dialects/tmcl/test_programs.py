@@ -123,7 +123,7 @@ def test_routines_at_other_addresses_are_listed_with_a_gap_and_come_back() -> No
     shop, state = opened()
     device = shop.devices["1"]
     device.program.load({0: Call(28), 50: Call(3), 51: Call(22, value=50)})
-    upload = shop.run(programs.upload(state, raw=False))
+    upload = shop.run(programs.PROGRAM_FILES.upload(state, raw=False))
     assert upload[:2] == ("    STOP", "    0 0, 0, 0") and upload[-3:] == ("Line50:", "    MST 0", "    JA Line50")
     memory = list(device.program.memory)
     device.program.load({})
@@ -147,7 +147,7 @@ def test_what_upload_writes_downloads_to_the_same_memory(numbers: list[int], kin
     device.program.load({at: Call(number, kind, 0, value) for at, number in enumerate(numbers)})
     memory = list(device.program.memory)
     for raw in (False, True):
-        text = "\n".join(shop.run(programs.upload(state, raw)))
+        text = "\n".join(shop.run(programs.PROGRAM_FILES.upload(state, raw)))
         device.program.load({})
         load(shop, state, text)
         assert list(device.program.memory) == memory
