@@ -36,6 +36,7 @@ EXTRAS = {
     "lsp": "pygls",
     "mqtt": "paho",
     "notebook": "ipykernel",
+    "opcua": "asyncua",
     "prometheus": "prometheus_client",
     "pytest": "pytest",
     "rerun": "rerun",

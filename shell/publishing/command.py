@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 from multidrop.dialects import Diagnostic
 from multidrop.dialects.text import counted
@@ -15,6 +15,7 @@ from multidrop.shell.publishing import broker
 from multidrop.shell.publishing.broker import Message, Target, parse_target
 from multidrop.shell.publishing.feed import Feed, Topics
 from multidrop.shell.publishing.listening import Listening, parse_listening
+from multidrop.shell.publishing.opcua import UaServer
 from multidrop.shell.publishing.prometheus import Endpoint
 from multidrop.shell.publishing.publisher import Publisher
 from multidrop.shell.publishing.registry import LOST, ONLINE, Outlet, Registry, parse_rate
@@ -27,7 +28,7 @@ from multidrop.transports.sockets import exposed
 
 AGAIN = 30.0
 """The time between two attempts to open a line that was not there, s."""
-SERVERS = {"prometheus": Endpoint}
+SERVERS: Mapping[str, type[Endpoint] | type[UaServer]] = {"prometheus": Endpoint, "opcua": UaServer}
 """The outlets that listen, by scheme."""
 
 

@@ -10,7 +10,7 @@ from multidrop.dialects import Diagnostic
 from multidrop.dialects.on_demand import importing
 from multidrop.shell.publishing.feed import escape
 from multidrop.shell.publishing.listening import Listening
-from multidrop.shell.publishing.registry import LOST, ONLINE, SILENT, STATES, Key, Registry, Value
+from multidrop.shell.publishing.registry import ONLINE, STATES, Key, Registry, Value
 
 if TYPE_CHECKING:
     from prometheus_client.core import GaugeMetricFamily
@@ -136,8 +136,7 @@ class Endpoint:
                 for word in STATES:
                     states.add_metric([*labels, word], float(word == fields["value"]))
                 continue
-            state = values.get(Key(key.bus, key.address, "state"))
-            if state is not None and state.number in (SILENT, LOST):
+            if not registry.current(key):
                 continue
             found[key.what].add_metric(labels, float(fields["value"]))
             if "quantity" in fields:

@@ -240,6 +240,11 @@ class Registry:
         for outlet in self.outlets:
             outlet.line(bus, word)
 
+    def current(self, key: Key) -> bool:
+        """Whether the drive of a value replies, as far as is known."""
+        state = self.values.get(Key(key.bus, key.address, "state"))
+        return state is None or state.number not in (SILENT, LOST)
+
     def _in_units(self, bus: str, address: str, axis: str, number: float, takes: Takes) -> tuple[float, str] | None:
         found = self.session.buses[bus].drives.get(address) if self.session.scaled else None
         return None if found is None else self.session.units.given(found, axis, number, takes)
