@@ -86,10 +86,21 @@ class UaServer:
         """Import the library. Raises Diagnostic where it is missing."""
         try:
             with importing():
-                import asyncua  # noqa: F401
+                from asyncua.server import binary_server_asyncio as connections
         except ImportError:
             what = "publish --to opcua:// needs asyncua, which is not installed"
             raise Diagnostic(what, hint=INSTALL) from None
+
+        class Bounded(connections.OPCUAProtocol):  # type: ignore[misc]
+            """A connection that ends where a client sends more than any message has: the library has no bound."""
+
+            def data_received(self, data: bytes) -> None:
+                if len(self._buffer) > LONGEST:
+                    self.transport.abort()
+                else:
+                    super().data_received(data)
+
+        connections.OPCUAProtocol = Bounded
         logging.getLogger("asyncua").setLevel(logging.CRITICAL + 1)  # clients could fill the terminal
 
     async def listen(self) -> None:

@@ -212,6 +212,11 @@ def test_what_is_wrong_at_the_start_is_one_line(arguments: list[str], code: int,
             "publish --to prometheus:// needs prometheus_client, which is not installed; "
             "pip install 'multidrop[prometheus]'\n",
         ),
+        (
+            "opcua://:0",
+            "asyncua.server",
+            "publish --to opcua:// needs asyncua, which is not installed; pip install 'multidrop[opcua]'\n",
+        ),
     ],
 )
 def test_without_its_library_it_says_what_to_install(
