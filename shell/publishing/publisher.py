@@ -100,6 +100,13 @@ async def again(make: Callable[[], Connection], notify: Callable[[str], None]) -
                 notify(f"the broker is still lost: {said}")
 
 
+async def over(task: asyncio.Task[None]) -> None:
+    """Cancel a task, and wait for its end. `wait_for` of Python 3.11 swallows a cancellation that meets its result."""
+    while not task.done():
+        task.cancel()
+        await asyncio.wait([task], timeout=1)
+
+
 class Publisher:
     """Messages on their way to a broker. `begin` connects, `end` says goodbye."""
 
@@ -172,8 +179,7 @@ class Publisher:
                     self.pump()
                     await asyncio.sleep(LOOK)
         if self._task is not None:
-            self._task.cancel()
-            await asyncio.wait([self._task])
+            await over(self._task)
         if self._connection is not None:
             await self._connection.close()
         self._give_back()

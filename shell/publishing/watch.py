@@ -17,7 +17,7 @@ from multidrop.shell.exit_codes import exit_code
 from multidrop.shell.prompt.keyboard import on_signals
 from multidrop.shell.publishing.broker import Connection, Target, fresh_name, load, parse_target
 from multidrop.shell.publishing.plant import LONGEST, Plant, Row
-from multidrop.shell.publishing.publisher import again, connected
+from multidrop.shell.publishing.publisher import again, connected, over
 from multidrop.shell.streams.stdout import finish, nonblocking, report, write
 
 INBOX = 5000
@@ -48,8 +48,7 @@ class Watch:
 
     async def end(self) -> None:
         if self._task is not None:
-            self._task.cancel()
-            await asyncio.wait([self._task])
+            await over(self._task)
 
     def _take(self, topic: str, payload: bytes, retained: bool) -> None:
         """Queue a message, in the thread of the connection."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 from collections import Counter
+from contextlib import suppress
 
 import pytest
 from hypothesis import given
@@ -57,6 +58,21 @@ async def test_a_broker_that_is_not_there_at_the_start_is_a_failure(desk: Desk) 
     with pytest.raises(Unreachable, match="no broker at h:1"):
         await desk.publisher.begin()
     assert len(desk.broker.attempts) == 1
+
+
+async def test_a_cancellation_that_is_swallowed_while_the_broker_is_lost_delays_no_end(desk: Desk) -> None:
+    await desk.publisher.begin()
+    connection = desk.broker.connections[0]
+
+    async def close() -> None:
+        with suppress(asyncio.CancelledError):
+            await asyncio.sleep(30)
+
+    connection.close = close  # type: ignore[method-assign]
+    desk.broker.refusals = ["refused"] * 1000
+    desk.broker.cut()
+    await asyncio.sleep(1)
+    await asyncio.wait_for(desk.publisher.end(BYE), 20)
 
 
 async def test_a_lost_broker_is_tried_again_with_back_off_and_each_reason_is_said_once(desk: Desk) -> None:
