@@ -94,6 +94,9 @@ async def test_any_name_is_a_label_that_the_parser_takes(names: list[str]) -> No
         words = {names[0]: "online"}
         values = {Key(names[0], names[1], "position"): Value(0.0, datetime.now(UTC), {"value": 7})}
 
+        def current(self, key: Key) -> bool:
+            return True
+
     endpoint = Endpoint(Named(), HERE)  # type: ignore[arg-type]
     assert [value for (name, _), value in read(endpoint.answer(GET)).items() if name == "position"] == [7]
 
