@@ -353,8 +353,6 @@ class BusTwins:
         for drive in list(self.besides):
             self.remove(drive)
         self._poll()
-        for asked in self._asked.values():
-            asked.close()
         while self._ends:
             self._ends.pop()()
 
@@ -368,9 +366,10 @@ class BusTwins:
         ]
         self._samples = telemetry.subscribe(addresses, PERIOD) if addresses else None
         self._inputs = telemetry.read(words, INPUTS) if words else None
-        for each in before:
+        for each in (*before, *self._asked.values()):
             if each is not None:
                 each.close()
+        self._asked = {}
 
     # Events
 
