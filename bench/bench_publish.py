@@ -1,5 +1,8 @@
 """`multidrop publish`: 200 lines of 3 drives each through one broker, and a burst of messages beside paho itself.
 
+`multidrop plant`: 500 drives of 50 publishers, each with a new position and velocity every second. This process publishes
+as they would, which is the same to the page; two real publishers are beside them.
+
 The simulated drives, the broker (mosquitto), the publisher and a subscriber, which counts, are processes of this
 machine. The drives are at rest, or all of them move to and fro. A cost is processor time, of the publisher only where
 nothing else is named. Where mosquitto is not installed, there are no rows.
@@ -27,6 +30,7 @@ sys.path.insert(0, str(Path(__file__).parent.parent))
 import paho.mqtt.client as mqtt
 from report import Row, compared, main
 from sim_process import ROOT, all_served, busy
+from terminal import Terminal, multidrop
 
 from multidrop.shell.configuration import MqttSettings
 from multidrop.shell.publishing.broker import WINDOW, Connection, Message, parse_target
@@ -40,6 +44,7 @@ MOVING = "PG 1\nLB SU\n MR 102400000\n H\n MR -102400000\n H\n BR SU\nE\nPG\n"
 LINES, MANY = (200,), (25, 50, 100, 200)
 BURST = 20_000
 TEXT = '{{"time": "2026-11-22T14:03:07.123456+00:00", "value": {}}}'
+PUBLISHERS, DRIVES = 50, 10
 OPEN = 240.0
 """The longest time to open all lines, s."""
 
@@ -49,6 +54,7 @@ def rows(full: bool) -> Iterator[Row]:
     if not MOSQUITTO:
         return
     yield burst(7 if full else 3)
+    yield from plant(60.0 if full else 20.0)
     for count in MANY if full else LINES:
         for moving in (False, True):
             yield from fleet(count, moving, 60.0 if full else 20.0)
@@ -194,6 +200,64 @@ def fleet(count: int, moving: bool, seconds: float) -> Iterator[Row]:
     yield Row(f"{what}: memory a line", "kB", memory / count / 1e3, note=note)
 
 
+# A plant
+
+
+def plant(seconds: float) -> Iterator[Row]:
+    """Measure the page of a plant on a terminal, and its lines for programs."""
+    cell = BUS.format(number=0) + "".join(DRIVE.format(name=name, program="") for name in NAMES)
+    with ExitStack() as stack:
+        _, port = stack.enter_context(broker())
+        folder = Path(stack.enter_context(tempfile.TemporaryDirectory()))
+        for number in range(2):
+            _, places = stack.enter_context(all_served(cell))
+            url = f"{places[0]}?party=1&drives={','.join(NAMES)}"
+            stack.enter_context(published([url], port, folder, f"fleet/real-{number}"))
+        over = threading.Event()
+        stack.callback(over.set)
+        threading.Thread(target=_publish_all, args=(port, over), daemon=True).start()
+        url = f"mqtt://127.0.0.1:{port}/fleet"
+        page = Terminal(multidrop("plant", url), folder)
+        stack.callback(page.end)
+        page.until(f"{PUBLISHERS * DRIVES + 2 * len(NAMES)} drives".encode(), OPEN)
+        time.sleep(3.0)
+        before, begin, bytes_before = busy(page.pid), time.monotonic(), page.count
+        time.sleep(seconds)
+        took = time.monotonic() - begin
+        used, written = (busy(page.pid) - before) / took, (page.count - bytes_before) / took
+    what = f"plant, {PUBLISHERS * DRIVES} drives of {PUBLISHERS} publishers at 1 Hz"
+    note = (
+        f"{2 * PUBLISHERS * DRIVES} values a second, and two real publishers; {written / 1e3:.1f} kB/s to the terminal"
+    )
+    yield Row(f"{what}: the page", "% core", 100 * used, note=note)
+
+
+def _publish_all(port: int, over: threading.Event) -> None:
+    """Publish as so many programs would, each drive once a second, evenly."""
+    client = mqtt.Client(mqtt.CallbackAPIVersion.VERSION2)
+    client.connect("127.0.0.1", port)
+    client.loop_start()
+    places = [(publisher, drive) for publisher in range(PUBLISHERS) for drive in range(DRIVES)]
+    for publisher in range(PUBLISHERS):
+        about = '{"version": "0", "host": "pc", "lines": {"line": "line"}}'
+        client.publish(f"fleet/{publisher}/about", about, 1, True)
+        client.publish(f"fleet/{publisher}/status", "online", 1, True)
+    for publisher, drive in places:
+        client.publish(f"fleet/{publisher}/line/{drive}/state", TEXT.format('"moving"'), 1, True)
+    number = 0
+    while not over.is_set():
+        due = time.monotonic() + 1
+        for at, (publisher, drive) in enumerate(places):
+            number += 1
+            for what in ("position", "velocity"):
+                client.publish(f"fleet/{publisher}/line/{drive}/{what}", TEXT.format(number), 1)
+            if at % DRIVES == 0:
+                over.wait(0.9 / PUBLISHERS)
+        over.wait(max(0.0, due - time.monotonic()))
+    client.disconnect()
+    client.loop_stop()
+
+
 def _why(publisher: subprocess.Popen[str], counter: Counter) -> str:
     """Why not every drive was seen."""
     publisher.kill()
@@ -201,9 +265,9 @@ def _why(publisher: subprocess.Popen[str], counter: Counter) -> str:
 
 
 @contextmanager
-def published(urls: list[str], port: int, folder: Path) -> Iterator[subprocess.Popen[str]]:
+def published(urls: list[str], port: int, folder: Path, prefix: str = "fleet") -> Iterator[subprocess.Popen[str]]:
     """`multidrop publish` in a process of its own."""
-    command = [sys.executable, "-m", "multidrop", "publish", *urls, "--to", f"mqtt://127.0.0.1:{port}/fleet"]
+    command = [sys.executable, "-m", "multidrop", "publish", *urls, "--to", f"mqtt://127.0.0.1:{port}/{prefix}"]
     places = {"MULTIDROP_CONFIG_DIR": str(folder), "MULTIDROP_STATE_DIR": str(folder), "PYTHONPATH": str(ROOT)}
     process = subprocess.Popen(
         command,
