@@ -1,7 +1,7 @@
 """`multidrop publish`: 200 lines of 3 drives each through one broker, and a burst of messages beside paho itself.
 
-`multidrop plant`: 500 drives of 50 publishers, each with a new position and velocity every second. This process publishes
-as they would, which is the same to the page; two real publishers are beside them.
+`multidrop plant`: 500 drives of 50 publishers, each with a new position and velocity every second. This process is all
+of them to the page, and two real publishers are beside it.
 
 The simulated drives, the broker (mosquitto), the publisher and a subscriber, which counts, are processes of this
 machine. The drives are at rest, or all of them move to and fro. A cost is processor time, of the publisher only where
