@@ -234,3 +234,30 @@ def test_a_motor_of_another_folder_is_refused(tmp_path: Path) -> None:
     (tmp_path / "in" / "c.toml").write_text(cell('motor = "../m.csv"'))
     with pytest.raises(Diagnostic, match="leaves the folder of the cell file"):
         cells.load(tmp_path / "in" / "c.toml")
+
+
+@examples(25, nightly=1000)
+@given(looks=st.lists(st.floats(0.001, 0.7), max_size=8), load=st.floats(0, 0.6), inertia=st.floats(0, 2e-3))
+def test_being_looked_at_changes_no_stall(looks: list[float], load: float, inertia: float) -> None:
+    """Whatever moment a drive is asked at, its shaft stalls where and when it does without being asked."""
+
+    def ends(asked: list[float]) -> list[object]:
+        device = drive(
+            "EE=1", "SM=1", "RC=70", "PM=0", "DB=65000", "A=200000", motor=NEMA17, load=load, inertia=inertia
+        )
+        module = Module(motor=NEMA17, load=load, inertia=inertia, settings={"6": 180, "5": 500_000})
+        say(device, "MR 8000")
+        module.ask("MVP ABS, 0, 200000")
+        for seconds in asked:
+            device.advance(device.now + seconds)
+            module.wait(seconds)
+            module.ask("GAP 206, 0")
+        device.advance(20.0)
+        module.wait(20.0 - module.now)
+        return [
+            *say(device, "PR C1", "PR ER"),
+            round(rotor(device), -1),
+            round(module.device.motors[0].shaft.position(20.0), 3),
+        ]
+
+    assert ends(looks) == ends([])
