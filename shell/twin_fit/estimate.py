@@ -45,7 +45,7 @@ class Point(NamedTuple):
     grain: float
     """Full steps in a count."""
     direction: float
-    """1 or -1; 0: the lag itself was read, so no counter begins anywhere."""
+    """1 or -1; 1 where the lag itself was read, which is rounded in one way."""
 
 
 @dataclass(frozen=True)
@@ -58,6 +58,15 @@ class Evidence:
     seen: bool = False
     strange: int = 0
     """Lags of more than a full step in a move that has lost none."""
+
+    @property
+    def different(self) -> Sequence[Point]:
+        """The points without those that repeat."""
+        return list(
+            {
+                (round(each.lag, 4), round(each.speed, 4), round(each.acceleration, 2)): each for each in self.points
+            }.values()
+        )
 
     @property
     def fits(self) -> bool:
@@ -83,7 +92,7 @@ class Estimate(NamedTuple):
 
 def estimates(evidence: Evidence, motor: MotorSpec) -> dict[str, Estimate]:
     """Estimate each value. Raises Diagnostic where scipy is missing."""
-    if len(evidence.points) >= FEWEST and evidence.fits:
+    if len(evidence.different) >= FEWEST and evidence.fits:
         return _Fit(evidence, motor).estimates()
     unknown = dict.fromkeys(UNITS, Estimate(0.0, inf, 0.0))
     if evidence.seen and evidence.moves:
@@ -103,7 +112,8 @@ class _Fit:
         except ImportError:
             raise Diagnostic("scipy is missing", "twin fit", INSTALL) from None
         self._evidence, self._motor, self._numpy = evidence, motor, numpy
-        holding, points = motor.curve[0][1], evidence.points
+        # A machine that does the same again is rounded in the same way: samples that repeat tell nothing new.
+        holding, points = motor.curve[0][1], evidence.different
         fastest = max(each.speed for each in points)
         steepest = max(abs(each.acceleration) for each in points)
         self._units = (1.0, holding / fastest, holding / (2 * pi * steepest) if steepest else 1.0)

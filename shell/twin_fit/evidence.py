@@ -35,6 +35,8 @@ NEAR = 0.1
 """Seconds between the time of a sample in the log and the moment of its velocity, at most."""
 SETTLED = 0.2
 """Seconds after which a drive is at rest whose velocity was not read."""
+LATE = 0.02
+"""Seconds between the time of a typed question in the log and the reading, as far as the speed is concerned."""
 LOST = 0.5
 """Full steps; more of them between two rests are lost."""
 Axis = tuple[str, str, str]
@@ -139,13 +141,13 @@ def evidence(read: Sequence[Reading]) -> Evidence:
     """Sort the readings of an axis into rests and moves."""
     points: list[Point] = []
     moves: dict[Profile, Effort] = {}
-    stalled = 0
+    stalled = strange = 0
     base: float | None = None
     moved: list[Reading] = []
     for each in read:
         if each.lag is not None:
             steady = _steady(each)
-            points += [steady] if steady is not None else []
+            points += [steady] if steady is not None and abs(steady.lag) <= 1 else []
             moved += [each] if each.effort.profile.moving(each.at) else []
         elif each.position is not None and not _rests(each):
             moved.append(each)
@@ -155,16 +157,16 @@ def evidence(read: Sequence[Reading]) -> Evidence:
             if base is not None and abs(origin - base) * effort.count > LOST * effort.turn / FULL_STEPS:
                 stalled += 1
             elif base is not None:
-                points += [found for one in moved if (found := _point(one, base)) is not None]
+                ramps = [found for one in moved if (found := _point(one, base)) is not None]
+                points += [each for each in ramps if abs(each.lag) <= 1]
+                strange += sum(abs(each.lag) > 1 for each in ramps)
                 moves |= {one.effort.profile: one.effort for one in moved}
             base, moved = origin, []
     if any(each.lag is not None for each in moved):
         moves |= {one.effort.profile: one.effort for one in moved}
     seen = any(each.effort.measured or each.effort.stalls for each in read)
     moves = {profile: each for profile, each in moves.items() if each.measured or each.lag or each.stalls}
-    near = [each for each in points if abs(each.lag) <= 1]
-    strange = sum(bool(each.direction) for each in points if each not in near)
-    return Evidence(near, list(moves.values()), stalled, seen, strange)
+    return Evidence(points, list(moves.values()), stalled, seen, strange)
 
 
 def _rests(reading: Reading) -> bool:
@@ -192,8 +194,9 @@ def _steady(reading: Reading) -> Point | None:
     joints = [profile.end, *(each.start for each in profile.segments)]
     if reading.lag is None or not profile.moving(at) or any(abs(each - at) < SETTLED / 4 for each in joints):
         return None
-    full = effort.turn / FULL_STEPS
-    return _made(effort, at, reading.lag / full, 1 / full, 0.0)
+    full, changing = effort.turn / FULL_STEPS, abs(profile.acceleration(at) / (profile.velocity(at) or 1.0))
+    doubt = abs(reading.lag) * changing * LATE  # the speed of then is not known
+    return _made(effort, at, reading.lag / full, (1 + doubt) / full, 1.0)
 
 
 def _made(effort: Effort, at: float, lag: float, grain: float, direction: float) -> Point:

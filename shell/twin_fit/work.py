@@ -71,12 +71,13 @@ def _why(known: Estimate | None, seen: Evidence) -> str:
     most = f"; at most {known.most:.3g}" if known.most < inf else ""
     if not seen.fits:
         return "the moves are not those that the cell commands; snapshot the drive, and log again"
-    if len(seen.points) >= FEWEST:
+    number = len(seen.different)
+    if number >= FEWEST:
         return f"the moves do not tell it from the others{most}"
     if not (seen.seen or seen.points):
         return "the drive reports the steps that it commands"
     stalled = f", {counted(seen.stalled, 'move')} stalled" if seen.stalled else ""
-    return f"{counted(len(seen.points), 'lag')} in ramps, {FEWEST} are needed{stalled}{most}"
+    return f"{counted(number, 'lag')} in ramps, {FEWEST} are needed{stalled}{most}"
 
 
 def _name(axis: Axis) -> str:

@@ -46,10 +46,9 @@ def measured(hidden: WorldSpec, states: Sequence[tuple[float, float, float]], no
 
 def ramps(number: int, rate: float = 20.0, directions: Sequence[float] = (1, -1)) -> list[tuple[float, float, float]]:
     """The samples of some moves, up and down."""
-    speeds = [0.4 * n for n in range(1, 20)]
-    return [
-        (speed, sign * rate, way) for _ in range(number) for way in directions for sign in (1, -1) for speed in speeds
-    ]
+    rng = Random(number)
+    ways = [(sign * rate, way) for _ in range(19 * number) for way in directions for sign in (1, -1)]
+    return [(rng.uniform(0.2, 7.6), sign, way) for sign, way in ways]
 
 
 HIDDEN = [
@@ -142,7 +141,8 @@ THERE_AND_BACK = ("MR 8000", "/sleep 1.2", "MR -8000", "/sleep 1.2")
 async def test_an_encoder_tells_load_and_inertia_and_the_cell_keeps_its_remarks(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    log = await recorded(tmp_path, axis("load = 0.2\ninertia = 8e-4"), *THERE_AND_BACK * 3)
+    moves = [line for n in range(7) for line in ("MR 8000", f"/sleep 1.2{n}3", "MR -8000", f"/sleep 1.2{n}7")]
+    log = await recorded(tmp_path, axis("load = 0.3\ninertia = 8e-4"), *moves)
     jitter = Random(7)
     late = (json.loads(each) for each in log.read_text().splitlines())
     with log.open("w") as file:
@@ -150,18 +150,20 @@ async def test_an_encoder_tells_load_and_inertia_and_the_cell_keeps_its_remarks(
             at = datetime.fromisoformat(entry["time"]) + timedelta(milliseconds=jitter.uniform(0, 4))
             file.write(json.dumps({**entry, "time": at.isoformat(timespec="microseconds")}) + "\n")
     found, text = await fitted(tmp_path, log, axis("load = 0.9  # a guess"), capsys)
-    assert found[LOAD] == pytest.approx(0.2, rel=0.05) and found[INERTIA] == pytest.approx(8e-4, rel=0.05)
+    assert found[LOAD] == pytest.approx(0.3, rel=0.05) and found[INERTIA] == pytest.approx(8e-4, rel=0.05)
     assert "# a guess" in text and f"load = {found[LOAD]}" in text and f"inertia = {found[INERTIA]}" in text
 
 
 @pytest.mark.virtual
 async def test_hmt_tells_load_and_margin_where_ll_was_read(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    settings = {"EE": 0, "AS": 1, "VM": 200000, "A": 500000, "D": 500000, "RC": 60}
-    read = ("PR LL", "/sleep 0.04") * 40
-    log = await recorded(tmp_path, axis("load = 0.25", **settings), "MR 250000", *read, "MR -250000", *read, period=0.5)
+    settings = {"EE": 0, "AS": 1, "VM": 200000, "A": 100000, "D": 100000, "RC": 60}
+    read = ("PR LL", "/sleep 0.06") * 30
+    speeds = range(30_000, 181_000, 30_000)
+    moves = [line for top in speeds for line in (f"VM={top}", f"SL {top}", *read, "SL 0", "/sleep 2")]
+    log = await recorded(tmp_path, axis("load = 0.25", **settings), *moves, period=0.5)
     found, _ = await fitted(tmp_path, log, axis(**settings), capsys)
     assert found[LOAD] == pytest.approx(0.25, rel=0.05)
-    used = 0.25 * 0.45 / 0.6 / Torque(WorldSpec(motor=NEMA17)).available(200000 / 51200)
+    used = 0.25 * 0.45 / 0.6 / Torque(WorldSpec(motor=NEMA17)).available(180_000 / 51_200)
     assert found[MARGIN] == pytest.approx(1 - used, abs=0.05 * used)
 
 
