@@ -105,6 +105,16 @@ class MCodeDevice(EventLoop):
         counters = self.motor.counters
         return counters.shown(counters.source, now)
 
+    @property
+    def homing(self) -> bool:
+        return self.motor.homing_active
+
+    def align(self, _: str, position: int, now: float) -> None:
+        """Stand at a position."""
+        self.advance(now)
+        self.motor.stop(now)
+        self.execute(f"P={position}", now, immediate=True)
+
     def motion(self, now: float) -> Motion:
         """P and V, likewise."""
         return Motion(self.position(now), self.velocity(now))

@@ -335,15 +335,10 @@ def _shadow(device: MCodeDevice, port: MCodePort) -> Shadow:
     def motion(now: float) -> tuple[Motion, ...]:
         return (device.motion(now),)
 
-    def align(_: str, position: int, now: float) -> None:
-        device.advance(now)
-        device.motor.stop(now)
-        device.execute(f"P={position}", now, immediate=True)
-
     def awaits(_: str, now: float) -> str | None:  # noqa: ARG001
-        return "" if device.motor.homing_active else None
+        return "" if device.homing else None
 
-    return Shadow(rest, motion, align, awaits, lambda: {"": device.effort})
+    return Shadow(rest, motion, device.align, awaits, lambda: {"": device.effort})
 
 
 def _at_baud(spec: DriveSpec, baud: int) -> DriveSpec:
