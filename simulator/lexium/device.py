@@ -249,9 +249,9 @@ def _accepted(line: str, where: str, execute: Execute) -> None:
 
 def _set_up(device: MCodeDevice, spec: DriveSpec) -> None:
     """Put what the spec says into NVM. What the inputs are meanwhile is nothing to react to. Raises Diagnostic."""
-    execute = partial(_reason, device)
-    device.motor.inputs.begin(0.0)
-    device.motor.inputs.watched = False
+    execute, inputs = partial(_reason, device), device.motor.inputs
+    inputs.begin(0.0)
+    inputs.watched = False
     # Declare the variables, and store the program. Raises Diagnostic.
     for name, value in spec.variables.items():
         _accepted(f"VA {name}={value}", f"drive {spec.name}: variables", execute)
@@ -263,7 +263,7 @@ def _set_up(device: MCodeDevice, spec: DriveSpec) -> None:
     device.memory.texts["DN"] = spec.name
     _assign(spec, execute)
     device.nvm.keep()
-    device.motor.inputs.watched = True
+    inputs.watched = True
 
 
 def _reason(device: MCodeDevice, line: str) -> str:
