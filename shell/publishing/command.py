@@ -62,7 +62,11 @@ def run(
 
 
 def _parse(text: str) -> Target | Listening:
-    return parse_listening(text) if text.partition("://")[0] in SERVERS else parse_target(text)
+    scheme = text.partition("://")[0]
+    if scheme not in (*SERVERS, *broker.PORTS):
+        hint = ", ".join((broker.FORM, *(f"{each}://[HOST]:PORT" for each in SERVERS)))
+        raise Diagnostic("a target begins with its scheme", "--to", hint)
+    return parse_listening(text) if scheme in SERVERS else parse_target(text)
 
 
 def _outlet(registry: Registry, target: Target | Listening, home_assistant: bool) -> Outlet:

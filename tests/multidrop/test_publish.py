@@ -184,6 +184,7 @@ async def test_a_server_that_never_answers_is_given_up_and_nothing_stays(monkeyp
         (["--to", "mqtt://me:hunter2@127.0.0.1/p"], 2, "--to: a password in a URL"),
         ([], 2, "--to"),
         (["--to", "prometheus://:0", "--home-assistant"], 2, "--home-assistant: goes through a broker"),
+        (["--to", "http://127.0.0.1:1/p"], 2, "or mqtts://..., prometheus://[HOST]:PORT, opcua://[HOST]:PORT"),
         (["--to", "prometheus://:x"], 2, "--to: no address ':x' of a server"),
         (["--to", "prometheus://:1", "--to", "prometheus://127.0.0.1:1"], 2, "--to: given twice"),
         (
