@@ -83,7 +83,7 @@ def read_drive(table: Table, folder: Folder) -> DriveSpec:
     world, *further = read_worlds(surroundings, names, WORLD_KEYS, inputs_of(module), COUNTS, geared)
     variables = table.table("variables", "[bus.drive.variables]")
     rows = table.table("identity", "[bus.drive.identity]")
-    identity = read_identity(rows, ("version",), {"position": module.motors})
+    identity = read_identity(rows, ("version",), {"position": module.motors, "target": module.motors})
     if identity.version and not VERSION_FORM.fullmatch(identity.version):
         hint = "valid: module and firmware, as in 1241V115"
         raise rows.wrong("version", f"cannot be {quoted(identity.version)}", hint)

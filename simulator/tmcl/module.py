@@ -97,8 +97,9 @@ class TmclModule:
         if f"G{int(Global.BAUD)}" not in spec.set:
             self._global[Global.BAUD] = next((code for code, each in BAUDS.items() if each == baud), 0)
         self.power(True, 0.0)
+        targets = iter(spec.identity.counters.get("target", ()))
         for motor, position in zip(self.motors, spec.identity.counters.get("position", ()), strict=False):
-            motor.stand_at(position, 0.0)
+            motor.stand_at(position, 0.0, next(targets, position))
 
     def _fresh(self) -> None:
         """Set what EEPROM holds to the factory's values."""

@@ -112,9 +112,10 @@ class Motor:
         self.parameters[Axis.TARGET_VELOCITY] = velocity
         self._plan(t)
 
-    def stand_at(self, position: int, t: float) -> None:
-        """Give its present place this position, which is the target too."""
-        self.positioning, self._target = True, position
+    def stand_at(self, position: int, t: float, target: int | None = None) -> None:
+        """Give its present place this position, which is the target too unless the last move was broken off."""
+        self._target = position if target is None else target
+        self.positioning = self._target == position
         self._profile = halt(t, float(position))
         self._hand_on(t)
 

@@ -296,9 +296,10 @@ def take(state: TmclState, progress: Progress) -> Procedure[Snapshot]:
     module, (major, _, minor) = state.product.rpartition("-")[2], state.version.partition(".")
     if count > (simulated := MODULES[module].motors if module in MODULES else 1):
         remarks.append(f"it has {count} motors; the simulated module has {simulated}")
-    positions = []
+    positions, targets = [], []
     for motor in range(count):
         positions.append((yield from read(state, Call(Command.GAP, Axis.ACTUAL_POSITION, motor))))
+        targets.append((yield from read(state, Call(Command.GAP, Axis.TARGET_POSITION, motor))))
     code = readings.values.get(f"G{int(Global.BAUD)}")
     return Snapshot(
         kind="tmcl",
@@ -307,7 +308,7 @@ def take(state: TmclState, progress: Progress) -> Procedure[Snapshot]:
         name=state.address,
         baud=BAUDS.get(code, 0) if isinstance(code, int) else 0,
         readings=readings,
-        counters={"position": tuple(positions)},
+        counters={"position": tuple(positions), **({"target": tuple(targets)} if targets != positions else {})},
         program=tuple((line.at, line.text) for line in held.lines),
         active=active or runs,
         remarks=tuple(remarks),

@@ -114,3 +114,10 @@ async def test_a_push_by_hand_is_one_warning_and_the_twin_takes_the_position(tmp
         await run(cell, "MR 800", "/sleep 4")
         assert of(cell, Diverged) == []
         agrees(cell)
+
+
+async def test_a_module_counts_from_the_target_of_a_move_that_was_broken_off(tmp_path: Path) -> None:
+    async with CellSession(tmp_path, bus("b", TMCL)) as cell:
+        await run(cell, "MVP REL, 0, 90000", "/sleep 1", "MST 0", "/sleep 2", "/twin on", "MVP REL, 0, 900", "/sleep 4")
+        assert of(cell, Diverged) == [] and of(cell, Predicted)[-1].position == 90900
+        agrees(cell)
