@@ -160,6 +160,7 @@ class Plant:
             return
         found = _object(payload)
         lines = found.get("lines")
+        lines = {str(each): each for each in lines} if isinstance(lines, list) else lines
         if not isinstance(found.get("host"), str) or not isinstance(lines, dict):
             self.ignored["of no known form"] += 1
         elif (publisher := self._publisher(above, at)) is not None:

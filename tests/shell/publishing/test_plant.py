@@ -74,6 +74,12 @@ def test_a_drive_is_named_by_its_place_and_its_line_by_host_and_port(desk: Desk)
     assert ("press-pc", "press", "a") in [row[1:4] for row in desk.rows]
 
 
+def test_an_about_may_name_its_lines_in_a_list(desk: Desk) -> None:
+    desk.put("plant/p/about", {"version": "2", "host": "pc", "lines": ["press", ["x"], 5]})
+    desk.drive("plant/p/press/a")
+    assert [row[1:4] for row in desk.rows] == [("p", "press", "a")]
+
+
 def test_the_worst_are_first_and_a_lost_pc_or_line_has_its_drives(desk: Desk) -> None:
     for number, state in enumerate(("at rest", "moving", "no current", "silent", "lost"), 1):
         desk.drive(f"plant/p/l/{number}", state)

@@ -6,6 +6,7 @@ import json
 from collections import Counter
 from datetime import UTC, datetime
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 from urllib.parse import unquote
 
@@ -232,6 +233,21 @@ def test_the_error_is_that_of_the_first_axis_that_has_one() -> None:
     assert error_of([fine]) == {"value": 0, "text": ""}
     assert error_of([fine, wrong]) == {"value": 5, "text": "limit", "axis": "y"}
     assert "clear" in str(error_of([Conditions(error=UNREAD)])["text"])
+
+
+@pytest.mark.parametrize(
+    ("name", "port", "shown"),
+    [
+        ("press", "tcp://10.0.0.5:4001", "press"),
+        ("10.0.0.5", "tcp://10.0.0.5:4001", "10.0.0.5:4001"),
+        ("10.0.0.5-4001", "rfc2217://10.0.0.5:4001", "10.0.0.5:4001"),
+        ("ttyUSB0", "/dev/ttyUSB0", "ttyUSB0"),
+        ("10.0.0.5-rig", "tcp://10.0.0.5:4001", "10.0.0.5-rig"),
+    ],
+)
+def test_a_line_that_is_named_after_its_host_is_shown_with_its_port(name: str, port: str, shown: str) -> None:
+    bus: Any = SimpleNamespace(name=name, link=SimpleNamespace(transport=SimpleNamespace(name=port)))
+    assert feed.shown_name(bus) == shown
 
 
 def test_a_line_is_an_entry_of_the_log_without_secrets_and_of_bounded_length() -> None:
