@@ -174,6 +174,21 @@ def test_a_tmcl_module_shows_the_reserve_of_its_torque_and_stops_on_a_stall() ->
     assert module.ask("GAP 3, 0") == 51200, "the next motion turns it again"
 
 
+def test_a_stalled_shaft_turns_again_where_the_command_turns_back() -> None:
+    """0.1 N m for each rev/s: 0.6 N m are there up to 6 rev/s, of 51200 microsteps."""
+    module = Module(motor=FLAT, friction=0.1, settings={"6": 153, "5": 500_000, "4": 1_000_000})
+    module.ask("ROR 0, 409600")
+    module.wait(2.0)
+    assert (module.ask("GAP 3, 0"), module.ask("GAP 206, 0")) == (409_600, 0)
+    stalled = module.device.motors[0].shaft.position(module.now)
+    module.ask("ROL 0, 102400")
+    module.wait(0.5)
+    assert module.device.motors[0].shaft.position(module.now) == stalled, "it slows down"
+    module.wait(2.0)
+    assert module.ask("GAP 206, 0") == round(1023 * (1 - 0.2 / 0.6))
+    assert module.device.motors[0].shaft.position(module.now) < stalled - 51_200
+
+
 def cell(lines: str, personality: str = "LMDCM") -> str:
     return f'[[bus]]\nname = "b"\n[[bus.drive]]\npersonality = "{personality}"\n{lines}\n'
 
