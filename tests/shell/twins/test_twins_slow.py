@@ -87,7 +87,7 @@ async def test_a_stall_is_found_over_a_slow_line(tmp_path: Path, monkeypatch: py
     async with CellSession(tmp_path, bus("b", CELLS["TMCL"][0])) as cell:
         await run(cell, "/twin on")
         for number in range(6):
-            await run(cell, f"MVP REL, 0, {(-1) ** number * 60000}", f"/sleep {0.3 + number / 10}")
+            await run(cell, f"MVP ABS, 0, {(-1) ** number * 90000}", f"/sleep {0.3 + number / 10}")
             cell.device("b:1").motors[0].freeze(cell.floor.now())
             await asyncio.sleep(4)
             assert len(of(cell, Diverged)) == 1
