@@ -137,11 +137,7 @@ $(VENV)/.run: pyproject.toml constraints.txt | $(VENV)/bin/python
 	touch $@
 
 $(VENV)/.dev: pyproject.toml constraints.txt requirements-dev.txt | $(VENV)/bin/python
-<<<<<<< HEAD
-	$(PIP) -c constraints.txt -e '.[rerun,lsp,mqtt,prometheus,usb,cluster,fit]' -r requirements-dev.txt
-=======
-	$(PIP) -c constraints.txt -e '.[rerun,lsp,mqtt,opcua,prometheus,usb,cluster]' -r requirements-dev.txt
->>>>>>> 7aca8669 (publish --to opcua://: a server whose nodes clients only read)
+	$(PIP) -c constraints.txt -e '.[rerun,lsp,mqtt,opcua,prometheus,usb,cluster,fit]' -r requirements-dev.txt
 	touch $@ $(VENV)/.run
 
 clean:
