@@ -248,7 +248,7 @@ class Comparison:
             self.lag = max(self.lag, interval - self._usual)
         else:
             self._usual = FADING * self._usual + (1 - FADING) * interval if self._usual else interval
-            if self.steady and pair.equally_fast and abs(pair.difference) <= self._limit(pair, rest, 0.0):
+            if self.steady and pair.equally_fast and abs(pair.difference) <= self._limit(pair, rest, -self.took):
                 self.lag *= FADING
 
     @property
