@@ -44,11 +44,14 @@ def with_motor(drive: DriveSpec, table: Table, folder: Folder) -> DriveSpec:
 
 
 def _rows(table: Table, folder: Folder, name: str) -> Iterator[tuple[float, ...]]:
-    text = read_file(name, "motor", table, folder, LARGEST).decode("utf-8-sig", "replace")
+    text, head = read_file(name, "motor", table, folder, LARGEST).decode("utf-8-sig", "replace"), ["rev/s", "N m"]
     for number, line in enumerate(split_lines(text), 1):
         text = line.partition("#")[0].strip()
         fields = [each.strip() for each in text.split(",")]
-        if not text or (number == 1 and fields == ["rev/s", "N m"]):
+        if not text:
+            continue
+        first, head = fields == head, []
+        if first:
             continue
         where = f"motor: {name}:{number}"
         try:

@@ -180,6 +180,7 @@ class Report:
         seconds = time.perf_counter() - self._began
         interruption.came = False  # the next signal ends the search
         groups = self._groups(interruption, LATE_SEARCH if code else SEARCH)
+        interrupted = interruption.came  # later the reader of the output may leave
         self.erase()
         self._cut = bool(code)
         answer = None if self._json and not self._svg else self._answer()
@@ -198,7 +199,7 @@ class Report:
             write(sys.stdout, f"{self._counted}, {len(self._failed)} failed, {seconds:.1f} s")
         if code:
             write(sys.stderr, f"ended after {self._counted} of {self._plan.runs}; the others were not run")
-        elif interruption.came:
+        elif interrupted:
             write(sys.stderr, "interrupted while simpler worlds were looked for")
         return self._finish_junit(groups, seconds, code or (FAILED if self._failed else 0))
 

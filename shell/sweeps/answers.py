@@ -200,6 +200,12 @@ class Answer:
             first = self._names.index(self._search)
             others = [at for at, axis in enumerate(self._axes) if at != first and len(axis.at) > 1]
             said = self._said(first, others)
+            if len(self._axes[first].at) > 1:
+                ends, rest = " at both ends of ", "; nothing between was tried"
+                said = [
+                    ((begin.replace(" at every ", ends), rest) if " every " in begin else (begin, end), place)
+                    for (begin, end), place in said
+                ]
         elif self._pair:
             said = self._said(self._pair[0], self._pair[1:])
             if all(" every " in begin for (begin, _), _ in said):  # the other key decides

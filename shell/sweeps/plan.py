@@ -124,8 +124,12 @@ class Plan:
         """The largest number of cases that run."""
         if not self.asked.search:
             return self.count
-        searched = next(v.count for k, v in zip(self.job.keys, self.values, strict=True) if k.text == self.asked.search)
-        return self.count // searched * (1 + searched.bit_length())
+        return self.count // self.searched.count * (1 + self.searched.count.bit_length())
+
+    @property
+    def searched(self) -> Values:
+        """The values of the key whose boundary is searched."""
+        return next(v for k, v in zip(self.job.keys, self.values, strict=True) if k.text == self.asked.search)
 
     def facts(self) -> dict[str, str]:
         """What makes this sweep the same as another: equal facts, equal results."""
@@ -223,6 +227,10 @@ def _check(plan: Plan) -> None:
     """Refuse too many cases, and any value that the world or the drive refuses. Raises Diagnostic."""
     if plan.asked.search and plan.asked.search not in (key.text for key in plan.job.keys):
         raise Diagnostic("has no values", f"--search {plan.asked.search}", f"--vary {plan.asked.search}=A..B:STEP")
+    if plan.asked.search:
+        numbers = [each for each in plan.searched.samples() if isinstance(each, int | float)]
+        if numbers not in (sorted(numbers), sorted(numbers, reverse=True)):
+            raise Diagnostic("its values go up and down", f"--search {plan.asked.search}", "write them in order")
     if plan.runs > MOST:
         hint = "take larger steps or fewer values, or draw some with --random N"
         raise Diagnostic(f"{plan.runs} cases are too many; a sweep has {MOST} at most", "--vary", hint)

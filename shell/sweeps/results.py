@@ -80,12 +80,15 @@ class Table:
 
     def take(self, result: Result) -> None:
         if self._files:
-            values = (each if isinstance(each, str) else spelled(each) for each in self._plan.values_of(result.number))
+            values = self._values(result.number)
             failed = self._reasons.get(result.failed, "")
             line = io.StringIO()
             row = [result.number, *values, "true" if result.ok else "false", failed, result.why, *result.cells]
             csv.writer(line, lineterminator="\n").writerow([*row, *self._facts.values()])
             self._rows[result.number] = line.getvalue().encode("utf-8", "backslashreplace")
+
+    def _values(self, number: int) -> list[str]:
+        return [each if isinstance(each, str) else spelled(each) for each in self._plan.values_of(number)]
 
     def save(self, *, now: bool = False) -> None:
         """Write the files, if it is time or `now`. Raises Diagnostic."""
@@ -152,7 +155,17 @@ class Table:
                 return None
         if number is None or code is None or (ok == "true") != (code == HELD):
             return None
+        if not all(map(_same, row[1:], self._values(number))):
+            return None
         return Result(number, code, said, cells)
+
+
+def _same(cell: str, value: str) -> bool:
+    """Whether a cell has a value. Parquet writes numbers in another way."""
+    try:
+        return cell == value or float(cell) == float(value)
+    except ValueError:
+        return False
 
 
 def _text(file: str) -> str:

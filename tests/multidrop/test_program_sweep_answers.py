@@ -187,6 +187,17 @@ def test_a_table_of_another_sweep_is_refused_and_unchanged(
         assert (tmp_path / "all.csv").read_bytes() == before
 
 
+def test_a_row_whose_values_were_edited_is_refused(sweep: Sweep, tmp_path: Path) -> None:
+    sweep(*GRID, "--csv", "all.csv")
+    edited = (tmp_path / "all.csv").read_text().replace("\n4,0.1,100000,", "\n4,0.1,300000,")
+    (tmp_path / "all.csv").write_text(edited)
+    done = sweep(*GRID, "--resume", "all.csv")
+    assert (done.returncode, done.stdout) == (2, "") and done.stderr == (
+        "all.csv:5: is not a row of this sweep; name a new file\n"
+    )
+    assert (tmp_path / "all.csv").read_text() == edited
+
+
 def test_a_table_of_another_version_is_refused(sweep: Sweep, monkeypatch: pytest.MonkeyPatch) -> None:
     sweep(*GRID, "--csv", "all.csv")
     monkeypatch.setattr(plan, "version", lambda: "99.0")
@@ -282,7 +293,13 @@ def test_a_search_finds_the_boundary_with_few_cases(sweep: Sweep, ran: list[int]
 
 def test_a_search_without_a_boundary_says_so(sweep: Sweep, ran: list[int]) -> None:
     done = sweep("--vary", "b.stall_at=700000..900000", "--search", "b.stall_at")
-    assert done.returncode == 0 and "passes everywhere\n2 cases, 0 failed" in done.stdout and ran == [1, 200001]
+    said = "passes at both ends of b.stall_at; nothing between was tried\n2 cases, 0 failed"
+    assert done.returncode == 0 and said in done.stdout and ran == [1, 200001]
+    two = sweep("--vary", "b.load=0,0.1", "--vary", "b.stall_at=100000..200000", "--search", "b.stall_at")
+    assert "\nfails at both ends of b.stall_at; nothing between was tried\n" in two.stdout
+    mixed = sweep("--vary", "b.stall_at=700000,100000,900000", "--search", "b.stall_at")
+    assert mixed.returncode == 2
+    assert mixed.stderr == "--search b.stall_at: its values go up and down; write them in order\n"
     wrong = sweep("--vary", "b.load=0", "--search", "load")
     assert wrong.returncode == 2 and wrong.stderr == "--search load: has no values; --vary load=A..B:STEP\n"
     both = sweep("--vary", "b.load=0", "--search", "b.load", "--random", "3")

@@ -195,7 +195,7 @@ def cell(lines: str, personality: str = "LMDCM") -> str:
 
 def test_every_axis_gets_the_motor_of_its_drive_and_a_file_has_its_rows(tmp_path: Path) -> None:
     (tmp_path / "own.csv").write_bytes(
-        b"\xef\xbb\xbfrev/s, N m\r\n# measured by hand\r\n0, 2.5\r\n10,1.25 # at 24 V\r\n\r\n"
+        b"\xef\xbb\xbf# of a motor\r\nrev/s, N m\r\n# measured by hand\r\n0, 2.5\r\n10,1.25 # at 24 V\r\n\r\n"
     )
     own = MotorSpec(((0.0, 2.5), (10.0, 1.25)))
     for lines, motor in (
