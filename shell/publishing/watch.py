@@ -24,6 +24,8 @@ INBOX = 5000
 """Messages that wait for `drain`; beyond, the oldest are dropped and counted."""
 DRAIN = 0.1
 """Seconds between two calls of `drain`: one turn of the event loop takes many messages."""
+BUSY = 0.1
+"""The longest time of one `drain`, s: keys and signals come between two."""
 PRINT = 1.0
 """Seconds between two looks for rows that have changed."""
 
@@ -38,7 +40,7 @@ class Watch:
         self.lost = False
         self._notify = notify
         self._make = lambda: Connection(target, settings.mqtt, None, fresh_name(), self._take)
-        self._waiting: deque[tuple[str, bytes, bool]] = deque(maxlen=INBOX)
+        self._waiting: deque[tuple[str, bytes, bool, float]] = deque(maxlen=INBOX)
         self._dropped = 0
         self._task: asyncio.Task[None] | None = None
 
@@ -53,17 +55,17 @@ class Watch:
     def _take(self, topic: str, payload: bytes, retained: bool) -> None:
         """Queue a message, in the thread of the connection."""
         self._dropped += len(self._waiting) == INBOX
-        self._waiting.append((topic, payload[: LONGEST + 1], retained))
+        self._waiting.append((topic, payload[: LONGEST + 1], retained, self.now))
 
     @property
     def now(self) -> float:
         return self._loop.time()
 
     def drain(self) -> None:
-        """Work off the messages that wait."""
-        now = self.now
-        for _ in range(len(self._waiting)):
-            self.plant.take(*self._waiting.popleft(), now)
+        """Work off messages that wait, for a limited time."""
+        end = self.now + BUSY
+        while self._waiting and self.now < end:
+            self.plant.take(*self._waiting.popleft())
         if self._dropped:
             self.plant.ignored["dropped: they came too fast"] += self._dropped
             self._dropped = 0
@@ -106,9 +108,9 @@ async def _run(url: str, as_json: bool) -> int:
             target = parse_target(url, "plant")
             load("plant")
             watch = Watch(target, configuration.load(), lambda text: write(sys.stderr, text))
-            await watch.begin()
             try:
-                await _print(watch, as_json, over)
+                if await _begun(watch, over):
+                    await _print(watch, as_json, over)
             finally:
                 await watch.end()
             return 0
@@ -117,6 +119,18 @@ async def _run(url: str, as_json: bool) -> int:
             return exit_code(failure)
         finally:
             await finish(streams, over.is_set)
+
+
+async def _begun(watch: Watch, over: asyncio.Event) -> bool:
+    """Connect; return whether that was done before a signal. Raises TransportLost or Diagnostic."""
+    begin, signal = asyncio.create_task(watch.begin()), asyncio.create_task(over.wait())
+    await asyncio.wait((begin, signal), return_when=asyncio.FIRST_COMPLETED)
+    signal.cancel()
+    if not begin.done():
+        begin.cancel()
+        return False
+    await begin
+    return True
 
 
 async def _print(watch: Watch, as_json: bool, over: asyncio.Event) -> None:

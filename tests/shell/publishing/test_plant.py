@@ -7,6 +7,7 @@ import json
 import socket
 import threading
 from contextlib import suppress
+from itertools import count
 from typing import Any
 
 import pytest
@@ -16,7 +17,7 @@ from hypothesis import strategies as st
 from multidrop.shell.configuration import Settings
 from multidrop.shell.publishing.broker import parse_target
 from multidrop.shell.publishing.plant import LONGEST, MOST, NAME, QUIET, SAMPLES, Place, Plant, Row
-from multidrop.shell.publishing.watch import INBOX, Watch, summary
+from multidrop.shell.publishing.watch import INBOX, Watch, _begun, summary
 from multidrop.transports import Unreachable
 from tests.support.until import until
 
@@ -299,7 +300,30 @@ async def test_a_flood_drops_the_oldest_and_says_how_many() -> None:
     watch, _ = await watched(1)
     for number in range(INBOX + 300):
         watch._take("plant/p/l/a/position", json.dumps({"value": number}).encode(), False)
-    watch.drain()
+    while watch._waiting:
+        watch.drain()
     assert watch.rows()[0].numbers["position"] == str(INBOX + 299)
     assert summary(watch.plant, watch.rows()).endswith("300 messages dropped: they came too fast")
     await asyncio.sleep(0)
+
+
+async def test_keys_and_signals_come_between_messages_that_take_long(monkeypatch: pytest.MonkeyPatch) -> None:
+    watch, _ = await watched(1)
+    times = count()
+    monkeypatch.setattr(Watch, "now", property(lambda _: next(times) * 0.04))
+    for number in range(10):
+        watch._take("plant/p/l/a/position", json.dumps({"value": number}).encode(), False)
+    watch.drain()
+    assert 0 < len(watch._waiting) < 10
+    (values,) = watch.plant.drives.values()
+    assert values["position", ""].at == pytest.approx(values["position", ""].value * 0.04), "it arrived then"
+
+
+async def test_a_signal_ends_the_wait_for_a_broker_that_does_not_answer() -> None:
+    over = asyncio.Event()
+    with socket.create_server(("127.0.0.1", 0)) as silent:
+        watch, _ = await watched(silent.getsockname()[1])
+        asyncio.get_running_loop().call_later(0.05, over.set)
+        async with asyncio.timeout(5):
+            assert not await _begun(watch, over)
+        await watch.end()
