@@ -22,10 +22,11 @@ from multidrop.shell import configuration
 from multidrop.shell.configuration import Settings
 from multidrop.shell.events import FAILURES
 from multidrop.shell.exit_codes import exit_code
+from multidrop.shell.prompt.keyboard import on_signals
 from multidrop.shell.publishing.broker import load, parse_target
 from multidrop.shell.publishing.plant import ENDED, ERROR, UNKNOWN, URGENCY, Place, Row, shown
 from multidrop.shell.publishing.registry import AT_REST, MOVING
-from multidrop.shell.publishing.watch import DRAIN, Watch, summary
+from multidrop.shell.publishing.watch import DRAIN, Watch, begun, summary
 from multidrop.shell.streams.stdout import report, write
 from multidrop.tui.text import age, fit
 from multidrop.tui.widgets.bars import Banner
@@ -37,7 +38,7 @@ PAINT = 0.5
 """Seconds between two pictures while nothing is pressed."""
 CALM = (UNKNOWN, ENDED, MOVING, AT_REST)
 WHERE, NAME, STATE, NUMBER, AGE = 16, 16, 10, 14, 7
-UNREACHED = "‼ NOT REACHED: this page only reads. Ctrl+X at {}, or the emergency stop there"
+UNREACHED = "‼ NOT REACHED: Ctrl+X at {}, or the emergency stop there; this page only reads"
 KEYS = (("↑↓", "choose"), ("Enter", "follow"), ("Esc", "back"), ("type", "narrows"), ("^Q", "quit"))
 
 
@@ -79,10 +80,10 @@ class PlantApp(App[int]):
         yield Lines(id="ignored")
         yield Lines(id="footer")
 
-    async def watch_broker(self) -> None:
-        """Connect. Raises TransportLost or Diagnostic."""
+    async def watch_broker(self, over: asyncio.Event) -> bool:
+        """Connect; return whether that was done before `over`. Raises TransportLost or Diagnostic."""
         self.broker = Watch(self.target, self._settings, self.tell)
-        await self.broker.begin()
+        return await begun(self.broker, over)
 
     async def end(self) -> None:
         await self.broker.end()
@@ -124,7 +125,7 @@ class PlantApp(App[int]):
 
     async def action_back(self) -> None:
         """Close the banner, the followed drive, or the words, one at a time."""
-        banner, plant = self.query_one(Banner), self.broker.plant
+        banner, plant, self._told = self.query_one(Banner), self.broker.plant, ""
         if banner.display:
             banner.show(())
         elif plant.followed is not None:
@@ -184,7 +185,7 @@ class PlantApp(App[int]):
         broker = [("BROKER LOST ", "error")] if self.broker.lost else [(f"{self.target.text} ", "dim")]
         left = [(" PLANT   ", "strong"), (states or "nothing is published here yet", "text")]
         self.query_one("#heading", Lines).put([spread(left, broker, width)])
-        below = self._told or summary(plant, everything)
+        below = " · ".join(filter(None, (self._told, summary(plant, everything))))
         self.query_one("#ignored", Lines).put([((fit(f" {below}", width), "strong" if self._told else "dim"),)])
         footer: Shown = tuple(span for key, word in KEYS for span in ((f" {key}", "key"), (f" {word} ", "dim")))
         words = [(f"{self._words}▏ ", "strong")] if self._words else []
@@ -205,7 +206,7 @@ class PlantApp(App[int]):
         row = next((each for each in self.broker.rows() if each.place == place), None)
         assert row is not None
         head: Shown = (
-            (f" {row.where}  {row.line}:{row.drive}  ", "strong"),
+            (f" {row.where}  {':'.join(filter(None, (row.line, row.drive)))}  ", "strong"),
             (row.state, _role(row)),
             (_host(self), "dim"),
         )
@@ -279,9 +280,16 @@ def run(url: str) -> int:
 
 
 async def _run(app: PlantApp) -> int:
-    await app.watch_broker()
-    try:
-        await app.run_async()
-    finally:
-        await app.end()
-    return 1 if app.return_value is None else app.return_value
+    over = asyncio.Event()
+
+    def end() -> None:
+        over.set()
+        app.exit(0)
+
+    with on_signals(end):
+        try:
+            if await app.watch_broker(over):
+                await app.run_async()
+        finally:
+            await app.end()
+    return 0 if over.is_set() else 1 if app.return_value is None else app.return_value

@@ -109,7 +109,7 @@ async def _run(url: str, as_json: bool) -> int:
             load("plant")
             watch = Watch(target, configuration.load(), lambda text: write(sys.stderr, text))
             try:
-                if await _begun(watch, over):
+                if await begun(watch, over):
                     await _print(watch, as_json, over)
             finally:
                 await watch.end()
@@ -121,7 +121,7 @@ async def _run(url: str, as_json: bool) -> int:
             await finish(streams, over.is_set)
 
 
-async def _begun(watch: Watch, over: asyncio.Event) -> bool:
+async def begun(watch: Watch, over: asyncio.Event) -> bool:
     """Connect; return whether that was done before a signal. Raises TransportLost or Diagnostic."""
     begin, signal = asyncio.create_task(watch.begin()), asyncio.create_task(over.wait())
     await asyncio.wait((begin, signal), return_when=asyncio.FIRST_COMPLETED)

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import asyncio
 import json
+import signal
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 
@@ -12,7 +14,7 @@ from textual.pilot import Pilot
 from multidrop.shell.configuration import Settings
 from multidrop.shell.publishing.plant import Place
 from multidrop.shell.publishing.watch import Watch
-from multidrop.tui.plant import PlantApp
+from multidrop.tui.plant import PlantApp, _run
 from multidrop.tui.widgets.lines import Lines
 
 pytestmark = pytest.mark.tui
@@ -84,7 +86,7 @@ async def test_ctrl_x_says_that_nothing_was_reached_and_where_to_go(before: tupl
     async with page() as plant:
         rows = await plant.press(*before, "ctrl+x")
         [banner] = [row for row in rows if "NOT REACHED" in row]
-        assert banner.startswith(" ‼ NOT REACHED: this page only reads. Ctrl+X at press-pc (hall-1)")
+        assert banner.startswith(" ‼ NOT REACHED: Ctrl+X at press-pc (hall-1), or the emergency stop there; this page")
         assert "STOPPED" not in "".join(rows) and banner in rows[1]
         assert not any("NOT REACHED" in row for row in await plant.press("escape"))
 
@@ -110,6 +112,9 @@ async def test_a_lost_broker_is_seen() -> None:
         plant.plant.lost(plant.app.broker.now)
         rows = await plant.press("down")
         assert rows[0].endswith("BROKER LOST") and rows[2].endswith("?")
+        plant.app.tell("the broker is back")
+        assert any("the broker is back · 2 PCs, 1 without about" in row for row in await plant.press("down"))
+        assert not any("is back" in row for row in await plant.press("escape"))
 
 
 async def test_ctrl_q_ends_it_and_ctrl_c_does_not() -> None:
@@ -117,3 +122,27 @@ async def test_ctrl_q_ends_it_and_ctrl_c_does_not() -> None:
         assert any("^Q quits" in row for row in await plant.press("ctrl+c"))
         await plant.pilot.press("ctrl+q")
     assert plant.app.return_value == 0
+
+
+@pytest.mark.parametrize("connected", [True, False])
+async def test_a_signal_ends_the_page_and_leaves_the_terminal_well(
+    monkeypatch: pytest.MonkeyPatch, connected: bool
+) -> None:
+    app, ran = PlantApp("mqtt://broker/plant", Settings()), asyncio.Event()
+    app.broker = Watch(app.target, Settings(), app.tell)
+
+    async def watch_broker(over: asyncio.Event) -> bool:
+        if not connected:
+            signal.raise_signal(signal.SIGTERM)
+            await over.wait()
+        return connected
+
+    async def run_async() -> None:
+        asyncio.get_running_loop().call_soon(signal.raise_signal, signal.SIGTERM)
+        while app.return_value is None:
+            await asyncio.sleep(0)
+        ran.set()
+
+    monkeypatch.setattr(app, "watch_broker", watch_broker)
+    monkeypatch.setattr(app, "run_async", run_async)
+    assert await asyncio.wait_for(_run(app), 5) == 0 and ran.is_set() == connected

@@ -17,7 +17,7 @@ from hypothesis import strategies as st
 from multidrop.shell.configuration import Settings
 from multidrop.shell.publishing.broker import parse_target
 from multidrop.shell.publishing.plant import LONGEST, MOST, NAME, QUIET, SAMPLES, Place, Plant, Row
-from multidrop.shell.publishing.watch import INBOX, Watch, _begun, summary
+from multidrop.shell.publishing.watch import INBOX, Watch, begun, summary
 from multidrop.transports import Unreachable
 from tests.support.until import until
 
@@ -325,5 +325,5 @@ async def test_a_signal_ends_the_wait_for_a_broker_that_does_not_answer() -> Non
         watch, _ = await watched(silent.getsockname()[1])
         asyncio.get_running_loop().call_later(0.05, over.set)
         async with asyncio.timeout(5):
-            assert not await _begun(watch, over)
+            assert not await begun(watch, over)
         await watch.end()
