@@ -47,7 +47,7 @@ _KIND = b'"kind": "'
 _RESUME = b'"kind": "typed", "text": "/resume"'
 _POLL = b'"poll": true}'
 _PLACE = rb'(?:, "bus": "(?:[^"\\]|\\.)*")?(?:, "drive": "(?:[^"\\]|\\.)*")?'
-_STEP = re.compile(rb'"kind": "(?:typed|printed|unsolicited|failed|stop)"[^\n]*')
+_STEP = re.compile(rb'"kind": "(?:typed|printed|unsolicited|failed|stop)"[^\n]*\}(?=\r?$)', re.MULTILINE)
 _KEPT = rb"(?:bus|typed|printed|unsolicited|output|notice|failed|stop|missing)"
 _STEP_PLACE = re.compile(rb'"kind": "[a-z]+"' + _PLACE)
 _BY = tuple(f', "by": "{word}"'.encode() for word in ("operator", "macro", "script"))
@@ -97,7 +97,7 @@ def _back(paths: Sequence[Path], end: int | None = None) -> Iterator[Block]:
                 yield Block(path, begin + cut, data[cut:], session >= 0)
                 if session >= 0:
                     return
-                last = begin + cut if cut else begin
+                last = begin + cut if 0 < cut < len(data) else begin  # else it is in a line that is no entry
 
 
 # A moment

@@ -269,3 +269,25 @@ def test_the_last_position_of_a_drive_is_decoded_without_the_drive(
     motions = known(written(folder / "motion.jsonl", entries), AT.isoformat()).motions
     found = [(each.axis, each.position, each.velocity) for each in motions.get(("p", drive), [])]
     assert [each[: len(wanted)] for each, wanted in zip(found, expected, strict=True)] == expected
+
+
+@pytest.mark.parametrize("size", range(660, 720))
+def test_a_line_that_is_longer_than_a_block_is_passed_over(folder: Path, size: int) -> None:
+    log = written(
+        folder / "long.jsonl", [Entry(AT, "log", "session of process 1"), Entry(AT, "typed", "PR P", "p", "a")]
+    )
+    log.write_bytes(log.read_bytes() + b"x" * (2 * 700) + b"\n" + b"y" * size + b"\n")
+    assert [each.text for each in shown(known(log, "12:00:01").lines)] == ["PR P"]
+    assert len(Run(log).steps) == 1
+
+
+def test_a_torn_line_at_the_end_is_no_step(folder: Path) -> None:
+    entries = [
+        Entry(AT, "log", "session of process 1"),
+        *(Entry(AT, "typed", each, "p", "a") for each in ("PR P", "S")),
+    ]
+    one, other = written(folder / "one.jsonl", entries), written(folder / "torn.jsonl", entries)
+    other.write_bytes(other.read_bytes()[:-9])
+    assert len(Run(other).steps) == 1 and first_difference(Run(one), Run(other)) == (1, None)
+    other.write_bytes(one.read_bytes().replace(b"\n", b"\r\n"))
+    assert first_difference(Run(one), Run(other)) is None
