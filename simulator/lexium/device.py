@@ -12,7 +12,6 @@ from functools import lru_cache, partial
 from typing import NamedTuple
 
 from multidrop.dialects import Diagnostic
-from multidrop.dialects.family import Motion
 from multidrop.dialects.files import split_lines
 from multidrop.dialects.mcode.manual.errors import text as error_text
 from multidrop.dialects.mcode.manual.grammar import LineError, parse, strip
@@ -114,10 +113,6 @@ class MCodeDevice(EventLoop):
         self.advance(now)
         self.motor.stop(now)
         self.execute(f"P={position}", now, immediate=True)
-
-    def motion(self, now: float) -> Motion:
-        """P and V, likewise."""
-        return Motion(self.position(now), self.velocity(now))
 
     @property
     def effort(self) -> Effort:

@@ -333,7 +333,7 @@ def _shadow(device: MCodeDevice, port: MCodePort) -> Shadow:
         port.sent(0.0)
 
     def motion(now: float) -> tuple[Motion, ...]:
-        return (device.motion(now),)
+        return (Motion(device.position(now), device.velocity(now)),)
 
     def awaits(_: str, now: float) -> str | None:  # noqa: ARG001
         return "" if device.homing else None

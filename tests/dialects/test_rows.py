@@ -8,7 +8,7 @@ from multidrop.dialects.rows import rows
 from tests.support.paths import ROOT
 
 TABLES = sorted(each for room in ("dialects", "simulator") for each in (ROOT / room).rglob("*.csv"))
-PAIRS = (["group", "number"], ["name", "each"], ["name", "asks"], ["word", "form"])
+PAIRS = (["group", "number"], ["name", "each"], ["name", "asks"], ["word", "form"], ["of", "value"])
 """The heads of the two cells that are the key of a row together."""
 
 

@@ -274,7 +274,7 @@ def _warnings(made: Assembled, wrong: Container[int]) -> Iterator[Problem]:
         if each.call.command in JUMPS and each.call.value > len(made.lines):
             what = f"the program has no line {each.call.value}"
             yield Problem(each.source, 1, what, f"its lines are 0 to {len(made.lines) - 1}", True)
-        dead = each.call.command in ENDS
+        dead = each.call.command in ENDS and each.source not in wrong
     if made.lines and made.lines[-1].call.command not in ENDS and made.lines[-1].source not in wrong:
         what = "the program runs on past this line, its last one"
         yield Problem(made.lines[-1].source, 1, what, "end it with STOP or JA", True)

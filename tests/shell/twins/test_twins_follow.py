@@ -48,7 +48,12 @@ HOMINGS = {
 }
 
 
-@pytest.mark.parametrize("case", HOMINGS)
+SELDOM = {"MCode to its index", "Modbus", "PMX to a limit", "PMX to its index", "TMCL mode 3", "TMCL mode 5"}
+
+
+@pytest.mark.parametrize(
+    "case", [pytest.param(each, marks=[pytest.mark.nightly] * (each in SELDOM)) for each in HOMINGS]
+)
 async def test_homing_is_no_alarm_and_the_drive_is_followed_after_it(tmp_path: Path, case: str) -> None:
     real, settings, homing, move = HOMINGS[case]
     async with CellSession(tmp_path, bus("b", real)) as cell:
@@ -73,7 +78,9 @@ LIMITS = {
 }
 
 
-@pytest.mark.parametrize("case", LIMITS)
+@pytest.mark.parametrize(
+    "case", [pytest.param(each, marks=[pytest.mark.nightly] * (each in SELDOM)) for each in LIMITS]
+)
 async def test_a_limit_switch_is_learned_where_it_is_met(tmp_path: Path, case: str) -> None:
     real, settings, there, back = LIMITS[case]
     async with CellSession(tmp_path, bus("b", real)) as cell:

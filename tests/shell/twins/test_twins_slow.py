@@ -61,8 +61,10 @@ def moves(family: str, number: int, random: Random) -> list[str]:
     return random.choice([[f"MR {way}"], [f"SL {way}", wait, "SL 0"], [f"SL {way}", wait, f"SL {way // 2}", "SL 0"]])
 
 
-@pytest.mark.parametrize("family", CELLS)
-@pytest.mark.parametrize("minutes", [1, pytest.param(42, marks=pytest.mark.nightly)])
+@pytest.mark.parametrize(
+    ("family", "minutes"),
+    [("TMCL", 1), *(pytest.param(each, 42, marks=pytest.mark.nightly) for each in CELLS)],
+)
 async def test_a_slow_line_is_no_alarm(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, family: str, minutes: int
 ) -> None:

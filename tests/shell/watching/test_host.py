@@ -12,6 +12,7 @@ import sys
 import tempfile
 from collections.abc import AsyncIterator, Iterator
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
@@ -154,7 +155,8 @@ async def test_another_version_is_refused_on_both_sides_with_both_versions(
     assert await asyncio.to_thread(to_end, peer) == greeting()
     await until(lambda: shared.refused)
     assert "is multidrop 9.9, this is " + own in shared.refused[0]
-    monkeypatch.setattr(host_side, "greeting", lambda: older)
+    theirs = SimpleNamespace(**vars(host_side.wire) | {"greeting": lambda: older})
+    monkeypatch.setattr(host_side, "wire", theirs)
     with pytest.raises(Unreachable, match=f"the shared screen is multidrop 9.9, this is {own}; install one version"):
         await asyncio.to_thread(joined, "", shared.folder)
 
