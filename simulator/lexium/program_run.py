@@ -310,7 +310,8 @@ class ProgramRun:
 
     def _summary(self, ended: str, given_up: bool = False, stuck: bool = False) -> Summary:
         device, errors = self._device, tuple(self._errors)
-        position, moving = device.position(device.now), device.velocity(device.now)
+        end = device.motion(device.now)
+        position, moving = end.position, end.velocity
         moves, instructions = device.language.motions.begun, self._interpreter.executed
         line = self._at(self._interpreter.line()).number if self._executed else 0
         failed = f"errors {', '.join(str(each) for each in errors)}" if errors else "no errors"
