@@ -12,6 +12,7 @@ from functools import lru_cache, partial
 from typing import NamedTuple
 
 from multidrop.dialects import Diagnostic
+from multidrop.dialects.family import Motion
 from multidrop.dialects.files import split_lines
 from multidrop.dialects.mcode.manual.errors import text as error_text
 from multidrop.dialects.mcode.manual.grammar import LineError, parse, strip
@@ -104,15 +105,15 @@ class MCodeDevice(EventLoop):
         counters = self.motor.counters
         return counters.shown(counters.source, now)
 
-    @property
-    def homing(self) -> bool:
-        return self.motor.homing_active
-
     def align(self, _: str, position: int, now: float) -> None:
         """Stand at a position."""
         self.advance(now)
         self.motor.stop(now)
         self.execute(f"P={position}", now, immediate=True)
+
+    def motion(self, now: float) -> Motion:
+        """P and V, likewise."""
+        return Motion(self.position(now), self.velocity(now))
 
     @property
     def effort(self) -> Effort:

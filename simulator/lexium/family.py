@@ -333,10 +333,10 @@ def _shadow(device: MCodeDevice, port: MCodePort) -> Shadow:
         port.sent(0.0)
 
     def motion(now: float) -> tuple[Motion, ...]:
-        return (Motion(device.position(now), device.velocity(now)),)
+        return (device.motion(now),)
 
     def awaits(_: str, now: float) -> str | None:  # noqa: ARG001
-        return "" if device.homing else None
+        return "" if device.motor.homing_active else None
 
     return Shadow(rest, motion, device.align, awaits, lambda: {"": device.effort})
 
