@@ -97,7 +97,8 @@ def _keep(path: Path, shop: Cell, told: Mapping[Axis, Mapping[str, float]]) -> N
         for key in ("world", axis):
             if key:
                 if key not in table:
-                    table[key] = tomlkit.table()
+                    inline = isinstance(table, tomlkit.items.InlineTable)
+                    table[key] = tomlkit.inline_table() if inline else tomlkit.table()
                 table = table[key]
         table.update(values)
     text = tomlkit.dumps(document)

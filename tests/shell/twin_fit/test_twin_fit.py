@@ -15,7 +15,8 @@ import pytest
 from multidrop.dialects import Diagnostic, DriveError
 from multidrop.shell.log.writer import SessionLog
 from multidrop.shell.twin_fit.estimate import FRICTION, INERTIA, LOAD, MARGIN, Evidence, Point, estimates
-from multidrop.shell.twin_fit.work import fit
+from multidrop.shell.twin_fit.work import _keep, fit
+from multidrop.simulator import cells
 from multidrop.simulator.cell.spec import WorldSpec
 from multidrop.simulator.family import Effort
 from multidrop.simulator.kinematics import move
@@ -203,3 +204,11 @@ def test_without_scipy_one_line_says_what_to_install(monkeypatch: pytest.MonkeyP
     with pytest.raises(Diagnostic) as raised:
         estimates(measured(HIDDEN[0], ramps(2), 0.0, 1), NEMA17)
     assert str(raised.value) == "twin fit: scipy is missing; pip install 'multidrop[fit]'"
+
+
+def test_a_drive_in_one_line_gets_its_world_there(tmp_path: Path) -> None:
+    path = tmp_path / "cell.toml"
+    drive_ = '{ personality = "LMDCM", name = "a", motor = "nema17" }'
+    path.write_text(f'bus = [ {{ name = "axis", drive = [ {drive_} ] }} ]  # mine\n')
+    _keep(path, cells.load(path), {("axis", "a", ""): {"load": 0.3}})
+    assert cells.load(path).buses[0].drives[0].world.load == 0.3 and path.read_text().endswith("# mine\n")
