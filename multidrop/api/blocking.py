@@ -5,6 +5,7 @@ So it works in a notebook, too, whose own loop runs already.
 
 from __future__ import annotations
 
+import concurrent.futures
 import contextlib
 from collections.abc import Callable, Coroutine
 from functools import update_wrapper
@@ -20,7 +21,7 @@ from multidrop.api.programs import AsyncParameters, AsyncPrograms
 from multidrop.api.sessions import AsyncSession, Notice, log
 from multidrop.api.streams import AsyncStream
 from multidrop.api.telemetry import RATE, AsyncTelemetry, Sample
-from multidrop.api.threads import LoopThread, Notices
+from multidrop.api.threads import Ended, LoopThread, Notices
 from multidrop.dialects import Diagnostic
 from multidrop.drives.telemetry import PERIOD
 from multidrop.shell.events import FAILURES
@@ -127,6 +128,10 @@ class Session:
             return future.result()
         except FAILURES as error:
             raise error.with_traceback(None) from None
+        except (Ended, concurrent.futures.CancelledError):
+            if self._thread.alive:
+                raise
+            raise Diagnostic(*CLOSED) from None  # by another thread, meanwhile
         except (KeyboardInterrupt, SystemExit):  # of this thread: no call raises them
             if future is None or not future.done():
                 self._break_off()
@@ -134,7 +139,7 @@ class Session:
 
     def _break_off(self) -> None:
         """Stop what this session started; it stays open."""
-        with contextlib.suppress(Diagnostic):
+        with contextlib.suppress(Diagnostic, Ended):
             self._thread.begin(self._awaited._break_off()).result()
 
     def _run_there(self, function: Callable[[], T]) -> T:

@@ -16,31 +16,45 @@ END = 5.0
 """The longest wait for the thread to end, s."""
 
 
+class Ended(RuntimeError):
+    """The loop has ended."""
+
+
 class LoopThread:
     """A running event loop. It is a daemon: it never keeps a process from ending."""
 
     def __init__(self) -> None:
         self._loop = new_loop()
+        self._ended, self._ending = False, threading.Lock()
+        """Work begins before the end, or is refused: none is left in a loop that runs no more."""
         self._thread = threading.Thread(target=self._run, daemon=True, name="multidrop")
         self._thread.start()
 
     def _run(self) -> None:
         asyncio.set_event_loop(self._loop)
         self._loop.run_forever()
+        if left := asyncio.all_tasks(self._loop):
+            for task in left:
+                task.cancel()
+            self._loop.run_until_complete(asyncio.gather(*left, return_exceptions=True))
         self._loop.run_until_complete(self._loop.shutdown_asyncgens())
         self._loop.close()
 
     @property
     def alive(self) -> bool:
         """True if the loop runs."""
-        return self._thread.is_alive()
+        return self._thread.is_alive() and not self._ended
 
     def begin(self, work: Coroutine[Any, Any, T]) -> concurrent.futures.Future[T]:
-        """Begin work in the loop, from another thread. Raises RuntimeError from its own."""
+        """Begin work in the loop, from another thread. Raises RuntimeError from its own, Ended after its end."""
         if threading.current_thread() is self._thread:
             work.close()
             raise RuntimeError("a blocking call in the thread of its session would wait for itself")
-        return asyncio.run_coroutine_threadsafe(work, self._loop)
+        with self._ending:
+            if not self._ended:
+                return asyncio.run_coroutine_threadsafe(work, self._loop)
+        work.close()
+        raise Ended
 
     def soon(self, function: Callable[[], object]) -> None:
         """Call a function in the loop, from any thread; an exception of it is the loop's."""
@@ -61,7 +75,9 @@ class LoopThread:
     def end(self) -> None:
         """End the loop and its thread."""
         if self.alive and threading.current_thread() is not self._thread:
-            self._loop.call_soon_threadsafe(self._loop.stop)
+            with self._ending:
+                self._ended = True
+                self._loop.call_soon_threadsafe(self._loop.stop)
             self._thread.join(END)
 
 

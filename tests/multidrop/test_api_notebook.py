@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import asyncio
+import concurrent.futures
 import sys
+import threading
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import ModuleType, SimpleNamespace
@@ -10,8 +13,9 @@ from typing import Any
 
 import pytest
 
-from multidrop import Diagnostic, Session, connect
+from multidrop import Diagnostic, Session, TransportLost, connect
 from multidrop.api import notebook, threads
+from multidrop.api.threads import Ended, LoopThread
 from tests.support.cell_session import bus, moves, party
 from tests.support.virtual import VirtualLoop
 
@@ -109,6 +113,40 @@ def test_a_picture_ends_with_its_session(session: Session, kernel: Kernel, monke
     session.close()
     live._thread.join(10)
     assert not live._thread.is_alive()
+
+
+def test_a_call_of_another_thread_at_the_end_of_its_session_says_that_it_is_closed(url: str) -> None:
+    """However the two meet: each call has its value, or is refused in one line; none waits for ever."""
+    ends: list[object] = []
+
+    def ask(session: Session) -> None:
+        try:
+            while True:
+                session.drive("a").send("PR P")
+        except Exception as problem:  # noqa: BLE001
+            ends.append(problem)
+
+    for _ in range(20):
+        session = connect(url)
+        thread = threading.Thread(target=ask, args=(session,), daemon=True)
+        thread.start()
+        session.close()
+        thread.join(10)
+        assert not thread.is_alive()
+    assert len(ends) == 20 and {type(each) for each in ends} <= {Diagnostic, TransportLost}, ends
+
+
+def test_work_that_begins_with_the_end_of_its_loop_is_refused_or_cancelled() -> None:
+    async def endless() -> None:
+        await asyncio.Event().wait()
+
+    loop = LoopThread()
+    begun = loop.begin(endless())
+    loop.end()
+    with pytest.raises(concurrent.futures.CancelledError):
+        begun.result(10)
+    with pytest.raises(Ended):
+        loop.begin(endless())
 
 
 def test_outside_a_notebook_it_is_refused_in_one_line(url: str) -> None:
