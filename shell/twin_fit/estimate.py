@@ -58,6 +58,8 @@ class Evidence:
     seen: bool = False
     strange: int = 0
     """Lags of more than a full step in a move that has lost none."""
+    odd: Sequence[bool] = ()
+    """For each sample of such a move, whether the cell commands no such velocity near it."""
 
     @property
     def different(self) -> Sequence[Point]:
@@ -71,7 +73,8 @@ class Evidence:
     @property
     def fits(self) -> bool:
         """The moves are those that the cell commands."""
-        return self.strange <= MOST_STRANGE * len(self.points)
+        strange = self.strange > MOST_STRANGE * len(self.points)
+        return not strange and sum(self.odd) <= MOST_STRANGE * len(self.odd)
 
 
 class Estimate(NamedTuple):

@@ -33,6 +33,8 @@ from multidrop.simulator.torque import FULL_STEPS
 
 NEAR = 0.1
 """Seconds between the time of a sample in the log and the moment of its velocity, at most."""
+UNEVEN = 0.01
+"""The part by which a velocity that was read may differ from the commanded one."""
 SETTLED = 0.2
 """Seconds after which a drive is at rest whose velocity was not read."""
 LATE = 0.02
@@ -142,6 +144,7 @@ def evidence(read: Sequence[Reading]) -> Evidence:
     points: list[Point] = []
     moves: dict[Profile, Effort] = {}
     stalled = strange = 0
+    odd: list[bool] = []
     base: float | None = None
     moved: list[Reading] = []
     for each in read:
@@ -160,19 +163,32 @@ def evidence(read: Sequence[Reading]) -> Evidence:
                 ramps = [found for one in moved if (found := _point(one, base)) is not None]
                 points += [each for each in ramps if abs(each.lag) <= 1]
                 strange += sum(abs(each.lag) > 1 for each in ramps)
+                odd += [*map(_odd, moved)]
                 moves |= {one.effort.profile: one.effort for one in moved}
             base, moved = origin, []
     if any(each.lag is not None for each in moved):
         moves |= {one.effort.profile: one.effort for one in moved}
     seen = any(each.effort.measured or each.effort.stalls for each in read)
     moves = {profile: each for profile, each in moves.items() if each.measured or each.lag or each.stalls}
-    return Evidence(points, list(moves.values()), stalled, seen, strange)
+    return Evidence(points, list(moves.values()), stalled, seen, strange, odd)
 
 
 def _rests(reading: Reading) -> bool:
     """Whether an axis is at rest, and commanded to be."""
     wait = SETTLED if reading.velocity is None else 0.0
     return not reading.velocity and reading.effort.profile.end + wait <= reading.at
+
+
+def _odd(reading: Reading) -> bool:
+    """Whether the cell commands no such velocity near the time of the sample, so its settings are others."""
+    profile, count, at = reading.effort.profile, reading.effort.count, reading.at
+    if reading.velocity is None:
+        return False
+    joints = (each for segment in profile.segments for each in (segment.start, segment.end))
+    speeds = [abs(profile.velocity(min(max(each, at - NEAR), at + NEAR))) / count for each in (-inf, *joints, inf)]
+    speed = abs(reading.velocity)  # a PMX says no direction
+    edge = 1 + UNEVEN * speed
+    return not min(speeds) - edge <= speed <= max(speeds) + edge
 
 
 def _point(reading: Reading, origin: float) -> Point | None:

@@ -135,6 +135,7 @@ async def fitted(
         }, path.read_text()
 
 
+IRREGULAR = [line for n in range(7) for line in ("MR 8000", f"/sleep 1.2{n}3", "MR -8000", f"/sleep 1.2{n}7")]
 THERE_AND_BACK = ("MR 8000", "/sleep 1.2", "MR -8000", "/sleep 1.2")
 
 
@@ -142,8 +143,7 @@ THERE_AND_BACK = ("MR 8000", "/sleep 1.2", "MR -8000", "/sleep 1.2")
 async def test_an_encoder_tells_load_and_inertia_and_the_cell_keeps_its_remarks(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    moves = [line for n in range(7) for line in ("MR 8000", f"/sleep 1.2{n}3", "MR -8000", f"/sleep 1.2{n}7")]
-    log = await recorded(tmp_path, axis("load = 0.3\ninertia = 8e-4"), *moves)
+    log = await recorded(tmp_path, axis("load = 0.3\ninertia = 8e-4"), *IRREGULAR)
     jitter = Random(7)
     late = (json.loads(each) for each in log.read_text().splitlines())
     with log.open("w") as file:
@@ -184,11 +184,15 @@ def module(world: str) -> str:
         (lambda world: axis(world, RC=20), ("MR 8000", "/sleep 2"), "12 are needed, 1 move stalled"),
         (lambda world: axis(world, motor="") if not world else axis(world), THERE_AND_BACK, "no motor in the cell"),
         (lambda world: axis(world, A=60000 if world else 50000), THERE_AND_BACK * 3, "not those that the cell"),
+        *(
+            (lambda world, top=top: axis(world, VM=10000 if world else top), IRREGULAR, "not those that the cell")
+            for top in (8000, 9500, 12000, 18000)
+        ),
         (machine, ("X1000", "/sleep 3", "X0", "/sleep 3"), "the drive reports the steps that it commands"),
         (machine, ("SLX=1", "X1000", "/sleep 3", "X0", "/sleep 3"), "12 are needed; at most 0.99"),
         (module, ("MVP ABS, 0, 51200", "/sleep 3"), "the drive reports the steps that it commands"),
     ],
-    ids=["open loop", "stalls", "no motor", "other settings", "PMX", "PMX with StepNLoop", "TMCL"],
+    ids=["open loop", "stalls", "no motor", "other settings", *"abcd", "PMX", "PMX with StepNLoop", "TMCL"],
 )  # fmt: skip
 async def test_a_log_that_does_not_tell_leaves_the_cell_as_it_is(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], make: Callable[[str], str], lines: Sequence[str], why: str
