@@ -208,7 +208,7 @@ class PlantApp(App[int]):
         head: Shown = (
             (f" {row.where}  {':'.join(filter(None, (row.line, row.drive)))}  ", "strong"),
             (row.state, _role(row)),
-            (_host(self), "dim"),
+            (f"   at {self._elsewhere()}", "dim"),
         )
         rows: list[Shown] = []
         for (what, axis), reading in plant.drives[place].items():
@@ -226,10 +226,6 @@ class PlantApp(App[int]):
                 )
             )
         return head, rows
-
-
-def _host(app: PlantApp) -> str:
-    return f"   at {app._elsewhere()}"
 
 
 def _text(row: Row) -> str:

@@ -147,7 +147,7 @@ class Plant:
             self.words.pop(above, None)
         elif word not in (ONLINE, LOST, BYE):
             self.ignored["of no known form"] += 1
-        elif above in self.words or len(self.words) < MOST or self._beyond():
+        elif above in self.words or above in self.publishers or len(self.words) < MOST or self._beyond():
             self.words[above] = word
             if at is not None and (publisher := self.publishers.get(above)) is not None:
                 publisher.heard = at

@@ -219,6 +219,14 @@ def test_millions_of_topics_are_bounded_and_said(desk: Desk) -> None:
     assert f"messages beyond {MOST} drives" in summary(desk.plant, desk.rows)
 
 
+def test_false_states_hide_no_loss_of_a_pc_that_is_shown(desk: Desk) -> None:
+    desk.drive("plant/p/l/a")
+    for number in range(MOST + 1):
+        desk.put(f"plant/false/{number}/status", "online")
+    desk.put("plant/p/status", "lost")
+    assert [row.state for row in desk.rows] == ["PC lost"]
+
+
 def test_what_is_beside_the_topic_is_not_taken(desk: Desk) -> None:
     for topic in ("plants/p/l/a/position", "plant/position", "position", "plant/p/l/a/set", "other/plant/l/a/position"):
         desk.put(topic, {"value": 1})
