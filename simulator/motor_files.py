@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from dataclasses import replace
 from itertools import pairwise
@@ -16,6 +17,8 @@ VALID = ", ".join((*MOTORS, "FILE.csv"))
 MOST_ROWS = 1000
 FASTEST, STRONGEST = 1000.0, 10_000.0
 """The highest speed and torque of a row."""
+_NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)?", re.ASCII | re.IGNORECASE)
+"""A number of a row; `float` would also take `1_0` and digits of other scripts."""
 
 
 def read_motor(table: Table, folder: Folder) -> MotorSpec | None:
@@ -54,10 +57,9 @@ def _rows(table: Table, folder: Folder, name: str) -> Iterator[tuple[float, ...]
         if first:
             continue
         where = f"motor: {name}:{number}"
-        try:
-            speed, torque = map(float, fields)
-        except ValueError:
-            raise table.wrong(where, f"cannot be {quoted(text)}", "valid: rev/s, N m, as in 5, 0.38") from None
+        if len(fields) != 2 or not all(map(_NUMBER.fullmatch, fields)):
+            raise table.wrong(where, f"cannot be {quoted(text)}", "valid: rev/s, N m, as in 5, 0.38")
+        speed, torque = map(float, fields)
         if not (0 <= speed <= FASTEST and 0 <= torque <= STRONGEST):
             hint = f"valid: 0 to {FASTEST:g} rev/s, 0 to {STRONGEST:g} N m"
             raise table.wrong(where, f"is out of range: {quoted(text)}", hint)

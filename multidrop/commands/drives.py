@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import sys
 from collections.abc import Awaitable, Callable
 from functools import partial
 from pathlib import Path
@@ -33,15 +34,28 @@ DIFFERS = 1
 
 
 def twin_fit(chosen: argparse.Namespace) -> int:
-    """Fit a cell to a log, in virtual time; report a wrong file before anything is opened."""
+    """Fit a cell to a log, in virtual time; report a wrong file before anything is opened.
+
+    The cell is written once all output is. Raises Diagnostic.
+    """
     from multidrop.shell.batch.replay import VirtualLoop
     from multidrop.shell.log import steps
+    from multidrop.shell.streams import stdout
     from multidrop.shell.twin_fit.work import fit
 
     log, cell = Path(chosen.log), Path(chosen.cell.removeprefix("sim:"))
     steps.read(log)
-    body = partial(fit, log=log, cell=cell, as_json=chosen.json)
-    return runner.run([f"sim:{cell}"], body, unsolicited=False, replies=False, loop=VirtualLoop)
+    found: list[Callable[[], None]] = []
+
+    async def body(session: Session) -> None:
+        found.append(await fit(session, log, cell, chosen.json))
+
+    code = runner.run([f"sim:{cell}"], body, unsolicited=False, replies=False, loop=VirtualLoop)
+    if not code and stdout.dropped:
+        stdout.write(sys.stderr, f"{cell} is unchanged: its values could not be shown")
+    elif not code:
+        found[0]()
+    return code
 
 
 def list_(chosen: argparse.Namespace) -> int:

@@ -302,11 +302,12 @@ def _target(session: Session, place: tuple[str, str], places: Sequence[tuple[str
     name, address = place
     if name not in session.buses and len({bus for bus, _ in places}) == len(session.buses) == 1:
         name = next(iter(session.buses))
-    if name not in session.buses:
-        raise Diagnostic(f"the log has a bus {name}", hint=f"open: {', '.join(session.buses)}")
-    bus = session.buses[name]
-    if address in bus.drives or address in EVERYONE:
+    bus = session.buses.get(name)
+    if bus is not None and (address in bus.drives or address in EVERYONE):
         return session.drive(name, address)
-    if len(bus.drives) == 1 and len([each for each in places if each[0] == place[0]]) == 1:
+    if bus is not None and len(bus.drives) == 1 and len([each for each in places if each[0] == place[0]]) == 1:
         return next(iter(bus.drives.values()))
-    raise Diagnostic(f"the log has a drive {join_target(*place)}", hint=f"on {name}: {', '.join(bus.drives)}")
+    logged = ", ".join(join_target(*each) for each in places if each[1] not in EVERYONE)
+    opened = ", ".join(join_target(each, drive) for each, its in session.buses.items() for drive in its.drives)
+    what = f"a bus {place[0]}" if bus is None else f"a drive {join_target(*place)}"
+    raise Diagnostic(f"the log has {what}", hint=f"drives of the log: {logged or 'none'}; open: {opened or 'none'}")

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from functools import partial
 from math import inf
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -27,8 +28,8 @@ if TYPE_CHECKING:
     from multidrop.shell.session import Session
 
 
-async def fit(session: Session, log: Path, cell: Path, as_json: bool) -> None:
-    """Fit the drives of an open cell to a log, print what was found, and put it into the cell's file.
+async def fit(session: Session, log: Path, cell: Path, as_json: bool) -> Callable[[], None]:
+    """Fit the drives of an open cell to a log, and print what was found; return what puts it into the cell's file.
 
     Raises Diagnostic for a log or a cell that is not one, DriveError where nothing can be told.
     """
@@ -47,9 +48,7 @@ async def fit(session: Session, log: Path, cell: Path, as_json: bool) -> None:
     told = {axis: values for axis, values in told.items() if values}
     if not told:
         raise DriveError(f"{log} tells no value; {cell} is unchanged")
-    _keep(cell, shop, told)
-    for axis, values in told.items():
-        session.notify(f"{cell}: {', '.join(values)} of {_name(axis)} written", outcome=True)
+    return partial(_keep, cell, shop, told)
 
 
 def _line(axis: Axis, name: str, known: Estimate | None, seen: Evidence, as_json: bool) -> str:
@@ -107,3 +106,5 @@ def _keep(path: Path, shop: Cell, told: Mapping[Axis, Mapping[str, float]]) -> N
         write_atomically(path, text.encode())
     except OSError as problem:
         raise Diagnostic(f"cannot be written: {why(problem)}", str(path)) from None
+    for own, values in told.items():
+        write(sys.stderr, f"{path}: {', '.join(values)} of {_name(own)} written")

@@ -182,7 +182,8 @@ async def test_real_drives_and_what_moves_them_are_listed_and_asked_about(tmp_pa
 async def test_a_drive_or_bus_that_is_not_there_is_named_before_anything_is_sent(tmp_path):
     async with Cell(tmp_path, PRESS, bus("line", party("x"))) as cell:
         for place, text in ((("c", "press"), "drive press:c"), (("a", "other"), "bus other")):
-            with pytest.raises(Diagnostic, match=f"the log has a {text}"):
+            both = f"drives of the log: press:a, {place[1]}:{place[0]}; open: press:a, press:b, line:x$"
+            with pytest.raises(Diagnostic, match=f"the log has a {text}; {both}"):
                 await taken(cell, tmp_path, typed("MR 100"), typed("MR 100", drive=place[0], bus=place[1]))
         await taken(cell, tmp_path, typed("PR R1", "0", drive="c", bus="line"))
         assert cell.lines() == ["@line:x PR R1"]

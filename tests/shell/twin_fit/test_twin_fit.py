@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
+from argparse import Namespace
 from collections.abc import Callable, Sequence
 from datetime import datetime, timedelta
 from math import asin, pi
@@ -12,8 +13,12 @@ from random import Random
 
 import pytest
 
+from multidrop.commands.drives import twin_fit
 from multidrop.dialects import Diagnostic, DriveError
+from multidrop.shell.batch import runner
+from multidrop.shell.log.files import Entry, line_of
 from multidrop.shell.log.writer import SessionLog
+from multidrop.shell.streams import stdout
 from multidrop.shell.twin_fit.estimate import FRICTION, INERTIA, LOAD, MARGIN, Evidence, Point, estimates
 from multidrop.shell.twin_fit.work import _keep, fit
 from multidrop.simulator import cells
@@ -126,7 +131,9 @@ async def fitted(
         capsys.readouterr()
         path = Path(folder / "now" / "cell.toml")
         try:
-            await fit(cell.session, log, path, as_json=True)
+            keep = await fit(cell.session, log, path, as_json=True)
+            assert path.read_text() == mine, "the output comes first"
+            keep()
         except DriveError as failure:
             assert "tells no value" in str(failure) and path.read_text() == mine
         facts = [json.loads(each) for each in capsys.readouterr().out.splitlines()]
@@ -216,3 +223,17 @@ def test_a_drive_in_one_line_gets_its_world_there(tmp_path: Path) -> None:
     path.write_text(f'bus = [ {{ name = "axis", drive = [ {drive_} ] }} ]  # mine\n')
     _keep(path, cells.load(path), {("axis", "a", ""): {"load": 0.3}})
     assert cells.load(path).buses[0].drives[0].world.load == 0.3 and path.read_text().endswith("# mine\n")
+
+
+def _done(*_: object, **__: object) -> int:
+    return 0
+
+
+def test_a_cell_stays_as_it_is_where_the_output_is_lost(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "day.log").write_bytes(line_of(Entry(datetime.now().astimezone(), "log", "session of process 1")))
+    monkeypatch.setattr(runner, "run", _done)
+    monkeypatch.setattr(stdout, "dropped", ["the output cannot be written: No space left on device"])
+    assert twin_fit(Namespace(log=str(tmp_path / "day.log"), cell="sim:cell.toml", json=False)) == 0
+    assert capsys.readouterr().err == "cell.toml is unchanged: its values could not be shown\n"
