@@ -28,6 +28,9 @@ from multidrop.shell.raw import text_of
 from multidrop.shell.streams.stdout import lose, write
 
 if TYPE_CHECKING:
+    from datetime import datetime
+
+    from multidrop.shell.log.moments import Known, Moments
     from multidrop.shell.session import Session
 
 NOTHING_FOUND = 1
@@ -39,6 +42,8 @@ PERIOD = 0.1
 """The time between two looks at a log that is followed, s."""
 LONGEST = 200
 """The bytes in one line, where no end of line came."""
+MOST_BACKS = 3
+"""The times when the clock was set back that are named."""
 LAST = 10
 """The entries before the end with which following begins."""
 
@@ -118,37 +123,63 @@ def at(chosen: argparse.Namespace) -> int:
     from multidrop.shell.log import moments
 
     found = moments.known(_path(chosen), chosen.time)
-    session = "" if found.session is None else found.session.text
-    fact: dict[str, object] = {"at": found.at.isoformat(), "file": str(found.path), "session": session}
-    fact |= {"since": None if found.session is None else found.session.time.isoformat()}
-    fact |= {"stopped": None if found.stopped is None else found.stopped.time.isoformat()}
-
-    measured = [(place, each) for place, motions in found.motions.items() for each in motions]
-    samples = [
-        {"time": each.at.isoformat(), "bus": bus, "drive": drive, "axis": each.axis, "position": each.position}
-        | {"velocity": each.velocity}
-        for (bus, drive), each in measured
-    ]
 
     def work() -> None:
-        if chosen.json:
-            write(sys.stdout, json.dumps({"moment": fact}), *(line.data.decode().rstrip("\n") for line in found.lines))
-            write(sys.stdout, *(json.dumps({"sample": each}) for each in samples))
-            return
-        begun = "" if found.session is None else f": {session} since {_stamp(found.session)}"
-        write(sys.stdout, f"{found.path} at {found.at.isoformat(' ', 'milliseconds')[:STAMP]}{begun}")
-        if found.last is not None:
-            write(sys.stdout, f"the log ends at {_stamp(found.last)}")
-        if found.stopped is not None:
-            write(sys.stdout, f"stopped since {_stamp(found.stopped)}")
-        write(sys.stdout, *(text(line.entry) for line in found.lines if line.entry is not None))
-        for place, each in measured:
-            velocity = "" if each.velocity is None else f", velocity {each.velocity}"
-            axis = each.axis and f" {each.axis}"
-            moment = each.at.isoformat(" ", "milliseconds")[:STAMP]
-            write(sys.stdout, f"{moment} =  {visible(join_target(*place))}{axis} position {each.position}{velocity}")
+        if found.backs and not chosen.json:
+            write(sys.stdout, _set_back(found))
+        for each in found.known:
+            write(sys.stdout, *(_objects(each, found) if chosen.json else _lines(each)))
 
     return _reported(work)
+
+
+def _set_back(found: Moments) -> str:
+    """The times when the clock of a log was set back, and what of the log is shown therefore, in one line."""
+    backs = [f"{_time(before)} to {_time(after)}" for before, after in found.backs[-MOST_BACKS:]]
+    more = len(found.backs) - len(backs)
+    times = ", ".join(([f"{more} more"] if more else []) + backs)
+    if found.total == 1:
+        return f"the clock was set back in this log, from {times}; it has this time once"
+    shown = "all" if found.total == len(found.known) else f"the last {len(found.known)}"
+    return f"the clock was set back in this log, from {times}; it has this time {found.total} times: {shown} are shown"
+
+
+def _objects(found: Known, all_: Moments) -> Iterator[str]:
+    """A moment as JSON: its facts, the entries, and a sample for each axis."""
+    session, stopped = found.session, found.stopped
+    fact: dict[str, object] = {"at": found.at.isoformat(), "file": str(found.path)}
+    fact |= {"session": "" if session is None else session.text}
+    fact |= {"since": None if session is None else session.time.isoformat()}
+    fact |= {"stopped": None if stopped is None else stopped.time.isoformat()}
+    if all_.backs:
+        backs = [[each.isoformat() for each in both] for both in all_.backs]
+        fact |= {"clock_set_back": backs, "moments": all_.total}
+    yield json.dumps({"moment": fact})
+    yield from (line.data.decode().rstrip("\n") for line in found.lines)
+    for (bus, drive), motions in found.motions.items():
+        for each in motions:
+            sample = {"time": each.at.isoformat(), "bus": bus, "drive": drive, "axis": each.axis}
+            yield json.dumps({"sample": sample | {"position": each.position, "velocity": each.velocity}})
+
+
+def _lines(found: Known) -> Iterator[str]:
+    """A moment for a person."""
+    begun = "" if found.session is None else f": {found.session.text} since {_stamp(found.session)}"
+    yield f"{found.path} at {_time(found.at)}{begun}"
+    if found.last is not None:
+        yield f"the log ends at {_stamp(found.last)}"
+    if found.stopped is not None:
+        yield f"stopped since {_stamp(found.stopped)}"
+    yield from (text(line.entry) for line in found.lines if line.entry is not None)
+    for place, motions in found.motions.items():
+        for each in motions:
+            velocity = "" if each.velocity is None else f", velocity {each.velocity}"
+            axis = each.axis and f" {each.axis}"
+            yield f"{_time(each.at)} =  {visible(join_target(*place))}{axis} position {each.position}{velocity}"
+
+
+def _time(moment: datetime) -> str:
+    return moment.isoformat(" ", "milliseconds")[:STAMP]
 
 
 def bisect(chosen: argparse.Namespace) -> int:

@@ -106,5 +106,5 @@ def _keep(path: Path, shop: Cell, told: Mapping[Axis, Mapping[str, float]]) -> N
         write_atomically(path, text.encode())
     except OSError as problem:
         raise Diagnostic(f"cannot be written: {why(problem)}", str(path)) from None
-    for own, values in told.items():
-        write(sys.stderr, f"{path}: {', '.join(values)} of {_name(own)} written")
+    for place, values in told.items():
+        write(sys.stderr, f"{path}: {', '.join(values)} of {_name(place)} written")

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import re
 from collections import defaultdict
 from collections.abc import Iterator, Sequence
 from datetime import UTC, datetime, timedelta, timezone
 from pathlib import Path
+from typing import IO
 
 import pytest
 from hypothesis import given
@@ -14,7 +16,7 @@ from hypothesis import strategies as st
 from multidrop.dialects import Diagnostic
 from multidrop.shell.log import moments
 from multidrop.shell.log.files import Entry, Line, line_of, lines
-from multidrop.shell.log.moments import Run, first_difference, known, moment
+from multidrop.shell.log.moments import BACK, Known, Run, first_difference, moment
 from tests.support.examples import examples
 
 AT = datetime(2026, 11, 22, 12, 0, tzinfo=UTC)
@@ -28,7 +30,6 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
     """A folder; blocks are small in it, so that a short log has many."""
     with pytest.MonkeyPatch.context() as patched:
         patched.setattr(moments, "BLOCK", 700)
-        patched.setattr(moments, "NEAR", 200)
         yield tmp_path_factory.mktemp("logs")
 
 
@@ -59,6 +60,13 @@ def logs(draw: st.DrawFn) -> list[Entry]:
             text = "aPR P\n" if kind in ("sent", "received") else draw(TEXTS)
             found.append(Entry(now, kind, text, bus, drive, poll=kind in ("sent", "received")))
     return found
+
+
+def known(path: Path, text: str) -> Known:
+    """What was known at a time that a log has once."""
+    found = moments.known(path, text)
+    assert (found.total, found.backs) == (1, [])
+    return found.known[0]
 
 
 def shown(found: Sequence[Line]) -> list[Entry]:
@@ -129,20 +137,89 @@ def test_times(folder: Path) -> None:
         "12:00:30": last,
         "12:00:31": last.replace(day=21, second=31),
         "11:59": last.replace(hour=11, minute=59, second=0),
+        "12:00:31+01:00": last.replace(day=21, second=31),
         "2026-11-20 08:00:00.250": datetime(2026, 11, 20, 8, 0, 0, 250000, tzinfo=last.tzinfo),
         "2026-11-22T11:00:00+00:00": datetime(2026, 11, 22, 11, 0, tzinfo=UTC),
     }.items():
-        assert moment(text, first, last) == expected, text
-    assert moment("12:01", last, last) == last.replace(minute=1, second=0)  # after the end of a short log
-    with pytest.raises(Diagnostic, match=r"^log at: 'noon' is not a time; as in 11:37:05.2"):
-        moment("noon", first, last)
+        zoned = "+" in text
+        assert moment(text, first, last) == (expected if zoned else expected.replace(tzinfo=None)), text
+    after = moment("12:01", last, last)  # after the end of a short log
+    assert after == last.replace(minute=1, second=0, tzinfo=None)
+    for text in ("noon", "0001-01-01T00:00+00:00"):
+        with pytest.raises(Diagnostic, match=rf"^log at: '{re.escape(text)}' is not a time; as in 11:37:05.2"):
+            moment(text, first, last)
+
+
+def steps(*times: tuple[datetime, str]) -> list[Entry]:
+    """A session with a line at each time."""
+    head = Entry(times[0][0], "log", "session of process 1", marks=True)
+    return [head, *(Entry(at, "typed", text, "p", "a") for at, text in times)]
+
+
+@pytest.mark.parametrize("parts", [1, 2, 3])
+def test_a_clock_that_was_set_back_passes_a_time_again(folder: Path, parts: int) -> None:
+    def clock(hour: int, minute: int = 0) -> datetime:
+        return AT.replace(hour=hour, minute=minute)
+
+    entries = steps((clock(10), "1"), (clock(11), "2"), (clock(12), "3"), (clock(11, 5), "4"), (clock(11, 45), "5"))
+    stop, resume = Entry(clock(12), "stop", "stop of every drive"), Entry(clock(11, 4), "typed", "/resume")
+    path = written(folder / "set.jsonl", [*entries[:4], stop, resume, *entries[4:]], parts)
+    for at, texts in {
+        "10:30": ["1"],  # the clock passed it once
+        "11:02": ["2"],
+        "11:30": ["2", "4"],
+        "11:50": ["2", "5"],
+        "12:30": ["5"],
+    }.items():
+        found = moments.known(path, at)
+        assert [[each.text for each in shown(one.lines) if each.drive] for one in found.known] == [[t] for t in texts]
+        assert found.total == len(texts) and found.backs == [(clock(12), clock(11, 4))], at
+        assert [one.stopped for one in found.known] == [None] * len(texts), "it was resumed, by an earlier clock"
+        assert [one.last is not None for one in found.known] == [text == "5" for text in texts]
+
+
+def test_a_time_without_a_zone_is_the_clock_as_it_was_shown(folder: Path) -> None:
+    summer, winter = timezone(timedelta(hours=2)), timezone(timedelta(hours=1))
+    times = [datetime(2026, 10, 25, *at, tzinfo=zone) for *at, zone in ((1, summer), (2, 30, summer), (2, 5, winter))]
+    path = written(folder / "summer.jsonl", steps(*zip(times, "123", strict=True)))
+    autumn = moments.known(path, "02:20")
+    assert [one.at.tzinfo for one in autumn.known] == [summer, winter] and len(autumn.backs) == 1
+    assert [each.text for each in shown(known(path, "2026-10-25 02:45+02:00").lines)] == ["2"]
+    assert [each.text for each in shown(moments.known(path, "01:10").known[0].lines)] == ["1"]
+
+
+def test_times_of_threads_in_another_order_are_one_moment(folder: Path) -> None:
+    times = [AT + timedelta(seconds=second) for second in (0, 0.9, 0.1, 0.8, 2)]
+    path = written(folder / "threads.jsonl", steps(*zip(times, "12345", strict=True)))
+    assert [each.text for each in shown(known(path, "12:00:00.5").lines)] == ["3"] and timedelta(seconds=0.9) < BACK
+
+
+def test_a_log_that_is_rotated_meanwhile_is_read_again(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = written(folder / "turn.jsonl", steps(*((AT, str(number)) for number in range(60))), 2)
+    rotations = [1]
+    opened = moments._opened
+
+    def rotating(part: Path) -> IO[bytes]:
+        if rotations:
+            rotations.pop()
+            for number in (1, 0):
+                path.with_name(f"{path.name}.{number}" if number else path.name).rename(f"{path}.{number + 1}")
+            path.write_bytes(line_of(Entry(AT, "typed", "last", "p", "a")))
+        return opened(part)
+
+    monkeypatch.setattr(moments, "_opened", rotating)
+    run = Run(path)
+    assert len(run.steps) == 61
+    path.write_bytes(b"")
+    with pytest.raises(Diagnostic, match="was rotated while it was read; try again$"):
+        run.line(60)
 
 
 @given(st.binary(max_size=300))
 def test_any_file_is_read_or_refused(folder: Path, data: bytes) -> None:
     path = folder / "any.jsonl"
     path.write_bytes(data)
-    for read in (lambda: known(path, "12:00"), lambda: Run(path)):
+    for read in (lambda: moments.known(path, "12:00"), lambda: Run(path)):
         with pytest.raises(Diagnostic):
             read()
 
