@@ -2,7 +2,8 @@
 
 Theory of operation. Each connection is a client of its own: paho's own reconnection gives no reason for a failure. paho
 has a thread; its events are handed to the event loop. Every message is sent at QoS 1. Those that the broker has not
-acknowledged are known, so that the next connection sends them again. A client that publishes never subscribes.
+acknowledged are known, so that the next connection sends them again. A client that publishes never subscribes. paho
+bounds nothing that a broker sends; the socket does (`_Guarded`), before paho makes room for a packet.
 """
 
 from __future__ import annotations
@@ -10,6 +11,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import os
+import socket
 import ssl
 import struct
 from collections import deque
@@ -107,6 +109,10 @@ LONGEST = 65535
 """Bytes of a user or a password."""
 LEAVE = 1.0
 """The longest time to disconnect, s."""
+LARGEST = 4 << 20
+"""Bytes of a packet from a broker, at most."""
+KINDS = {0x20: "CONNACK", 0x30: "PUBLISH at QoS 0", 0x40: "PUBACK", 0x90: "SUBACK", 0xD0: "PINGRESP"}
+"""The packets that a broker has a reason to send: none of them waits for a reply of ours, or is kept by paho."""
 
 
 def load(who: str = "publish") -> Any:
@@ -156,6 +162,8 @@ class Connection:
         self._full = False
         self.lost = asyncio.Event()
         """Set at the end of the connection."""
+        self.refused = ""
+        """The packet for which the connection was ended, in a line."""
         self.on_room: Callable[[], None] = lambda: None
         """Called in the event loop once there is room after `publish` has refused a message."""
 
@@ -195,6 +203,7 @@ class Connection:
         if self._take is not None:
             client.on_message = lambda _client, _data, message: self._taken(message)
             client.on_subscribe = lambda _client, _data, _number, reasons, _: self._call(self._subscribed, reasons)
+        client.on_socket_open = lambda _client, _data, opened: opened.guard(self._refuse)
         client.max_inflight_messages_set(WINDOW)
         client.on_connect = lambda client, _data, _flags, reason, _properties: self._connected(client, reason)
         client.on_disconnect = lambda *_: self._call(self._ended)
@@ -244,8 +253,14 @@ class Connection:
         with contextlib.suppress(UnicodeDecodeError):  # such a topic is none of ours
             self._take(message.topic, message.payload, message.retain)
 
+    def _refuse(self, what: str) -> None:
+        """Note why the connection ends now, in paho's thread."""
+        self.refused = f"the broker at {self._where} sent {what}"
+
     def _ended(self) -> None:
         self.lost.set()
+        if self.refused and not self._accepted.done():
+            self._accepted.set_exception(Unreachable(self.refused))
         if not self._accepted.done():
             wants = "it may want cert and key under [mqtt]"
             hint = wants if self._target.encrypted else "mqtts:// is the encrypted form of mqtt://"
@@ -312,11 +327,64 @@ def _log_in(client: Client, target: Target, settings: MqttSettings) -> None:
         raise Diagnostic(f"the login is too long; MQTT has room for {LONGEST} bytes")
     if user:
         client.username_pw_set(user, secret or None)
-    if target.encrypted:
-        client.tls_set_context(_context(settings))
+    client.tls_set_context(_context(settings) if target.encrypted else _Plain())  # type: ignore[arg-type]
 
 
-class _Socket(ssl.SSLSocket):
+class _Guarded:
+    """A socket that ends its connection at a packet that is too long, or that a broker has no reason to send."""
+
+    _head = b""
+    _left = 0
+    """The bytes of the packet that are still to come."""
+
+    def guard(self, refuse: Callable[[str], None]) -> None:
+        """Tell a packet that is refused to `refuse`, in the reading thread."""
+        self._refuse = refuse
+
+    def recv(self, buflen: int = 1024, flags: int = 0) -> bytes:
+        """Read. Raises OSError."""
+        data: bytes = super().recv(buflen, flags)  # type: ignore[misc]
+        skipped = min(self._left, len(data))
+        self._left -= skipped
+        for byte in data[skipped:]:  # mostly one, as paho reads the head of a packet
+            self._take(byte)
+        return data
+
+    def _take(self, byte: int) -> None:
+        if self._left:
+            self._left -= 1
+            return
+        if not self._head and byte & 0xF6 not in KINDS:  # less the marks of a retained message and a second one
+            self._end(f"a packet of kind 0x{byte:02x}, which nothing here asked for")
+        self._head += bytes([byte])
+        if len(self._head) > 1 and byte < 0x80:
+            self._left = sum((each & 0x7F) << 7 * n for n, each in enumerate(self._head[1:]))
+            self._head = b""
+            if self._left > LARGEST:
+                self._end(f"a packet of {self._left / 2**20:.0f} MB; the limit is {LARGEST >> 20} MB")
+
+    def _end(self, what: str) -> None:
+        self._refuse(what)
+        raise ConnectionAbortedError(what)
+
+
+class _PlainSocket(_Guarded, socket.socket):
+    """A socket without encryption."""
+
+    def do_handshake(self, block: bool = False) -> None:
+        """Agree on nothing."""
+
+
+class _Plain:
+    """Makes sockets without encryption; paho takes a socket of another class from a context only."""
+
+    check_hostname = True  # there is no certificate to check
+
+    def wrap_socket(self, made: socket.socket, **_: object) -> _PlainSocket:
+        return _PlainSocket(fileno=made.detach())
+
+
+class _Socket(_Guarded, ssl.SSLSocket):
     """A socket that is closed where its handshake fails; paho leaves it open."""
 
     def do_handshake(self, block: bool = False) -> None:

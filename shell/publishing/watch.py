@@ -16,9 +16,10 @@ from multidrop.shell.events import FAILURES
 from multidrop.shell.exit_codes import exit_code
 from multidrop.shell.prompt.keyboard import on_signals
 from multidrop.shell.publishing.broker import Connection, Target, fresh_name, load, parse_target
-from multidrop.shell.publishing.plant import LONGEST, Plant, Row
+from multidrop.shell.publishing.plant import LONGEST, TOPIC, Plant, Row
 from multidrop.shell.publishing.publisher import again, connected, over
 from multidrop.shell.streams.stdout import finish, nonblocking, report, write
+from multidrop.transports import Unreachable
 
 INBOX = 5000
 """Messages that wait for `drain`; beyond, the oldest are dropped and counted."""
@@ -38,6 +39,8 @@ class Watch:
         self._loop = asyncio.get_running_loop()
         self.plant, self.target = Plant(target.prefix, self._loop.time()), target
         self.lost = False
+        self.left = ""
+        """Why the broker was left for good; empty: it was not."""
         self._notify = notify
         self._make = lambda: Connection(target, settings.mqtt, None, fresh_name(), self._take)
         self._waiting: deque[tuple[str, bytes, bool, float]] = deque(maxlen=INBOX)
@@ -55,7 +58,7 @@ class Watch:
     def _take(self, topic: str, payload: bytes, retained: bool) -> None:
         """Queue a message, in the thread of the connection."""
         self._dropped += len(self._waiting) == INBOX
-        self._waiting.append((topic, payload[: LONGEST + 1], retained, self.now))
+        self._waiting.append((topic[: TOPIC + 1], payload[: LONGEST + 1], retained, self.now))
 
     @property
     def now(self) -> float:
@@ -79,6 +82,10 @@ class Watch:
                 await connection.lost.wait()
                 self.lost = True
                 self.plant.lost(self.now)
+                if connection.refused:
+                    self.left = f"{connection.refused}; it is left, and every age is unknown now"
+                    self._notify(self.left)
+                    return
                 self._notify("the broker is lost: the age of every value is unknown; it is tried again")
                 await connection.close()
                 connection = await again(self._make, self._notify)
@@ -113,7 +120,7 @@ async def _run(url: str, as_json: bool) -> int:
                     await _print(watch, as_json, over)
             finally:
                 await watch.end()
-            return 0
+            return exit_code(Unreachable(watch.left)) if watch.left else 0
         except FAILURES as failure:
             write(sys.stderr, report(failure))
             return exit_code(failure)
@@ -134,10 +141,10 @@ async def begun(watch: Watch, over: asyncio.Event) -> bool:
 
 
 async def _print(watch: Watch, as_json: bool, over: asyncio.Event) -> None:
-    """Print rows as they change. Raises nothing; ends with a signal."""
+    """Print rows as they change, until a signal, or until the broker is left."""
     loop, shown, said = asyncio.get_running_loop(), dict[object, Row](), ""
     due = loop.time() + PRINT
-    while not over.is_set():
+    while not (over.is_set() or watch.left):
         await asyncio.sleep(DRAIN)
         watch.drain()
         if loop.time() < due:

@@ -264,10 +264,10 @@ class RawBroker:
                 pass
 
 
-def published(topic: bytes, payload: bytes) -> bytes:
+def published(topic: bytes, payload: bytes, kind: int = 0x30) -> bytes:
     body = len(topic).to_bytes(2) + topic + payload
     length = bytes([len(body)]) if len(body) < 128 else bytes([len(body) % 128 + 128, len(body) // 128])
-    return b"\x30" + length + body
+    return bytes([kind]) + length + body
 
 
 async def test_a_broker_that_refuses_to_be_read_is_said() -> None:
@@ -280,26 +280,32 @@ async def test_a_broker_that_refuses_to_be_read_is_said() -> None:
 
 
 @pytest.mark.parametrize(
-    "rest",
+    ("rest", "refused"),
     [
-        b"\x30\xff\xff\xff\xff\xff",  # a length that never ends
-        b"\x30\x00",  # a publication without a topic
-        b"\x30\x02\xff\xff",  # a topic longer than its message
-        b"\x32\x03\x00\x01a",  # no number at QoS 1
-        b"\x00\x00\xf0\x00\x50\x01\x00",
-        b"\x40\x00\x62\x00\x70\x00",
-        b"\x20\x02\x00\x05" * 3,
-        b"\x36\x05\x00\x01abc",
+        (b"\x30\xff\xff\xff\xff\xff", ""),  # a length that never ends
+        (b"\x30\x00", ""),  # a publication without a topic
+        (b"\x30\x02\xff\xff", ""),  # a topic longer than its message
+        (b"\x40\x00", ""),
+        (b"\x20\x02\x00\x05" * 3, ""),
+        (b"\x30\xff\xff\xff\x7f", "a packet of 256 MB; the limit is 4 MB"),
+        (b"\x90\x81\x80\x80\x02", "a packet of 4 MB; the limit is 4 MB"),
+        (published(b"t", b"x", 0x34), "a packet of kind 0x34, which nothing here asked for"),  # QoS 2 is kept by paho
+        (b"\x32\x03\x00\x01a", "a packet of kind 0x32, which nothing here asked for"),
+        (b"\x00\x00\xf0\x00\x50\x01\x00", "a packet of kind 0x00, which nothing here asked for"),
+        (b"\x62\x00", "a packet of kind 0x62, which nothing here asked for"),
     ],
 )
-async def test_what_is_not_mqtt_is_a_lost_broker_and_no_crash(rest: bytes) -> None:
+async def test_what_is_not_mqtt_or_without_limit_ends_the_connection(rest: bytes, refused: str) -> None:
     good = published(b"plant/p/l/a/position", b'{"value": 1}')
     broker = RawBroker(SUBACK, good + published(b"plant/\xff\xfe/l/a/position", b'{"value": 2}') + rest)
     watch, said = await watched(broker.port)
     await watch.begin()
     await until(lambda: (watch.drain(), watch.rows())[1])
-    await until(lambda: watch.lost or len(said) > 0 or not rest.strip(b"\x00"))
-    assert said[0].startswith("the broker is lost: the age of every value is unknown") and len(watch.rows()) == 1
+    await until(lambda: said)
+    lost = "the broker is lost: the age of every value is unknown"
+    left = f"the broker at 127.0.0.1:{broker.port} sent {refused}; it is left, and every age is unknown now"
+    assert said[0].startswith(left if refused else lost) and len(watch.rows()) == 1
+    assert bool(watch.left) == bool(refused) and watch.lost
     await watch.end()
     broker.server.close()
 
