@@ -83,8 +83,11 @@ class Selection:
         main, current = self._main, self._session.selected_bus
         self.shown = self._session.place
         if current != main.current or current not in main.pages:
-            if main.current == "" and "" in main.pages and current:
-                self._model.bus(current).fresh.extendleft(reversed(main.pages[""].records))
+            if main.current == "" and current:
+                early = [*main.pages[""].records] if "" in main.pages else []
+                if "" in self._model.buses:
+                    early += self._model.buses.pop("").fresh  # no frame has shown these
+                self._model.bus(current).fresh.extendleft(reversed(early))
                 main.adopt_page(current)
             main.show_page(current)
         main.set_label(self._label())

@@ -13,7 +13,10 @@ from textual.keys import _character_to_key
 from textual.pilot import Pilot
 
 from multidrop.dialects.mcode.host.framing import sealed
+from multidrop.shell.configuration import Settings
+from multidrop.shell.session import Session
 from multidrop.tui.app import MultidropApp
+from multidrop.tui.assist import Assist
 from tests.support.fake_session import driver_of
 from tests.support.real_screen import real_screen, until
 
@@ -154,3 +157,20 @@ async def test_raw_mode_shows_the_bytes_and_names_the_bus(tmp_path: Path) -> Non
         await until(pilot, lambda: "06 30 D0 0D 0A" in transcript(pilot))
         typed(pilot, "/raw off", "enter")
         await until(pilot, lambda: "a ▸" in app_of(pilot).main.lines("label").plain)
+
+
+async def test_what_no_frame_showed_before_a_bus_was_there_is_on_its_page(
+    tmp_path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    settings = Settings(folder=tmp_path / "config", state=tmp_path / "state")
+    session = Session(settings)
+    app = MultidropApp(session, [], Assist(session, settings))
+    async with app.run_test(size=(80, 24)) as pilot:
+        with monkeypatch.context() as patch:
+            patch.setattr(app.presenter, "take_records", print)
+            app.show_line("this is said early")
+            await session.open("sim:#press")
+            await until(pilot, lambda: app.main.current == "press")
+        await until(pilot, lambda: "press: a b c" in transcript(pilot))
+        assert "this is said early" in transcript(pilot)
+    await session.close()
