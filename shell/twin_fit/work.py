@@ -33,13 +33,18 @@ async def fit(session: Session, log: Path, cell: Path, as_json: bool) -> Callabl
 
     Raises Diagnostic for a log or a cell that is not one, DriveError where nothing can be told.
     """
-    found, shop = steps.read(log), cells.load(cell, session.settings.allowed)
-    everything: list[Step | Exchange] = [*found.steps, *found.polls]
+    logged, shop = steps.read(log), cells.load(cell, session.settings.allowed)
+    everything: list[Step | Exchange] = [*logged.steps, *logged.polls]
     drives = {place: each for place, each in targets(session, everything).items() if place[1] not in EVERYONE}
     specs = {(bus.name, each.name): each for bus in shop.buses for each in bus.drives}
     motors = {place: motor for place, each in specs.items() if (motor := each.world.motor) is not None}
     told: dict[Axis, dict[str, float]] = {}
-    for axis, each in readings(log, shop, drives, everything).items():
+    read = readings(log, shop, drives, everything)
+    if not read:  # the reply to another name is none
+        theirs, ours = (", ".join(join_target(*each) for each in places) or "none" for places in (drives, specs))
+        why = f"drives of the log: {theirs}; of the cell: {ours}" if theirs != ours else "it has no position that was read"
+        raise DriveError(f"{log} tells no value; {cell} is unchanged; {why}")
+    for axis, each in read.items():
         seen = evidence(each)
         known = estimates(seen, motors[axis[:2]]) if axis[:2] in motors else {}
         for name in UNITS:

@@ -225,6 +225,15 @@ def test_a_drive_in_one_line_gets_its_world_there(tmp_path: Path) -> None:
     assert cells.load(path).buses[0].drives[0].world.load == 0.3 and path.read_text().endswith("# mine\n")
 
 
+@pytest.mark.virtual
+async def test_a_drive_of_another_name_is_said_with_those_that_there_are(tmp_path: Path) -> None:
+    log = await recorded(tmp_path, axis(), "MR 100")
+    (tmp_path / "now").mkdir()
+    async with CellSession(tmp_path / "now", axis().replace('name = "a"', 'name = "q"')) as cell:
+        with pytest.raises(DriveError, match="is unchanged; drives of the log: axis:a; of the cell: axis:q$"):
+            await fit(cell.session, log, tmp_path / "now" / "cell.toml", as_json=False)
+
+
 def _done(*_: object, **__: object) -> int:
     return 0
 
