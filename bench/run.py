@@ -1,7 +1,8 @@
 """All benches one after the other: one table in text and one in JSON under bench/results/. `make bench` starts it.
 
 `latest.txt` and `latest.json` are written by each run. `reference.txt` and `reference.json` are the kept result, with
-the machine that it came from; only `--keep` overwrites them.
+the machine that it came from; only `--keep` overwrites them. With `--only` the other benches there stay, each with the
+commit and the date that it was measured at.
 
 Run: python bench/run.py [--only stop,line] [--full] [--keep]
 """
@@ -41,13 +42,32 @@ def main() -> int:
         print(f"no bench {', '.join(unknown)}; there are: {', '.join(benches)}", file=sys.stderr)
         return 2
     result: dict[str, Any] = {"date": datetime.now(UTC).isoformat(timespec="seconds"), **report.machine()}
-    result |= {"full": options.full, "load": os.getloadavg()[0], "benches": {}, "failed": []}
-    text = _Text(RESULTS / f"{'reference' if options.keep else 'latest'}.txt")
+    result |= {"full": options.full, "load": os.getloadavg()[0], "benches": {}, "failed": [], "earlier": {}}
+    path = RESULTS / f"{'reference' if options.keep else 'latest'}.txt"
+    if options.keep:
+        result |= earlier(path.with_suffix(".json"), chosen)
+    text = _Text(path)
     text.add(_heading(result))
+    for name, when in result["earlier"].items():
+        text.add(f"\n{name}, measured at {when}\n{report.head()}")
+        for row in result["benches"][name]:
+            text.add(report.line(Row(**row)))
     for name in chosen:
         _measure(name, benches[name], options.full, result, text)
         text.path.with_suffix(".json").write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")
     return 1 if result["failed"] else 0
+
+
+def earlier(reference: Path, chosen: list[str]) -> dict[str, Any]:
+    """The benches of a kept result that are not measured now, and the commit and the date of each."""
+    before = json.loads(reference.read_text(encoding="utf-8")) if reference.exists() else {"benches": {}}
+    others = [name for name in before["benches"] if name not in chosen and (HERE / f"bench_{name}.py").exists()]
+    benches = {name: before["benches"][name] for name in others}
+    dates = before.get("earlier", {})
+    return {
+        "benches": benches,
+        "earlier": {name: dates.get(name) or f"commit {before['commit']}, {before['date']}" for name in benches},
+    }
 
 
 def _options() -> argparse.Namespace:

@@ -42,7 +42,11 @@ async def fit(session: Session, log: Path, cell: Path, as_json: bool) -> Callabl
     read = readings(log, shop, drives, everything)
     if not read:  # the reply to another name is none
         theirs, ours = (", ".join(join_target(*each) for each in places) or "none" for places in (drives, specs))
-        why = f"drives of the log: {theirs}; of the cell: {ours}" if theirs != ours else "it has no position that was read"
+        why = (
+            f"drives of the log: {theirs}; of the cell: {ours}"
+            if theirs != ours
+            else "it has no position that was read"
+        )
         raise DriveError(f"{log} tells no value; {cell} is unchanged; {why}")
     for axis, each in read.items():
         seen = evidence(each)

@@ -1,6 +1,7 @@
 """The table of `make bench`: what a row says, and that each bench yields rows."""
 
 import importlib.util
+import json
 import sys
 from pathlib import Path
 
@@ -9,15 +10,25 @@ import pytest
 BENCH = Path(__file__).parents[2] / "bench"
 
 
-def _report():
-    spec = importlib.util.spec_from_file_location("bench_report", BENCH / "report.py")
+def _loaded(name):
+    spec = importlib.util.spec_from_file_location(name, BENCH / f"{name}.py")
     module = importlib.util.module_from_spec(spec)
-    sys.modules["bench_report"] = module
+    sys.modules[name] = module
     spec.loader.exec_module(module)
     return module
 
 
-report = _report()
+report = _loaded("report")
+run = _loaded("run")  # which imports `report`
+
+
+def test_a_kept_result_keeps_the_benches_that_are_not_measured_again(tmp_path):
+    kept = {"commit": "b", "date": "Monday", "earlier": {"stop": "commit a, Sunday"}}
+    kept["benches"] = {name: [] for name in ("stop", "sweep", "logs", "one-that-is-gone")}
+    (tmp_path / "reference.json").write_text(json.dumps(kept))
+    found = run.earlier(tmp_path / "reference.json", ["logs"])
+    assert found["earlier"] == {"stop": "commit a, Sunday", "sweep": "commit b, Monday"}
+    assert [*found["benches"]] == ["stop", "sweep"] and run.earlier(tmp_path / "none.json", [])["benches"] == {}
 
 
 def test_a_ratio_is_the_median_of_the_rounds_side_by_side():
