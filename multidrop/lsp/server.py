@@ -40,6 +40,10 @@ At = (
 """The requests that name a place."""
 
 
+NUMBER = int | float | str | None
+"""The number of a request."""
+
+
 class Protocol(LanguageServerProtocol):
     """The protocol of the library, which leaves a request without a reply that it cannot take."""
 
@@ -52,9 +56,12 @@ class Protocol(LanguageServerProtocol):
             raise
 
     def handle_message(self, message: Any) -> None:
+        own, method = getattr(message, "id", None), getattr(message, "method", "")
         if not hasattr(message, "jsonrpc"):
             number = message.get("id") if isinstance(message, dict) else None
             self._refuse(number, JsonRpcInvalidRequest("no message of JSON-RPC 2.0"))
+        elif not isinstance(own, NUMBER) or not isinstance(method, str):
+            self._refuse(own, JsonRpcInvalidRequest("an id is a number or a text, and a method a text"))
         elif isinstance(message, RPCRequest) and (self._shutdown or message.jsonrpc != self.VERSION):
             what = "after shutdown only exit is valid" if self._shutdown else f"JSON-RPC {self.VERSION} is valid"
             self._refuse(message.id, JsonRpcInvalidRequest(what))
@@ -62,7 +69,7 @@ class Protocol(LanguageServerProtocol):
             super().handle_message(message)
 
     def _refuse(self, number: object, why: JsonRpcException) -> None:
-        known = number if isinstance(number, int | str) else None
+        known = number if isinstance(number, NUMBER) else None
         self._send_data({"jsonrpc": self.VERSION, "id": known, "error": why.to_response_error()})
 
 

@@ -208,7 +208,9 @@ class ProgramText:
 
 
 def _folds(blocks: Sequence[Block]) -> Iterator[Fold]:
-    for block in blocks:
+    waiting = [*reversed(blocks)]  # they may be nested deeper than calls may
+    while waiting:
+        block = waiting.pop()
+        waiting += reversed(block.parts)
         if block.last > block.place.line:
             yield Fold(block.place.line, block.last)
-        yield from _folds(block.parts)

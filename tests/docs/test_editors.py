@@ -27,7 +27,7 @@ def test_vs_code_gives_each_language_its_endings() -> None:
     package = json.loads((EDITORS / "vscode" / "package.json").read_text())
     languages = package["contributes"]["languages"]
     assert {each["id"]: {ending[1:] for ending in each["extensions"]} for each in languages} == KNOWN
-    for each in (package["main"], *(language["configuration"] for language in languages)):
+    for each in ("README.md", package["main"], *(language["configuration"] for language in languages)):
         assert (EDITORS / "vscode" / each).is_file()
     assert package["devDependencies"] == {"@vscode/vsce": "3.9.2"} and "vsce package" in package["scripts"]["package"]
 

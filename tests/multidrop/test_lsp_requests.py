@@ -65,6 +65,10 @@ WRONG: list[tuple[dict[str, object], int]] = [
     ({"id": 1, "method": "textDocument/formatting", "params": None}, -32602),
     ({"id": 1, "method": "no/such", "params": {}}, -32601),
     ({"id": 1, "method": HOVER, "params": PLACE, "jsonrpc": "1.0"}, -32600),
+    ({"id": [1], "method": HOVER, "params": PLACE}, -32600),
+    ({"id": {"a": 1}, "method": HOVER, "params": PLACE}, -32600),
+    ({"id": 1.5, "method": HOVER, "params": []}, -32602),
+    ({"id": 1, "method": 5, "params": {}}, -32600),
 ]
 
 
@@ -72,7 +76,8 @@ WRONG: list[tuple[dict[str, object], int]] = [
 async def test_a_wrong_request_gets_an_error_and_the_next_one_its_reply(wrong: dict[str, object], code: int) -> None:
     client = Client(message(**wrong), message(id=2, method=HOVER, params=PLACE))
     _, refused, right = await client.replies(3)
-    assert (refused["id"], refused["error"]["code"]) == (wrong["id"], code)
+    number = wrong["id"] if isinstance(wrong["id"], int | float | str) else None
+    assert (refused["id"], refused["error"]["code"]) == (number, code)
     assert right == {"jsonrpc": "2.0", "id": 2, "result": None}
     await client.end()
 

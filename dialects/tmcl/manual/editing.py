@@ -6,6 +6,7 @@ The names of a file are its labels and its constants.
 from __future__ import annotations
 
 import re
+from bisect import bisect_right
 from collections.abc import Container, Iterable, Iterator, Sequence
 
 from multidrop.dialects.errors import Diagnostic
@@ -135,7 +136,7 @@ def outline(text: str) -> Sequence[Block]:
     labels = sorted(place.line for name, place in found if name.kind == "label")
     blocks = []
     for name, place in sorted(found, key=lambda each: each[1]):
-        follows = next((line for line in labels if line > place.line), len(lines))
+        follows = [*labels[bisect_right(labels, place.line) :][:1], len(lines)][0]
         last = place.line if name.kind == "constant" else follows - 1
         blocks.append(Block(name.kind, name.word, name.remark, place, last))
     return blocks

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import sys
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -63,6 +64,11 @@ def test_no_text_and_no_place_breaks_anything(text: str, file: str, line: int, c
             tested.renamed_at(line, column, new)
         except Diagnostic as problem:
             assert problem.message
+
+
+def test_blocks_that_are_nested_deeper_than_calls_may_be_are_folded() -> None:
+    deep = 2 * sys.getrecursionlimit()
+    assert len(list(text_of("IF V1=1\n" * deep + "ENDIF\n" * deep, "a.prg").folds())) == deep
 
 
 def _within(block: Block, lines: int) -> bool:
