@@ -56,6 +56,8 @@ def run(chosen: argparse.Namespace) -> int:
         if chosen.search or sum(each.count > 1 for each in plan.values) < 2:
             raise Diagnostic("shows two keys with several values each", f"--svg {chosen.svg}", "vary a second key")
         check_place(chosen.svg, "--svg", b"<svg", "picture")
+    if chosen.junit:  # before the tables are made
+        check_place(chosen.junit, "--junit", b"<testsuite", "JUnit report")
     table = Table(plan, chosen.csv, chosen.parquet, chosen.resume)
     report = Report(plan, table, as_json=chosen.json, junit=chosen.junit, svg=chosen.svg)
     with Interruption() as interruption:
@@ -197,7 +199,7 @@ class Report:
             if groups:
                 write(sys.stdout, *rows(self._plan, groups, len(self._failed)))
             write(sys.stdout, f"{self._counted}, {len(self._failed)} failed, {seconds:.1f} s")
-        if code:
+        if self._cut:
             write(sys.stderr, f"ended after {self._counted} of {self._plan.runs}; the others were not run")
         elif interrupted:
             write(sys.stderr, "interrupted while simpler worlds were looked for")

@@ -124,6 +124,8 @@ def check_place(path: str, option: str, sign: bytes, what: str) -> None:
     if path == new_file.STANDARD_OUTPUT:
         raise Diagnostic("standard output has the replies", f"{option} -", "name a file for the report")
     new_file.check_folder(path)
+    if not os.access(os.path.dirname(os.path.abspath(path)), os.W_OK):
+        raise Diagnostic("its folder cannot be written", path, "name a file in another folder")
     if not os.path.exists(path):  # Path's own methods raise for a name that is too long
         return
     if not os.path.isfile(path):

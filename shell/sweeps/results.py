@@ -13,6 +13,7 @@ import os
 import re
 import time
 from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -63,7 +64,14 @@ class Table:
         for number in self.known:
             self.take(self.known[number])
         self._next = 0.0
-        self._write([file for file in self._files if not os.path.exists(file)])
+        made = [file for file in self._files if not os.path.exists(file)]
+        try:
+            self._write(made)
+        except Diagnostic:
+            for file in made:
+                with suppress(OSError):
+                    os.unlink(file)
+            raise
 
     def _check(self, file: str, resume: str) -> None:
         if file == new_file.STANDARD_OUTPUT:
@@ -74,7 +82,7 @@ class Table:
         found = self._read(file)
         if file == resume:
             self.known = found
-        elif len(found) < self._plan.count:
+        elif 0 < len(found) < self._plan.count:
             what = f"has {len(found)} of {counted(self._plan.count, 'case')} of this sweep already"
             raise Diagnostic(what, file, f"--resume {file} goes on with them")
 

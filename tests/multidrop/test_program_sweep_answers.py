@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+import os
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -243,6 +244,24 @@ def test_a_table_that_cannot_be_written_any_more_is_said(
     monkeypatch.setattr(results, "write_atomically", full)
     done = sweep(*GRID, "--csv", "all.csv")
     assert done.returncode == 2 and done.stderr.startswith("all.csv: cannot be written: No space left on device\n")
+
+
+def test_an_output_that_cannot_be_made_leaves_no_other_and_nothing_runs(
+    sweep: Sweep, monkeypatch: pytest.MonkeyPatch, tmp_path: Path, ran: list[int]
+) -> None:
+    def locked(path: Path, data: bytes) -> None:
+        if path.name == "locked.csv":
+            raise PermissionError(13, "Permission denied")
+        atomic.write_atomically(path, data)
+
+    monkeypatch.setattr(results, "write_atomically", locked)
+    done = sweep(*GRID, "--resume", "new.csv", "--csv", "locked.csv")
+    assert (done.returncode, done.stdout) == (2, "") and "locked.csv: cannot be written" in done.stderr
+    monkeypatch.setattr(os, "access", lambda *_: False)
+    for option in ("--junit", "--svg"):
+        done = sweep(*GRID, option, "map", "--csv", "new.csv")
+        assert (done.returncode, done.stderr.startswith("map: its folder cannot be written; name a file")) == (2, True)
+    assert ran == [] and {each.name for each in tmp_path.iterdir() if each.is_file()} == {"go.mxt", "cell.toml"}
 
 
 def table_of(folder: Path) -> tuple[plan.Plan, bytes]:
