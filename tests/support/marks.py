@@ -4,7 +4,7 @@
 `virtual` marks a test, or a file of tests, that runs on a loop whose clock does not wait.
 `needs` names programs of others, such as `mbpoll`: without them a test is skipped, or fails (`tests.support.tools`).
 `wide` marks a product of parameters. An ordinary run takes its corners and its diagonal; `--nightly` takes all of it,
-and the tests with the marker `nightly`.
+the tests with the marker `nightly`, and those that `nightly.txt` lists.
 `pty`, `fork`, `AF_UNIX` and `tmux` mark what Windows has not (`tests.support.posix`): there such tests are left out.
 """
 
@@ -35,6 +35,9 @@ in them: measuring makes the product two to three times slower. So the share tha
 
 UNMEASURED = Path(__file__).with_name("unmeasured.txt")
 """Test functions that take long and go the ways of cheaper ones (`tests.support.choose_measured`)."""
+
+NIGHTLY = frozenset(Path(__file__).with_name("nightly.txt").read_text(encoding="utf-8").splitlines())
+"""Cases that take long and differ from others of their test, which every run takes, in a value only."""
 
 _running: list[pytest.Item] = []
 """The test that runs, its fixtures included."""
@@ -216,7 +219,7 @@ def _leave_out(config: pytest.Config, items: list[pytest.Item]) -> None:
 
 
 def _only_nightly(item: pytest.Item) -> bool:
-    if item.get_closest_marker("nightly"):
+    if item.nodeid in NIGHTLY or item.get_closest_marker("nightly"):
         return True
     return item.get_closest_marker("wide") is not None and not is_taken(places(item))
 
