@@ -48,7 +48,7 @@ types-here: $(VENV)/.dev
 	$(BIN)/mypy
 
 types-darwin types-win32: types-%: $(VENV)/.dev
-	$(BIN)/mypy --platform $* --cache-dir .mypy_cache/$*
+	$(BIN)/mypy --platform $* --cache-dir .mypy_cache/$* --package multidrop
 
 contracts: $(VENV)/.dev
 	$(BIN)/lint-imports

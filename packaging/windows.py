@@ -244,7 +244,7 @@ def _tests(arguments: list[str]) -> int:
     if arguments:
         return _shown(["wine", PYTHON / "python.exe", *pytest, *arguments], wine_environment())[0]
     outside, _ = _shown([sys.executable, *pytest, "-q", "tests/windows/from_outside.py"], dict(os.environ))
-    suite = [*pytest, "-q", "-n", "2", "--dist", "worksteal", "--timeout=120", "--hypothesis-profile=quick"]
+    suite = [*pytest, "-q", "-n", "2", "--dist", "worksteal", "--timeout=400", "--hypothesis-profile=quick"]
     inside, said = _shown(["wine", PYTHON / "python.exe", *suite], wine_environment())
     listed = [sys.executable, *pytest, "-q", "--collect-only"]
     collected = subprocess.run(listed, cwd=ROOT, capture_output=True, text=True)
