@@ -182,13 +182,13 @@ class Stopping:
         """Another thread's stop found the link lost, and the loop has not taken that over."""
         self._unconfirmed: list[Halt] = []
         """Stops that are not confirmed yet, or that a loss kept from the drives or from being confirmed."""
-        self._tasks: set[asyncio.Task[None]] = set()
+        self._tasks: dict[asyncio.Task[None], None] = {}
         roster.on_stored_stop = self._stored
 
     @property
-    def tasks(self) -> set[asyncio.Task[None]]:
+    def tasks(self) -> list[asyncio.Task[None]]:
         """The stops that are being confirmed."""
-        return set(self._tasks)
+        return list(self._tasks)
 
     # The bytes
 
@@ -310,8 +310,8 @@ class Stopping:
 
     def _begin_to_confirm(self, halt: Halt) -> None:
         task = asyncio.get_running_loop().create_task(self._confirm(halt))
-        self._tasks.add(task)
-        task.add_done_callback(self._tasks.discard)
+        self._tasks[task] = None
+        task.add_done_callback(self._tasks.pop)
 
     def _publish(self, halt: Halt) -> None:
         if halt.data:

@@ -247,8 +247,8 @@ async def settled(workspace: Workspace) -> None:
     """Wait until stops are sent and confirmed, and clean-ups are over; LINGER at most."""
     waits = [asyncio.create_task(bus.settled()) for bus in workspace.buses.values()]
     if waits:
-        _, late = await asyncio.wait(waits, timeout=LINGER)
-        for each in late:
+        await asyncio.wait(waits, timeout=LINGER)
+        for each in waits:
             each.cancel()
 
 

@@ -27,8 +27,9 @@ class Tasks:
 
     def __init__(self, changed: Callable[[], None]) -> None:
         self._changed = changed
-        self._running: set[asyncio.Task[Any]] = set()
-        self._stopped: set[asyncio.Task[Any]] = set()
+        self._running: dict[asyncio.Task[Any], None] = {}
+        """In the order in which they began, in which a stop cancels them."""
+        self._stopped: dict[asyncio.Task[Any], None] = {}
 
     @property
     def busy(self) -> bool:
@@ -38,7 +39,7 @@ class Tasks:
     async def run(self, work: Coroutine[Any, Any, T]) -> T:
         """Await the work. Raises Stopped if a stop ended it."""
         task = asyncio.get_running_loop().create_task(work)
-        self._running.add(task)
+        self._running[task] = None
         self._changed()
         try:
             return await task
@@ -47,14 +48,14 @@ class Tasks:
                 raise Stopped("stopped before it was done") from None
             raise
         finally:
-            self._running.discard(task)
-            self._stopped.discard(task)
+            del self._running[task]
+            self._stopped.pop(task, None)
             self._changed()
 
     def stop(self) -> None:
         """Cancel all work except the caller's; each `run` raises Stopped."""
         for task in self._others():
-            self._stopped.add(task)
+            self._stopped[task] = None
             task.cancel()
 
     async def stopped(self, limit: float) -> None:
@@ -67,8 +68,9 @@ class Tasks:
         for task in self._others():
             task.cancel()
 
-    def _others(self) -> set[asyncio.Task[Any]]:
-        return self._running - {_current()}
+    def _others(self) -> list[asyncio.Task[Any]]:
+        current = _current()
+        return [task for task in self._running if task is not current]
 
 
 def _current() -> asyncio.Task[Any] | None:

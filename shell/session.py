@@ -100,7 +100,7 @@ class Session(Workspace):
         self.automations, self.twins = Automations(self), Twins(self, partial(_apart, self))
         self.path = LinePath(self)
         self.openings = Openings(self, opener or partial(open_buses, state=self.settings.state), lazy, raw, tried)
-        self._background: set[asyncio.Task[Any]] = set()
+        self._background: dict[asyncio.Task[Any], None] = {}
         self.on_opened.append(lambda bus: self.units.opened(bus))
 
     # Buses
@@ -217,8 +217,8 @@ class Session(Workspace):
             return True
 
         task = asyncio.get_running_loop().create_task(succeeds())
-        self._background.add(task)
-        task.add_done_callback(self._background.discard)
+        self._background[task] = None
+        task.add_done_callback(self._background.pop)
         return task
 
     # The end

@@ -79,7 +79,7 @@ class SharedPort:
         self._purged = 0
         """Bytes that a purge has dropped, until the next ones are written: the drives may hold a half-sent line."""
         self._timer: asyncio.TimerHandle | None = None
-        self._tasks: set[asyncio.Task[None]] = set()
+        self._tasks: dict[asyncio.Task[None], None] = {}
         self._turns = asyncio.Lock()
         """Settings are changed one after the other."""
         self._server: asyncio.Server | None = None
@@ -241,8 +241,8 @@ class SharedPort:
 
     def _begin(self, work: Coroutine[Any, Any, None]) -> None:
         task = self._loop.create_task(work)
-        self._tasks.add(task)
-        task.add_done_callback(self._tasks.discard)
+        self._tasks[task] = None
+        task.add_done_callback(self._tasks.pop)
 
 
 def _change(control: PortControl, action: Set) -> Callable[[], None]:

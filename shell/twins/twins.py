@@ -84,7 +84,7 @@ class Twins:
 
     def off(self) -> bool:
         """End all twins: those that run, are read, or wait for their line. Return whether there were any."""
-        buses = {*self._buses, *self._paused, *self._tasks}
+        buses = list(dict.fromkeys((*self._buses, *self._paused, *self._tasks)))
         for bus in buses:
             self.stop(bus)
         self.wanted = False

@@ -32,7 +32,7 @@ def files(world: World, rng: Random) -> None:
     """Type a verb that writes a file."""
     name = f"m{rng.randrange(3)}"
     verbs = (
-        f"/log {world.folder}/session.log",
+        "/log session.log",
         f"/record {name} --replace",
         "/record stop",
         f"/key F{rng.randrange(2, 5)} {name}",

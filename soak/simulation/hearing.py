@@ -61,7 +61,7 @@ def _judge_stopped(world: World, line: str, drive: str, who: str) -> None:
 
 def typed(world: World, data: bytes, session: Session, who: str = "") -> None:
     """Take what somebody types; at a stop, note what has to leave next on each line."""
-    world.history.note(world.loop.now, f"key{who}", data.replace(bytes(world.folder), b"~").hex())
+    world.history.note(world.loop.now, f"key{who}", data.hex())
     if data[:1] in (b"y", b"Y"):
         world.history.told.yes.append(world.loop.now)
     if STOP in data:

@@ -6,13 +6,14 @@ import random
 import re
 import subprocess
 import sys
+from contextlib import nullcontext
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
 import pytest
 
-from soak.simulation import shrinking, world
+from soak.simulation import living, shrinking, world
 from soak.simulation.__main__ import main
 from soak.simulation.climate import FAULTS
 from soak.simulation.history import Command, Damage, Executed, Held, History, Outcome, Shown
@@ -56,7 +57,22 @@ def test_the_logs_of_simulated_sessions_break_no_rule(first: int, logs: int, mon
         judged, seed = judged + history.counts["logs judged"], seed + 1
 
 
+@pytest.mark.parametrize("seed", [81, 122])
+def test_a_seed_gives_the_same_history_each_time(seed: int) -> None:
+    assert len({verdict(lived(seed, range(30))) for _ in range(3)}) == 1
+
+
+def test_a_seed_gives_the_same_history_in_a_folder_with_a_longer_path(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    here = verdict(lived(9, range(30)))
+    (longer := tmp_path / ("further" * 9)).mkdir()
+    monkeypatch.setattr(living, "place_of_state", lambda: nullcontext(longer))
+    assert verdict(lived(9, range(30))) == here
+
+
 @pytest.mark.process
+@pytest.mark.nightly
 def test_a_seed_gives_the_same_history_in_another_process_with_other_hashes() -> None:
     here = verdict(lived(3, range(20)))
     command = (sys.executable, "-m", "soak.simulation", "--seed", "3", "--steps", "20")
