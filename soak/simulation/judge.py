@@ -56,9 +56,10 @@ def _first(world: World) -> Iterator[str | Granted]:
 
 def _behind_a_drop(world: World, line: str, first: int, begun: bytes) -> Iterator[bytes]:
     """What leaves behind a drop of the stop before, of which nothing else has left: one drop is enough for both."""
-    last = next((data for _, port, data in reversed(world.history.written[:first]) if port == line), b"")
-    if world.place(line[:2]).kind == "ssh" and last.endswith(DROP):
-        yield DROP + begun
+    if world.place(line[:2]).kind == "ssh":
+        before = b"".join(data for _, port, data in world.history.written[:first] if port == line)
+        if before.endswith(DROP):
+            yield DROP + begun
 
 
 def _lost(world: World, line: str, stop: Stop) -> bool:

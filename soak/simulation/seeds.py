@@ -37,6 +37,7 @@ FIXED = {
     1499: "what noise left of two OKs, which was shown as a value",
     2381549: "a state folder that the log had made and not synced, lost in a power cut with the echo mode owed",
     1502: "a stored line that was typed before a stop, too (of the simulation itself)",
+    20156: "a stop behind a drop that left in two pieces (of the simulation itself)",
 }
 DERIVED = 12
 """The number of seeds that follow from the commit."""
