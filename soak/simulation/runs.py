@@ -26,6 +26,8 @@ from soak.simulation.world import World
 STEPS = 30
 """The steps of a story, unless told."""
 ROOT = Path(__file__).parents[2]
+WORD = ": "
+"""What a count has before a word of the host, and no other count has."""
 
 
 @dataclass(frozen=True)
@@ -52,6 +54,15 @@ def verdict(world: World) -> str:
     return f"seed {world.seed}: {said}, {seconds:.1f} virtual s, {commands} commands, trace {trace}"
 
 
+def outcomes(world: World) -> Counter[str]:
+    """The host's words about the commands, by language and checksum."""
+    found: Counter[str] = Counter()
+    for each in world.history.commands.values():
+        place = world.place(each.line)
+        found[f"{place.language} with{'' if place.checked else 'out'} a checksum{WORD}{each.outcome.value}"] += 1
+    return found
+
+
 def result(life: Life) -> Result:
     """Live and judge."""
     began = time.process_time()
@@ -65,7 +76,7 @@ def result(life: Life) -> Result:
         history.exchanges,
         world.loop.now,
         time.process_time() - began,
-        history.counts | world.climate.happened | found.granted,
+        history.counts | world.climate.happened | found.granted | outcomes(world),
     )
 
 
@@ -147,7 +158,9 @@ class Figures:
             ", ".join(f"{number} {name}" for name, number in sorted(self.findings.items())) or "none"
         )
         faults = {name: self.counts[name] for name in FAULTS if name in self.counts}
-        for what, found in (("faults", faults), ("acts and exceptions", self.counts.keys() - faults)):
+        words = {name for name in self.counts if WORD in name}
+        others = self.counts.keys() - faults.keys() - words
+        for what, found in (("faults", faults), ("acts and exceptions", others), ("words about commands", words)):
             text = ", ".join(f"{self.counts[name]} {name}" for name in sorted(found))
             yield f"{sum(self.counts[name] for name in found)} {what}: {text}"
         yield (
