@@ -62,7 +62,7 @@ def _one(life: Life, whole: bool) -> int:
     for name in found.rules[:1]:
         life = shrunk(life, name) if whole else life
         _show(life)
-    print(verdict(world))
+    print(verdict(world, found))
     return int(bool(found.breaches))
 
 

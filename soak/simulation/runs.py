@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import json
 import multiprocessing
 import os
@@ -10,7 +11,7 @@ import subprocess
 import time
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from contextlib import ExitStack
+from contextlib import ExitStack, contextmanager
 from dataclasses import asdict, dataclass, field
 from functools import partial
 from hashlib import sha256
@@ -19,13 +20,15 @@ from typing import TextIO
 
 from multidrop import __version__
 from soak.simulation.climate import FAULTS
-from soak.simulation.judge import judged
+from soak.simulation.judge import Judgement, judged
 from soak.simulation.shrinking import Life
 from soak.simulation.world import World
 
 STEPS = 30
 """The steps of a story, unless told."""
 ROOT = Path(__file__).parents[2]
+GARBAGE = 50_000
+"""The number of new objects between two collections of garbage."""
 WORD = ": "
 """What a count has before a word of the host, and no other count has."""
 
@@ -45,10 +48,9 @@ class Result:
     counts: dict[str, int] = field(default_factory=dict)
 
 
-def verdict(world: World) -> str:
+def verdict(world: World, found: Judgement) -> str:
     """The one line of a seed, the same in every run of it."""
-    rules = judged(world).rules
-    said = f"broke {', '.join(rules)}" if rules else "held"
+    said = f"broke {', '.join(found.rules)}" if found.rules else "held"
     commands = len(world.history.commands) + world.history.asked
     seconds, trace = world.loop.now, world.history.trace
     return f"seed {world.seed}: {said}, {seconds:.1f} virtual s, {commands} commands, trace {trace}"
@@ -70,7 +72,7 @@ def result(life: Life) -> Result:
     found, history = judged(world), world.history
     return Result(
         life.seed,
-        verdict(world),
+        verdict(world, found),
         [(rule.name, text) for rule, text in found.breaches],
         len(history.commands) + history.asked,
         history.exchanges,
@@ -90,6 +92,7 @@ def run(lives: Sequence[Life], jobs: int = 0, resume: Path | None = None) -> Ite
     left = lives[len(known) :]
     jobs = min(jobs or os.cpu_count() or 1, len(left))
     with ExitStack() as stack:
+        stack.enter_context(_collected_seldom())
         if file is not None:
             stack.enter_context(file)
         results: Iterator[Result] = map(result, left)
@@ -100,6 +103,19 @@ def run(lives: Sequence[Life], jobs: int = 0, resume: Path | None = None) -> Ite
             if file is not None:
                 print(json.dumps(asdict(each)), file=file, flush=True)
             yield each
+
+
+@contextmanager
+def _collected_seldom() -> Iterator[None]:
+    """Let the garbage collection leave alone what the program consists of, and look seldom at the rest."""
+    before = gc.get_threshold()
+    gc.freeze()
+    gc.set_threshold(GARBAGE)
+    try:
+        yield
+    finally:
+        gc.set_threshold(*before)
+        gc.unfreeze()
 
 
 def _taken_up(lives: Sequence[Life], path: Path) -> tuple[list[Result], TextIO]:

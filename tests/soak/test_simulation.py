@@ -22,7 +22,7 @@ from soak.simulation.living import lived
 from soak.simulation.outcomes import OUTCOMES
 from soak.simulation.places import Place
 from soak.simulation.rule import Granted, Rule
-from soak.simulation.runs import derived, lives, result, run, verdict
+from soak.simulation.runs import derived, lives, result, run
 from soak.simulation.seeds import DERIVED, FIXED
 from soak.simulation.shrinking import Life, shrunk
 from soak.simulation.trace import readable
@@ -59,22 +59,22 @@ def test_the_logs_of_simulated_sessions_break_no_rule(first: int, logs: int, mon
 
 @pytest.mark.parametrize("seed", [81, 122])
 def test_a_seed_gives_the_same_history_each_time(seed: int) -> None:
-    assert len({verdict(lived(seed, range(30))) for _ in range(3)}) == 1
+    assert len({lived(seed, range(30)).history.trace for _ in range(3)}) == 1
 
 
 def test_a_seed_gives_the_same_history_in_a_folder_with_a_longer_path(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    here = verdict(lived(9, range(30)))
+    here = lived(9, range(30)).history.trace
     (longer := tmp_path / ("further" * 9)).mkdir()
     monkeypatch.setattr(living, "place_of_state", lambda: nullcontext(longer))
-    assert verdict(lived(9, range(30))) == here
+    assert lived(9, range(30)).history.trace == here
 
 
 @pytest.mark.process
 @pytest.mark.nightly
 def test_a_seed_gives_the_same_history_in_another_process_with_other_hashes() -> None:
-    here = verdict(lived(3, range(20)))
+    here = result(Life(3, tuple(range(20)))).line
     command = (sys.executable, "-m", "soak.simulation", "--seed", "3", "--steps", "20")
     there = subprocess.run(command, cwd=ROOT, env={"PYTHONHASHSEED": "77"}, capture_output=True, text=True, check=True)
     assert there.stdout.splitlines()[-1] == here
