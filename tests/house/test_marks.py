@@ -1,13 +1,18 @@
-"""What an ordinary run takes of a product of parameters, and what becomes of a test whose tool is absent."""
+"""What an ordinary run takes of a product of parameters, leaves in the tree, and does where a tool is absent."""
 
 from __future__ import annotations
 
 import re
+import subprocess
 from collections import Counter
 from itertools import product
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import pytest
 
+from tests.support import marks
 from tests.support.choose_measured import choose
 from tests.support.marks import NIGHTLY, UNMEASURED, is_taken, places
 from tests.support.paths import ROOT
@@ -37,6 +42,22 @@ def test_an_absent_tool_skips_a_test_and_fails_it_where_all_are_promised(monkeyp
     monkeypatch.setenv(PROMISED, "1")
     with pytest.raises(pytest.fail.Exception, match="no-such-tool is not installed, and MULTIDROP_ALL_TOOLS"):
         tool("no-such-tool")
+
+
+@pytest.mark.process
+def test_a_file_that_is_left_in_the_tree_fails_the_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    if marks.tree(ROOT) is None:
+        pytest.skip("the tree is not one of git")
+    subprocess.run(["git", "init", "-q", tmp_path], check=True)
+    monkeypatch.setattr(marks, "ROOT", tmp_path)
+    config = SimpleNamespace(stash=pytest.Stash())
+    config.stash[marks.TREE] = marks.tree(tmp_path)
+    session: Any = SimpleNamespace(config=config, exitstatus=pytest.ExitCode.OK)
+    marks.pytest_sessionfinish(session)
+    assert session.exitstatus == pytest.ExitCode.OK
+    (tmp_path / "go2.mxt").touch()
+    marks.pytest_sessionfinish(session)
+    assert (config.stash[marks.LEFT], session.exitstatus) == (["?? go2.mxt"], pytest.ExitCode.TESTS_FAILED)
 
 
 def test_ci_installs_every_tool_of_the_tests_and_hides_nothing_by_a_setting_of_python() -> None:

@@ -1,5 +1,6 @@
-"""The root of the repository holds what CONTRIBUTING names."""
+"""The root of the repository holds what CONTRIBUTING names, which names each target of the Makefile."""
 
+import re
 import tomllib
 from fnmatch import fnmatch
 
@@ -14,6 +15,14 @@ def test_everything_in_the_root_is_named_in_contributing():
     root = sorted(each.name for each in ROOT.iterdir())
     others = [name for name in root if not any(fnmatch(name, pattern) for pattern in ignored)]
     assert [name for name in others if name not in named] == []
+
+
+def test_contributing_names_every_target_of_the_makefile():
+    named = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
+    makefile = (ROOT / "Makefile").read_text(encoding="utf-8")
+    (targets,) = re.findall(r"^\.PHONY: (.*)$", makefile, re.MULTILINE)
+    assert set(re.findall(r"^([a-z][a-z-]*)(?: [a-z -]+)?:(?!=)", makefile, re.MULTILINE)) <= set(targets.split())
+    assert [each for each in targets.split() if not re.search(rf"`make {each}[` ]", named)] == []
 
 
 def test_the_wheel_has_one_package():

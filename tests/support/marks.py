@@ -6,6 +6,7 @@
 `wide` marks a product of parameters. An ordinary run takes its corners and its diagonal; `--nightly` takes all of it,
 the tests with the marker `nightly`, and those that `nightly.txt` lists.
 `pty`, `fork`, `AF_UNIX` and `tmux` mark what Windows has not (`tests.support.posix`): there such tests are left out.
+A run fails where the tree has a new or changed file at its end: a test has left it there.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ import asyncio
 import gc
 import os
 import re
+import shutil
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
@@ -22,6 +24,7 @@ from typing import Any
 
 import pytest
 
+from tests.support.paths import ROOT
 from tests.support.posix import LEFT_OUT, left_out, only_posix
 from tests.support.tools import tool
 from tests.support.virtual import VirtualLoop
@@ -42,6 +45,12 @@ NIGHTLY = frozenset(Path(__file__).with_name("nightly.txt").read_text(encoding="
 _running: list[pytest.Item] = []
 """The test that runs, its fixtures included."""
 
+TREE = pytest.StashKey[set[str] | None]()
+"""New and changed files when the run began, in the words of git; None: they are not compared."""
+
+LEFT = pytest.StashKey[list[str]]()
+"""Those that came during the run."""
+
 
 def pytest_addoption(parser: pytest.Parser) -> None:
     """Add `--nightly` and `--measure-all`."""
@@ -49,8 +58,10 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption("--measure-all", action="store_true", help="measure coverage in the first case of every test")
 
 
-def pytest_configure() -> None:
-    """Watch for processes until the run ends: an audit hook cannot be removed."""
+def pytest_configure(config: pytest.Config) -> None:
+    """Watch for processes until the run ends: an audit hook cannot be removed. Note the files of the tree."""
+    controls = not hasattr(config, "workerinput") and not config.getoption("update_snapshots", default=False)
+    config.stash[TREE] = tree(ROOT) if controls else None
     sys.addaudithook(_watch)
     if sys.platform == "win32":
         os.kill = _no_signal  # type: ignore[assignment]
@@ -60,6 +71,32 @@ def pytest_configure() -> None:
 def _no_signal(to: object, number: int) -> None:
     """Leave out a test that would send a signal, which Windows takes for an order to end a process at once."""
     left_out("fork")
+
+
+def tree(folder: Path) -> set[str] | None:
+    """The new and changed files below a folder, as `git status` names them; None without git."""
+    git = shutil.which("git")
+    if git is None:
+        return None
+    asked = [git, "-C", str(folder), "status", "--porcelain", "-uall", "--", "."]
+    done = subprocess.run(asked, capture_output=True, encoding="utf-8", errors="replace")
+    return None if done.returncode else set(done.stdout.splitlines())
+
+
+@pytest.hookimpl(trylast=True)
+def pytest_sessionfinish(session: pytest.Session) -> None:
+    """Fail a run that left files in the tree."""
+    before, after = session.config.stash[TREE], tree(ROOT)
+    left = [] if before is None or after is None else sorted(after - before)
+    session.config.stash[LEFT] = left
+    if left and session.exitstatus == pytest.ExitCode.OK:
+        session.exitstatus = pytest.ExitCode.TESTS_FAILED
+
+
+def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter, config: pytest.Config) -> None:
+    """Name what was left."""
+    for each in config.stash.get(LEFT, []):
+        terminalreporter.write_line(f"new or changed in the tree since the run began: {each}", red=True)
 
 
 def _watch(event: str, _: Any) -> None:
