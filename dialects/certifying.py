@@ -11,7 +11,7 @@ from typing import Generic, NamedTuple, TypeVar
 
 from multidrop.dialects.codec import Procedure
 from multidrop.dialects.errors import NoAnswer, Refused
-from multidrop.dialects.rows import rows
+from multidrop.dialects.files import rows
 from multidrop.dialects.state import DriveState, Owed
 
 S = TypeVar("S", bound=DriveState)

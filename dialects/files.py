@@ -1,6 +1,7 @@
 """Text files that people write: read within limits, divided into lines by one rule, TOML parsed.
 
-No file makes a program wait or fills its memory, and no line is hidden from a person who reads it in an editor.
+No file makes a program wait or fills its memory, and no line is hidden from a person who reads it in an editor. `rows`
+are those of our own tables.
 """
 
 from __future__ import annotations
@@ -230,3 +231,14 @@ def _check_nesting(text: str, where: str) -> None:
 
 def _at(where: str, line: int) -> str:
     return f"{where}:{line}" if where else f"line {line}"
+
+
+def rows(module: str, name: str) -> Iterator[dict[str, str]]:
+    """The rows of a table of a manual by its head line: a `.csv` file beside a module, whose `__file__` is given.
+
+    There is a row for each word or number; it may leave out empty cells at its end.
+    """
+    import csv  # only who reads a table waits for it
+
+    with open(os.path.join(os.path.dirname(module), name), encoding="utf-8", newline="") as table:
+        yield from csv.DictReader(table, restval="")

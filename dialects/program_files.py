@@ -1,13 +1,15 @@
 """Programs of a family: files, their language, problems, canonical spelling and editing; what a drive holds.
 
 The language is imported at its first use. In canonical spelling indents, remarks and their columns stay.
+`walk` and `nearest` go breadth-first through the statements of a program, which are numbered.
 """
 
 from __future__ import annotations
 
 import importlib
 import re
-from collections.abc import Callable, Container, Iterable, Mapping, Sequence
+from collections import deque
+from collections.abc import Callable, Container, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, cast
@@ -350,3 +352,42 @@ def replaced(lines: Sequence[str], places: Iterable[Span], new: str) -> list[str
         line = found[place.line]
         found[place.line] = line[: place.start] + new + line[place.stop :]
     return found
+
+
+Ways = Callable[[int], Iterable[int]]
+"""Gives the statements that may be executed after a statement."""
+
+
+def walk(starts: Iterable[int], ways: Ways) -> dict[int, int | None]:
+    """Return the statements that are reached, nearest first, each with the one before it; None for a start."""
+    before: dict[int, int | None] = dict.fromkeys(starts)
+    queue = deque(before)
+    while queue:
+        place = queue.popleft()
+        for each in ways(place):
+            if each not in before:
+                before[each] = place
+                queue.append(each)
+    return before
+
+
+def way_to(place: int, before: Mapping[int, int | None]) -> Iterator[tuple[int, int]]:
+    """Yield the steps of a walk to a statement, the last one first: from where, and to where."""
+    while (previous := before[place]) is not None:
+        yield previous, place
+        place = previous
+
+
+def nearest(starts: Iterable[int], ways: Ways, wanted: Callable[[int], bool], most: int) -> int | None:
+    """Find the nearest wanted statement; None if none is among the first `most` ones."""
+    seen = dict.fromkeys(starts)
+    queue = deque(seen)
+    while queue and len(seen) <= most:
+        place = queue.popleft()
+        if wanted(place):
+            return place
+        for each in ways(place):
+            if each not in seen:
+                seen[each] = None
+                queue.append(each)
+    return None

@@ -12,10 +12,10 @@ from random import Random
 
 from multidrop.dialects import Diagnostic
 from multidrop.dialects.text import whole
+from multidrop.simulator import USAGES
 from multidrop.simulator.cell.spec import BusSpec, Cell, DriveSpec
 from multidrop.simulator.families import BY_PERSONALITY, family_of
 from multidrop.simulator.family import Connection, Device, Place, Unit, UsbSide
-from multidrop.simulator.sim_words import USAGES
 from multidrop.simulator.wire import Wire
 from multidrop.simulator.world import World
 

@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 from textual.binding import Binding, BindingType
 
-from multidrop.dialects.rows import rows
+from multidrop.dialects.files import rows
 from multidrop.tui.text import key_words
 
 NONE = "no-key-"

@@ -8,7 +8,6 @@ from multidrop.dialects.codec import Procedure
 from multidrop.dialects.family import Family, Guard, Guards
 from multidrop.dialects.mcode.host import classify, operations
 from multidrop.dialects.mcode.host.codec import STOP_BYTES, MCode
-from multidrop.dialects.mcode.host.cyber_security import CYBER_SECURITY
 from multidrop.dialects.mcode.host.identify import identify, remember
 from multidrop.dialects.mcode.host.state import MCodeState
 from multidrop.dialects.mcode.manual import guards, help, points
@@ -45,7 +44,7 @@ MCODE = Family(
     assign=points.assign,
     programs_at="multidrop.dialects.mcode.host.programs:PROGRAMS",
     guards=Guards(guards.NAMES, guarded, guards.word_of, guards.only_ends, guards.only_reads),
-    protection=CYBER_SECURITY,
+    protection=guards.CYBER_SECURITY,
     debugging_at="multidrop.dialects.mcode.host.debugging:DEBUGGING",
     repairs=True,
     remember=remember,

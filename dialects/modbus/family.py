@@ -7,7 +7,6 @@ from functools import partial
 from multidrop.dialects.codec import Procedure
 from multidrop.dialects.family import Family, Guard, Guards, Registers
 from multidrop.dialects.mcode.host.classify import referencing
-from multidrop.dialects.mcode.host.cyber_security import CYBER_SECURITY
 from multidrop.dialects.mcode.manual import guards, help, points
 from multidrop.dialects.modbus.host import operations
 from multidrop.dialects.modbus.host.codec import Modbus, ModbusState, pdu_codec
@@ -57,9 +56,9 @@ MODBUS = Family(
         device=operations.device,
     ),
     guards=Guards(guards.NAMES, guarded, guards.word_of, guards.only_ends, guards.only_reads),
-    protection=CYBER_SECURITY,
+    protection=guards.CYBER_SECURITY,
     prepare=pdu_codec,
     certifying_at="multidrop.dialects.modbus.host.operations:CERTIFYING",
     values_at="multidrop.dialects.modbus.host.values:VALUES",
-    units_at="multidrop.dialects.modbus.host.units:UNITS",
+    units_at="multidrop.dialects.modbus.host.values:UNITS",
 )

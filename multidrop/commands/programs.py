@@ -133,12 +133,12 @@ SHOWN = 10
 def convert(chosen: argparse.Namespace) -> int:
     """Convert a file; 1: something cannot be converted, so nothing is written, or a run beside the original differs."""
     from multidrop.shell import new_file
-    from multidrop.shell.programs import conversion
+    from multidrop.shell.programs import checking
     from multidrop.shell.streams.stdout import StatusLine
 
     try:
         new_file.check(chosen.output, printed=True)
-        converted = conversion.convert(chosen.file, chosen.to, chosen.personality)
+        converted = checking.convert(chosen.file, chosen.to, chosen.personality)
         found, status = converted.found, StatusLine()
         for each in found.refused:
             write(sys.stderr, each.line_for(chosen.file))

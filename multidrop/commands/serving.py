@@ -63,10 +63,10 @@ def plot(chosen: argparse.Namespace) -> int:
 
 
 def poll(chosen: argparse.Namespace) -> int:
-    from multidrop.shell.plots import poll
+    from multidrop.shell.plots import command
 
-    asked = poll.Polling(chosen.names, chosen.drive or "all", chosen.every, chosen.rows, chosen.json)
-    return poll.run(chosen.url, asked, reconnect=not chosen.no_reconnect)
+    asked = command.Polling(chosen.names, chosen.drive or "all", chosen.every, chosen.rows, chosen.json)
+    return command.poll(chosen.url, asked, reconnect=not chosen.no_reconnect)
 
 
 def publish(chosen: argparse.Namespace) -> int:

@@ -1,20 +1,36 @@
-"""Completion and hints for the line being typed, at the prompt and in the TUI."""
+"""Completion and hints for the line being typed, at the prompt and in the TUI.
+
+A placeholder of a usage has values: open buses and drives, files, words of the drives' languages.
+"""
 
 from __future__ import annotations
 
+import contextlib
+import os
 import re
+from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from multidrop.dialects import Diagnostic
+from multidrop.dialects.families import DEFAULT, FAMILIES
 from multidrop.drives.drive import Drive
-from multidrop.shell.line_syntax import EVERYONE, DriveLine, VerbLine, parse
-from multidrop.shell.operations.offers import PLACEHOLDERS, Found, meant, offered, spoken, targets, verbs
+from multidrop.macros import KEYS
+from multidrop.shell.connect.url_forms import URL_FORMS
+from multidrop.shell.line_syntax import EVERYONE, DriveLine, VerbLine, join_target, parse
+from multidrop.shell.operations.conditions import simulated_cell
 from multidrop.shell.operations.table import VERBS
 from multidrop.shell.operations.usage import following, narrowed
 from multidrop.shell.workspace import Workspace
+from multidrop.simulator.families import PROGRAMS, TABLE
+
+if TYPE_CHECKING:
+    from multidrop.dialects.family import Language
 
 MOST = 200
 """The largest number of completions."""
+Found = Iterable[tuple[str, str]]
+"""Texts, each with its meaning."""
 
 
 @dataclass(frozen=True)
@@ -99,3 +115,91 @@ def _arguments(workspace: Workspace, typed: list[str], word: str) -> Found:
             yield from offered(workspace, each, word)
         elif each == each.lower():
             yield each, verb.words.get(each, "") if verb else ""
+
+
+def spoken(workspace: Workspace, line: DriveLine) -> tuple[Language, str]:
+    """Language and product of the drive that a line goes to, or of a neighbour if that drive is not known."""
+    drive = meant(workspace, line)
+    if drive is None and (bus := workspace.buses.get(line.bus or workspace.selected_bus)):
+        drive = next(iter(bus.drives.values()), None)
+    return (drive.family.language, drive.product) if drive else (FAMILIES[DEFAULT].language, "")
+
+
+def meant(workspace: Workspace, line: DriveLine) -> Drive | None:
+    bus = workspace.buses.get(line.bus or workspace.selected_bus)
+    if not bus or not (line.bus or line.address):
+        return workspace.selected
+    return bus.drives.get(line.address or "")
+
+
+def targets(workspace: Workspace) -> Found:
+    """Addresses as typed: plain on the selected bus, after the bus's name on the others."""
+    for bus in workspace.buses.values():
+        name = "" if bus.name == workspace.selected_bus else bus.name
+        for drive in bus.drives.values():
+            if not drive.address:
+                yield f"{bus.name}:", f"{drive.label} {drive.product}".strip()
+            else:
+                yield join_target(name, drive.address), f"{drive.label} {drive.product}".strip()
+        if "" not in bus.drives:
+            yield join_target(name, "*"), f"every drive of {bus.name}"
+
+
+def verbs(workspace: Workspace) -> Found:
+    return ((verb.name, verb.lines[0]) for verb in VERBS.values() if verb.fits is None or verb.fits(workspace))
+
+
+PLOTS = ("FILE.rrd", "FILE.csv", "FILE.parquet")
+PLACEHOLDERS = (
+    *("ADDR", "@ADDR", "BUS", "BUS[:ADDR]", "DRIVE", "F2..F12", "FILE", *PLOTS, "MACRO", "PAGE"),
+    *("PERSONALITY", "URL", "WORD"),
+)
+"""The words of a usage for which values are known; only a person knows the value of any other placeholder."""
+
+
+def offered(workspace: Workspace, placeholder: str, word: str) -> Found:
+    """The values of a placeholder; `word`: what is typed of it."""
+    drives = [pair for pair in targets(workspace) if not pair[0].endswith("*")]
+    match placeholder:
+        case "ADDR" | "BUS[:ADDR]":
+            yield from drives
+        case "@ADDR":
+            yield from ((f"@{name}", meaning) for name, meaning in drives)
+        case "DRIVE":
+            cell = simulated_cell(workspace)
+            for each in cell.floor.drives if cell else ():
+                name = each.spec.name if each.bus == workspace.selected_bus else f"{each.bus}:{each.spec.name}"
+                yield name, each.spec.personality
+        case "F2..F12":
+            yield from ((key, "") for key in KEYS)
+        case "MACRO" | "PAGE" as what:
+            with contextlib.suppress(Diagnostic):
+                found = workspace.macros.names() if what == "MACRO" else workspace.macros.pages()
+                yield from [(name, "macro" if what == "MACRO" else "page of keys") for name in found]
+        case "PERSONALITY":
+            yield from ((name, family) for family in PROGRAMS for name in TABLE[family].personalities)
+        case "URL":
+            yield from ((name, each.url) for name, each in workspace.settings.connections.items())
+            yield from ((form.prefix, form.meaning) for form in URL_FORMS.values())
+            if word.startswith("sim:"):
+                cells = (f"sim:{name}" for name, _ in _files(word[4:]))
+                yield from ((name, "a cell") for name in cells if name.endswith((".toml", "/")))
+        case "WORD":
+            yield from ((verb.name, verb.lines[0]) for verb in VERBS.values())
+            language, product = spoken(workspace, DriveLine(""))
+            yield from language.complete("", product)
+    if placeholder in ("BUS", "BUS[:ADDR]"):
+        yield from ((bus.name, ", ".join(bus.drives)) for bus in workspace.buses.values())
+    if placeholder in ("FILE", *PLOTS, "URL"):
+        yield from _files(word)
+
+
+def _files(word: str) -> Found:
+    folder, _, _ = word.rpartition("/")
+    base = folder + "/" if "/" in word else ""
+    try:
+        with os.scandir(base or ".") as entries:
+            found = sorted((entry.name, entry.is_dir()) for entry in entries if not entry.name.startswith("."))
+    except OSError:
+        return []
+    return [(f"{base}{name}/" if is_dir else f"{base}{name}", "") for name, is_dir in found]

@@ -1,4 +1,7 @@
-"""The way of a registry to a broker: topics, texts, limits of what rests and of transcripts, the heartbeat."""
+"""The way of a registry to a broker: topics, texts, limits of what rests and of transcripts, the heartbeat.
+
+For the discovery of Home Assistant one retained message for each value makes it a sensor there, and nothing a command.
+"""
 
 from __future__ import annotations
 
@@ -6,10 +9,12 @@ import asyncio
 import json
 import re
 import socket
+import zlib
 from collections import Counter, defaultdict
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 from datetime import datetime
+from typing import Any
 
 from multidrop.dialects.on_demand import imported
 from multidrop.dialects.text import counted, visible
@@ -18,7 +23,6 @@ from multidrop.drives.events import Unsolicited
 from multidrop.shell.events import Entered, Failed, Notified, OnBus, Printed, SessionEvent
 from multidrop.shell.log.files import Entry, line_of
 from multidrop.shell.publishing.broker import Message
-from multidrop.shell.publishing.home_assistant import sensor
 from multidrop.shell.publishing.publisher import Publisher
 from multidrop.shell.publishing.registry import BYE, ONLINE, Fields, Key, Registry, Value
 from multidrop.shell.streams.stdout import shortened
@@ -152,6 +156,42 @@ class LineLimit:
         self.left, self.at = self.left + min(BURST, (now - self.at) * LINES) - 1, now
         dropped, self.dropped = self.dropped, 0
         return dropped
+
+
+PREFIX = "homeassistant"
+"""The topic under which Home Assistant looks, unless it is told another one."""
+EXPIRES = 60.0
+"""Seconds, or three periods, after which a number that is no longer published is unavailable there."""
+AVAILABLE = "{{ 'online' if value == 'online' else 'offline' }}"
+MEASURED = ("position", "velocity")
+
+
+def sensor(key: Key, value: Value, topic: str, available: tuple[str, ...], period: float, product: str) -> Message:
+    """Make the message that describes the sensor of a value.
+
+    `topic`: of the value. `available`: the topics that say `online` while values are current.
+    """
+    quantity = "quantity" in value.fields
+    template = f"value_json.{'quantity' if quantity else 'value'}"
+    if key.axis:  # all axes share a topic; an empty text leaves a number as it is
+        template += f" if value_json.axis == {json.dumps(key.axis)} else ''"
+    drive = f"{key.bus} {key.address}".strip()
+    identity = f"multidrop {topic} {key.axis}".rstrip()
+    numbers: dict[str, Any] = {"state_class": "measurement", "expire_after": round(max(EXPIRES, 3 * period))}
+    config = {
+        "name": f"{key.axis} {key.what}".strip(),
+        "unique_id": identity,
+        "state_topic": topic,
+        "value_template": f"{{{{ {template} }}}}",
+        "availability": [{"topic": each, "value_template": AVAILABLE} for each in available],
+        "availability_mode": "all",
+        "device": {"identifiers": [f"multidrop {topic.rpartition('/')[0]}"], "name": drive, "model": product},
+        "origin": {"name": "multidrop", "sw_version": imported("multidrop:__version__")},
+        **(numbers if key.what in MEASURED else {}),
+        **({"unit_of_measurement": str(value.fields["unit"])} if quantity else {}),
+    }
+    name = f"{re.sub('[^a-zA-Z0-9_-]+', '-', identity)}-{zlib.crc32(identity.encode()):08x}"
+    return Message(f"{PREFIX}/sensor/{name}/config", json.dumps(config), retain=True, bus=key.bus)
 
 
 KINDS = {Entered: "typed", Printed: "printed", Notified: "notice", Failed: "failed"}

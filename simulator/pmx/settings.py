@@ -10,8 +10,8 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+from multidrop.dialects.files import rows
 from multidrop.dialects.pmx.manual.script_parser import KEPT_VARIABLES
-from multidrop.dialects.rows import rows
 
 AXES = ("X", "Y")
 INT32 = 2**31

@@ -14,7 +14,7 @@ from typing import Any
 import pytest
 
 from multidrop import Diagnostic, Session, TransportLost, connect
-from multidrop.api import notebook, threads
+from multidrop.api import blocking, threads
 from multidrop.api.threads import Ended, LoopThread
 from tests.support.cell_session import bus, moves, party
 from tests.support.virtual import VirtualLoop
@@ -97,7 +97,7 @@ def test_an_interrupted_cell_stops_what_the_session_moves(session: Session, kern
 def test_a_picture_is_replaced_until_it_is_closed(
     session: Session, kernel: Kernel, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(notebook, "EVERY", 0.01)
+    monkeypatch.setattr(blocking, "EVERY", 0.01)
     session.drive("a").move(25600)
     session.drive("a").wait()
     live = session.live("a")
@@ -108,7 +108,7 @@ def test_a_picture_is_replaced_until_it_is_closed(
 
 
 def test_a_picture_ends_with_its_session(session: Session, kernel: Kernel, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(notebook, "EVERY", 0.01)
+    monkeypatch.setattr(blocking, "EVERY", 0.01)
     live = session.live()
     session.close()
     live._thread.join(10)

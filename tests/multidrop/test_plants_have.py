@@ -13,8 +13,7 @@ from typing import Any
 
 import pytest
 
-from multidrop.shell.publishing.feed import Topics
-from multidrop.shell.publishing.home_assistant import sensor
+from multidrop.shell.publishing.feed import Topics, sensor
 from multidrop.shell.publishing.registry import Key, Value
 from tests.support.foreign_python import foreign_python
 from tests.support.mosquitto import free_port

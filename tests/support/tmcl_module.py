@@ -6,8 +6,8 @@ from multidrop.dialects.tmcl.host import codec
 from multidrop.dialects.tmcl.manual import commands
 from multidrop.dialects.tmcl.manual.modules import module_of
 from multidrop.simulator.cell.spec import DriveSpec, WorldSpec
+from multidrop.simulator.tmcl.family import TmclPort
 from multidrop.simulator.tmcl.module import TmclModule
-from multidrop.simulator.tmcl.port import TmclPort
 from multidrop.simulator.world import World
 
 

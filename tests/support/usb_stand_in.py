@@ -13,7 +13,7 @@ from contextvars import Context, copy_context
 from dataclasses import dataclass, field
 from random import Random
 
-from multidrop.simulator.pmx.usb import UsbController
+from multidrop.simulator.pmx.family import UsbController
 from multidrop.simulator.serving.running import Listener, RunningFloor
 from multidrop.transports import Unreachable
 from multidrop.transports.controllers import Found, chosen

@@ -14,7 +14,7 @@ import pytest
 
 from multidrop.simulator.cells import read
 from multidrop.simulator.floor import Floor
-from multidrop.simulator.pmx.usb import UsbController
+from multidrop.simulator.pmx.family import UsbController
 from multidrop.simulator.serving.running import RunningFloor
 from multidrop.simulator.serving.usbip import UsbipServer
 from multidrop.transports import TransportLost, Unreachable

@@ -56,8 +56,6 @@ LATER = {
     *(f"multidrop.tui.screens.{page.place.partition(':')[0]}" for page in PAGES),
     *(
         "multidrop.tui.editor",
-        "multidrop.shell.params.page",
-        "multidrop.shell.operations.offers",
         "multidrop.shell.prompt.complete",
     ),
     *(

@@ -13,8 +13,7 @@ from multidrop.dialects import Diagnostic
 from multidrop.dialects.families import FAMILIES
 from multidrop.dialects.values import IO, VARIABLES, Reading, Readings
 from multidrop.shell.events import SettingsRead
-from multidrop.shell.params.page import edit, found_in, meanings_of, parsed, rows
-from multidrop.tui.screens.parameters import ParametersPage
+from multidrop.tui.screens.parameters import ParametersPage, edit, found_in, meanings_of, parsed, rows
 from tests.support.fake_session import FakeSession, demo_session, emit, on_screen, press, settle
 
 at_screen = pytest.mark.tui

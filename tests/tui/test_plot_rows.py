@@ -19,9 +19,8 @@ from multidrop.tui.curves.raster import ASCII
 from multidrop.tui.curves.samples import Quantity
 from multidrop.tui.curves.trigger import State
 from multidrop.tui.panels.plot import plot_rows, plot_title
-from multidrop.tui.panels.plot_tools import cursor_rows, parse_trigger, typed_trigger
 from multidrop.tui.screens.dialogs import Field
-from multidrop.tui.screens.plot_page import PlotPage
+from multidrop.tui.screens.plot_page import PlotPage, cursor_rows, parse_trigger, typed_trigger
 from multidrop.tui.widgets.lines import width_of
 from tests.support.fake_session import FakeBus, FakeDrive, FakeSession, a_move, demo_session, on_screen, press, settle
 from tests.support.panel_rows import plain, view

@@ -12,8 +12,7 @@ from multidrop.dialects.values import Conditions
 from multidrop.drives.events import Traffic
 from multidrop.shell.events import Phase
 from multidrop.tui.panels.program import listing_rows, program_rows, program_title, state_words
-from multidrop.tui.panels.table import log_rows, log_title, size_words
-from multidrop.tui.panels.traffic import piece_rows, traffic_rows
+from multidrop.tui.panels.table import log_rows, log_title, piece_rows, size_words, traffic_rows
 from multidrop.tui.panels.view import Glance, View
 from multidrop.tui.readout import ProgramFacts, Readout
 from multidrop.tui.screen_model import Piece, ScreenModel

@@ -4,24 +4,38 @@ On a wide screen several are shown, in places: below the transcript, and in colu
 rests on the size of the screen and on the panels that a person has hidden, never on what they show. Panels that share a
 place have it in turn: one that has nothing to show leaves it to the next one, and so does the room that it does not
 use. On a narrow screen there is a single panel, below the transcript.
+
+The panels of the log and of the traffic are here; those of drives, programs and plots have modules of their own.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from datetime import datetime
 from typing import NamedTuple
 
+from rich.cells import cell_len
+
+from multidrop.shell.raw import hex_of, parts_of, text_of
 from multidrop.tui.panels.drive import drive_title
 from multidrop.tui.panels.drives import drives_rows
 from multidrop.tui.panels.facts import cards_rows, next_rows, selected_rows
 from multidrop.tui.panels.plot import panel_rows, plot_title
 from multidrop.tui.panels.plotted import plot_shows
 from multidrop.tui.panels.program import program_rows, program_shows, program_title
-from multidrop.tui.panels.traffic import traffic_rows, traffic_title
-from multidrop.tui.panels.view import View
+from multidrop.tui.panels.view import View, names_on
+from multidrop.tui.screen_model import Piece
 from multidrop.tui.text import fit, visible
 from multidrop.tui.widgets.lines import Row, width_of
 
+OUT, IN = "↑", "↓"
+CLOCK = 12
+"""Width of `12:41:05.123`."""
+NAME = 12
+"""The largest width of a drive's name."""
+HEX_FROM = 60
+"""Width in cells from which a row has room for hex beside text."""
+Wall = Callable[[float], datetime]
 OFF = (" off", " /log on: a new file in the state folder", " /log FILE: one that you name")
 
 
@@ -53,6 +67,56 @@ def size_words(size: int) -> str:
 def _end_of(path: str, width: int) -> str:
     """Shorten a path to its end, where file names differ."""
     return path if len(path) <= width else f"…{path[1 - width :]}"
+
+
+def traffic_rows(view: View, width: int, height: int) -> list[Row]:
+    """The last pieces that fit, without polls and their replies."""
+    name = view.session.selected_bus
+    pieces = view.model.bus(name).traffic.pieces if name in view.session.buses else ()
+    rows, names = list[Row](), names_on(view.session, name)
+    for piece in reversed(pieces):
+        if not piece.poll:
+            rows[:0] = piece_rows(piece, view.session.wall, width, names)
+        if len(rows) >= height:
+            break
+    return rows[-height:] or [((fit(" nothing yet; polls are not shown", width), "dim"),)]
+
+
+def traffic_title(view: View) -> Row:
+    """The title: the bus."""
+    return ((f" traffic {view.session.selected_bus} ", "strong"), ("without polls ", "dim"))
+
+
+def piece_rows(piece: Piece, wall: Wall, width: int, names: Mapping[str, str], hex_too: bool = True) -> list[Row]:
+    """A piece as rows: time, direction, drive by its name, then text and hex, or text alone where there is no room."""
+    at = wall(piece.at)
+    clock = f"{at:%H:%M:%S}.{at.microsecond // 1000:03}"
+    head = f" {clock} " if width >= HEX_FROM else f" {clock[6:]} "
+    sign = OUT if piece.outgoing else IN
+    role = "dim" if piece.poll else "strong" if piece.outgoing else "text"
+    place = min(NAME, max(3, *map(cell_len, ("", *names.values()))))
+    room = max(8, width - len(head) - place - 4)
+    beside = hex_too and width >= HEX_FROM
+    size = room // 4 if beside else room
+    rows: list[Row] = []
+    for number, part in enumerate(parts_of(piece.data, size, len(piece.data) * 4 if beside else room)):
+        start = head if not number else " " * len(head)
+        where = fit("" if number else names.get(piece.address, piece.address), place)
+        rows.append(
+            (
+                (start, "dim"),
+                (f"{sign} " if not number else "  ", role),
+                (f"{where} ", "dim"),
+                (fit(_dots(part), size + 1) if beside else text_of(part), role),
+                *([(hex_of(part), "dim")] if beside else []),
+            )
+        )
+    return rows
+
+
+def _dots(data: bytes) -> str:
+    """Bytes as text of the same length, beside their hex: a dot for each that is not printable."""
+    return "".join(chr(each) if 0x20 <= each < 0x7F else "·" for each in data)
 
 
 MOTION, CONDITIONS, PLOT = "motion", "conditions", "plot"

@@ -6,19 +6,28 @@ sends the lines that are shown. They go out as if they were typed, and then ever
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import re
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from textual.binding import BindingType
 
 from multidrop.dialects import Diagnostic
-from multidrop.dialects.values import VARIABLES, Readings, Value
+from multidrop.dialects.values import (
+    ORDINARY,
+    VARIABLES,
+    Parameters,
+    Permission,
+    Reading,
+    Readings,
+    Scalar,
+    Value,
+    same,
+)
 from multidrop.drives.drive import Drive
 from multidrop.shell import setting_units
 from multidrop.shell.params import file as files
-from multidrop.shell.params.page import Edit, edit, found_in, meanings_of, parsed, rows
-from multidrop.shell.params.page import Row as Setting
 from multidrop.tui.key_table import bound
 from multidrop.tui.panels.table import column_rows, panel
 from multidrop.tui.panels.view import Glance, View, name_of
@@ -26,9 +35,102 @@ from multidrop.tui.screens.page import Begun, Host, ListPage
 from multidrop.tui.text import age, fit
 from multidrop.tui.widgets.lines import Row, Span, spread
 
+if TYPE_CHECKING:
+    from multidrop.dialects.family import Language
+
+_NUMBER = re.compile(r"[+-]?\d{1,20}")
+_FRACTION = re.compile(r"[+-]?(?:\d{1,20}\.\d*|\.\d+)(?:[eE][+-]?\d{1,3})?")
 NAME, VALUE, UNIT = 8, 16, 10
 TOLD = ("range", "value", "values", "note")
 """The rows of help for the chosen setting, besides its title and meaning."""
+
+
+@dataclass(frozen=True)
+class Setting:
+    """One setting: its value here and what it is compared with, each as text."""
+
+    reading: Reading
+    value: str
+    other: str = ""
+    """Empty where there is nothing to compare with."""
+    differs: bool = False
+    meaning: str = ""
+
+
+def rows(found: Readings, other: Mapping[str, Value] | None, meanings: Mapping[str, str]) -> list[Setting]:
+    """A row for each setting. `other`: the values to compare with."""
+    made = []
+    for each in found.readings:
+        there = None if other is None else other.get(each.name)
+        compared = "" if there is None else files.shown(there)
+        differs = there is not None and not same(each.value, there)
+        made.append(Setting(each, files.shown(each.value), compared, differs, meanings.get(each.name, "")))
+    return made
+
+
+def found_in(table: Sequence[Setting], words: str, *, differing: bool = False) -> list[Setting]:
+    """The rows that contain every word: names, sections, values, meanings."""
+    wanted = words.casefold().split()
+
+    def contains(row: Setting) -> bool:
+        text = f"{row.reading.name} {row.reading.section} {row.value} {row.reading.unit} {row.meaning}".casefold()
+        return all(each in text for each in wanted)
+
+    chosen = [row for row in table if contains(row) and (row.differs or not differing)]
+    return sorted(chosen, key=lambda row: row.reading.name.casefold() != words.strip().casefold())
+
+
+def meanings_of(found: Readings, language: Language, product: str) -> dict[str, str]:
+    """The first line of help on each setting, without its name."""
+    made = {}
+    for each in found.readings:
+        for word in (each.name, each.name.rstrip("0123456789")):
+            try:
+                first = language.describe(word, product)[0]
+            except Diagnostic:
+                continue
+            made[each.name] = re.sub(r" \((?:variable|flag)\)$", "", first.partition(": ")[2] or first)
+            break
+    return made
+
+
+def parsed(text: str) -> Value:
+    """Read a typed value: a number, a text, or the fields of a set-up with commas. Raises Diagnostic."""
+    fields = [each.strip() for each in text.strip().strip("[]").split(",")]
+    if not all(fields):
+        raise Diagnostic("a value is missing", text, "such as 600000, or 1,1,0 for a set-up")
+    values: list[Scalar] = []
+    for each in fields:
+        if _NUMBER.fullmatch(each):
+            values.append(int(each))
+        elif _FRACTION.fullmatch(each):
+            values.append(float(each))
+        elif each.isascii() and each.isprintable():
+            values.append(each.strip('"'))
+        else:
+            raise Diagnostic("not a value", each, "a number, or text in plain ASCII")
+    return values[0] if len(values) == 1 else tuple(values)
+
+
+@dataclass(frozen=True)
+class Edit:
+    """The lines that change one setting, and what a person must know before they are sent."""
+
+    lines: tuple[str, ...]
+    warning: str = ""
+
+
+def edit(parameters: Parameters[Any], state: Any, present: Readings, name: str, value: Value) -> Edit:
+    """Plan the lines that set one value. Raises Diagnostic for a value that the drive refuses."""
+    made = parameters.plan(state, present, {name: value}, ORDINARY)
+    warning = "; ".join(reason for _, reason in made.withheld)
+    if made.withheld:
+        made = parameters.plan(state, present, {name: value}, Permission(frozenset({name}), communication=True))
+    if made.impossible:
+        raise Diagnostic("; ".join(reason for _, reason in made.impossible), name)
+    if not made.changes:
+        raise Diagnostic(f"it is {files.shown(value)} already", name)
+    return Edit(tuple(change.text for change in made.changes), "; ".join(filter(None, (warning, *made.remarks))))
 
 
 @dataclass

@@ -9,7 +9,7 @@ from textual.binding import BindingType
 
 from multidrop.dialects.text import counted
 from multidrop.tui.key_table import bound
-from multidrop.tui.panels.traffic import piece_rows
+from multidrop.tui.panels.table import piece_rows
 from multidrop.tui.panels.view import View, names_on
 from multidrop.tui.screen_model import TrafficStore
 from multidrop.tui.screens.page import Host, Page

@@ -16,7 +16,7 @@ from random import Random
 from typing import Any
 
 from multidrop.dialects.errors import Diagnostic
-from multidrop.dialects.files import split_lines
+from multidrop.dialects.files import rows, split_lines
 from multidrop.dialects.mcode.manual import program_file
 from multidrop.dialects.mcode.manual.grammar import Number, Statement, parsed, statement_tokens
 from multidrop.dialects.mcode.manual.help import out_of_range
@@ -27,7 +27,6 @@ from multidrop.dialects.mcode.manual.program_flow import AT_POWER_UP
 from multidrop.dialects.mcode.manual.statements import spelled, words_of
 from multidrop.dialects.mcode.manual.table import lookup
 from multidrop.dialects.program_files import Conversion, Problem
-from multidrop.dialects.rows import rows
 
 SOURCES = ("MDI", "MDIE", "MDIX")
 TARGETS = ("LMDCM", "LMDOM", "LMDCE", "LMDOE")

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from enum import IntEnum
 
-from multidrop.dialects.rows import rows
+from multidrop.dialects.files import rows
 
 
 class ErrorNumber(IntEnum):

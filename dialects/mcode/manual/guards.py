@@ -2,6 +2,10 @@
 
 A guarded line erases, takes the drive out of reach, or starts it in a way that its word does not show. A stop is never
 guarded. (MCode reference 5.1.6, 5.1.9, 5.1.23, 5.1.33, 5.1.45, 5.1.63, 5.1.75, 5.1.105, 5.1.133.)
+
+And what may guard a unit itself: the cyber security of newer Lexium Ethernet units, which carry a CSE mark, as far as
+users report it. Until a person disables it with the unit's access code, the unit does not reply; or it prints and
+moves, and refuses every value. Nothing of its bytes is public.
 """
 
 from __future__ import annotations
@@ -9,8 +13,9 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Mapping
 
-from multidrop.dialects.family import ADDRESSES, EVERYONE, Guard, to_all
-from multidrop.dialects.mcode.manual.grammar import LineError, Number, Statement, parse
+from multidrop.dialects.family import ADDRESSES, EVERYONE, Guard, Protection, to_all
+from multidrop.dialects.mcode.manual.grammar import LineError, Number, Statement, parse, parsed
+from multidrop.dialects.mcode.manual.mnemonic import ETHERNET
 from multidrop.dialects.mcode.manual.program_file import bare
 from multidrop.dialects.mcode.manual.table import lookup
 
@@ -124,3 +129,23 @@ def _value(statement: Statement) -> int | str:
     if len(statement.arguments) == 1 and isinstance(first, Number) and first.value == int(first.value):
         return int(first.value)
     return "?"
+
+
+TEXT = (
+    "cyber security may be on: a newer Lexium Ethernet unit (CSE mark) does not reply, or refuses every value, until "
+    "it is disabled in the maker's software"
+)
+
+
+def _text(product: str) -> str:
+    return TEXT if not product or ETHERNET.match(product) else ""
+
+
+def _word(text: str) -> str:
+    """The variable or flag to which a line gives a value; empty: it gives none."""
+    statement = parsed(text)
+    row = lookup(statement.word) if statement is not None and statement.arguments else None
+    return row.name if row is not None and row.kind in ("variable", "flag") else ""
+
+
+CYBER_SECURITY = Protection(_text, _word)

@@ -12,8 +12,7 @@ from dataclasses import dataclass
 from multidrop.dialects.mcode.manual.grammar import Argument, Name, Number, Statement, words
 from multidrop.dialects.mcode.manual.program_file import ProgramLine
 from multidrop.dialects.mcode.manual.statements import CONDITIONAL
-from multidrop.dialects.program_files import Problem
-from multidrop.dialects.walks import nearest, walk, way_to
+from multidrop.dialects.program_files import Problem, nearest, walk, way_to
 
 PLACES = {"BR": 0, "CL": 0, "OE": 0, "TC": 0, "TM": 0, "TI": 1, "TP": 1, "TT": 1, "TR": 1, "TA": 1}
 """Words that go to a place or name one, and the position of that place among their arguments."""

@@ -15,8 +15,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+from multidrop.dialects.files import rows
 from multidrop.dialects.mcode.manual.mnemonic import EVERY, LEXIUM, MDRIVE_PLUS, READ_ONLY, Default, Mnemonic, Number
-from multidrop.dialects.rows import rows
 
 
 def _number(text: str) -> Number | None:

@@ -1,7 +1,7 @@
 """What is read of an Ethernet drive over Modbus: settings, conditions, values for plots, and all of it for a snapshot.
 
 The drive and its rules are those of MCode, so the order of the steps is, too. What has no register, or another form in
-it, is left to MCode/TCP. Nothing moves, and nothing is cleared.
+it, is left to MCode/TCP. Nothing moves, and nothing is cleared. What a step is in units is read in the same way.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ from functools import partial
 
 from multidrop.dialects.codec import Priority, Procedure
 from multidrop.dialects.errors import Diagnostic, Inexpressible, NoAnswer, Refused
+from multidrop.dialects.mcode.host import units
 from multidrop.dialects.mcode.host.state import who
 from multidrop.dialects.mcode.host.values import SNAPSHOT_WORDS, rows_of_list, snapshot_of
 from multidrop.dialects.mcode.manual import parameter_plan, points
@@ -33,6 +34,7 @@ from multidrop.dialects.modbus.host.operations import (
     value,
 )
 from multidrop.dialects.modbus.manual.registers import REGISTERS
+from multidrop.dialects.units import Basis, Units
 from multidrop.dialects.values import (
     Conditions,
     Facts,
@@ -226,3 +228,14 @@ VALUES = Values(
     controls=points.controls,
     actions=points.ACTIONS,
 )
+
+
+def basis(state: ModbusState, axis: str, full_steps: int | None) -> Procedure[Basis]:
+    values = {}
+    for word in units.rests_on(state.product):
+        if word in REGISTERS:
+            values[word] = str((yield from value(state, word)))
+    return units.counted(state.product, values, full_steps)
+
+
+UNITS = Units(units.UNITS.axes, units.fields, units.UNITS.words, basis, units.disturbs, units.reads)

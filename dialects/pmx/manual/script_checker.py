@@ -16,8 +16,7 @@ from dataclasses import dataclass
 from multidrop.dialects.pmx.manual import script_compiler
 from multidrop.dialects.pmx.manual.script_compiler import LINES
 from multidrop.dialects.pmx.manual.script_parser import Statement, parse
-from multidrop.dialects.program_files import Problem, errors, in_order, refuse
-from multidrop.dialects.walks import nearest, walk
+from multidrop.dialects.program_files import Problem, errors, in_order, nearest, refuse, walk
 
 _OPENS = {"ENDIF": "IF", "ELSE": "IF", "ELSEIF": "IF", "ENDWHILE": "WHILE"}
 _ENDS = {"IF": "ENDIF", "WHILE": "ENDWHILE", "PRG": "END", "SUB": "ENDSUB"}

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from enum import IntEnum
 
 from multidrop.dialects.codec import Command as TypedCommand
-from multidrop.dialects.rows import rows
+from multidrop.dialects.files import rows
 from multidrop.dialects.text import counted
 
 

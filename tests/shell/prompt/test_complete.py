@@ -9,11 +9,10 @@ from multidrop.dialects.on_demand import imported
 from multidrop.shell.channel import Front
 from multidrop.shell.connect.url_forms import URL_FORMS
 from multidrop.shell.connect.urls import KEYS
-from multidrop.shell.operations.offers import PLACEHOLDERS
 from multidrop.shell.operations.table import VERBS
 from multidrop.shell.operations.usage import forms, is_placeholder
-from multidrop.shell.prompt.complete import complete, hint
-from multidrop.simulator.sim_words import USAGES
+from multidrop.shell.prompt.complete import PLACEHOLDERS, complete, hint
+from multidrop.simulator import USAGES
 from tests.support.cases import for_each
 
 BOTH = [("press", "a"), ("press", "b"), ("eth", "!")]
