@@ -26,7 +26,7 @@ async def open_libusb(target: str) -> UsbPipe:
 class LibusbCarrier:
     """The transfers of one controller. Making one finds and claims it, which may block. Raises Unreachable."""
 
-    delay = 0.0
+    delay: float = 0.0
 
     def __init__(self, target: str) -> None:
         self._usb1 = usb1 = library()

@@ -150,7 +150,7 @@ class SerialControl(PortControl):
 class SerialDevice:
     """A port through pyserial's blocking calls, for systems that cannot watch a descriptor."""
 
-    piece = _PIECE
+    piece: int = _PIECE
 
     def __init__(self, port: str, baud: int) -> None:
         self.name = com_name(present(port) or port)

@@ -11,7 +11,10 @@ from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Protocol
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from serial.tools.list_ports_common import ListPortInfo
 
 _COM = re.compile(r"(?:\\\\[.?]\\)?(COM[0-9]+)", re.IGNORECASE)
 _LINKS = ("dev/serial/by-id", "dev/serial/by-path")
@@ -28,15 +31,6 @@ class PortInfo:
     On Windows it is made of the adapter's USB serial number.
     """
     description: str = ""
-
-
-class UsbPort(Protocol):
-    """A port as pyserial lists it."""
-
-    device: str
-    vid: int | None
-    pid: int | None
-    serial_number: str | None
 
 
 def list_ports(root: Path = Path("/")) -> list[PortInfo]:
@@ -86,7 +80,7 @@ def com_name(port: str) -> str:
     return found[1].upper() if found else port
 
 
-def usb_names(ports: Iterable[UsbPort]) -> dict[str, str]:
+def usb_names(ports: Iterable[ListPortInfo]) -> dict[str, str]:
     """Return the name by USB serial number of each port that has one to itself, as in `usb-0403-6001-A5069RR4`."""
     names = {
         port.device: f"usb-{port.vid:04x}-{port.pid:04x}-{port.serial_number}"

@@ -131,7 +131,7 @@ class Elsewhere(Transport):
 class HostLog:
     """The log that the host writes."""
 
-    size = 0
+    size: int = 0
 
     def __init__(self, path: str) -> None:
         self.path = Path(path)
