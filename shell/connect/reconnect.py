@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from multidrop.dialects import DriveError, Hints, Stopped
 from multidrop.drives.drive import confirmed_motion
 from multidrop.drives.events import Changed, isolated
+from multidrop.shell.connect import Pauses
 from multidrop.shell.stop_report import E_STOP, UNCONFIRMED, last_seen
 from multidrop.transports import Transport, TransportLost, Unreachable
 
@@ -120,14 +121,14 @@ class LoginAgain:
     def __init__(self, open_: Callable[[float, int | None], Awaitable[Transport]], took: float) -> None:
         self._open = open_
         self._within = min(max(LOGIN, PATIENCE * took), SLOWEST_LOGIN)
-        self._pause = 0.0
+        self._pauses = Pauses(0.0, LONGEST_PAUSE, FIRST_PAUSE)
 
     async def __call__(self, old: Transport) -> Transport:
         await old.close()
-        await asyncio.sleep(self._pause)
-        self._pause = min(2 * self._pause + FIRST_PAUSE, LONGEST_PAUSE)
+        await asyncio.sleep(self._pauses.now)
+        self._pauses.lengthen()
         opened = await self._open(self._within, old.control.baud if old.control else None)
-        self._pause = 0.0
+        self._pauses.begin(0.0)
         return opened
 
 
@@ -164,9 +165,9 @@ Say = Callable[[str, str], None]
 """Publishes a warning: the name of the bus, the text."""
 
 
-def next_pause(pause: float, failure: TransportLost) -> float:
-    """The pause after an attempt that failed, s; `pause`: the one before it."""
-    return min(2 * pause, GLANCE if isinstance(failure, Absent) else LONGEST)
+def limit_of(failure: TransportLost) -> float:
+    """The longest pause after an attempt that failed, s."""
+    return GLANCE if isinstance(failure, Absent) else LONGEST
 
 
 SILENT = 5.0
@@ -278,29 +279,28 @@ class _Return:
         if self._unsure:
             seen = ", ".join(f"{each.shown} {last_seen(each, self._since)}" for each in self._unsure)
             self._say(f"{bus.name}: cannot be stopped from here until the line is back: {seen}{E_STOP}")
-        pause = FIRST
-        while pause:
-            await asyncio.sleep(pause)
+        pauses = Pauses(FIRST, LONGEST)
+        while True:
+            await asyncio.sleep(pauses.now)
             if newcomer is not None and bus.drives and bus.lost is None:
                 return  # a person's search has found them
             try:
                 await self._attempt()
+                break
             except Stopped:
-                pause = min(2 * pause, GLANCE)
+                pauses.lengthen(GLANCE)
             except DriveError as failure:  # after a search of some seconds
-                pause = FIRST
+                pauses.begin(FIRST)
                 if newcomer is None:
                     self._failed(str(failure))
                 elif newcomer.silent(failure):
-                    pause = SILENT
+                    pauses.begin(SILENT)
                 else:
                     return
             except TransportLost as failure:
                 if not isinstance(failure, Absent):
                     self._failed(str(failure))
-                pause = next_pause(pause, failure)
-            else:
-                pause = 0.0
+                pauses.lengthen(limit_of(failure))
         if newcomer is not None and bus.drives:
             return await newcomer.found()
         self._say(f"{bus.name} is back after {bus.now() - self._since:.1f} s")

@@ -14,6 +14,7 @@ from collections.abc import Callable, Sequence
 
 from multidrop.dialects import Diagnostic
 from multidrop.dialects.text import counted
+from multidrop.shell.connect import Pauses
 from multidrop.shell.publishing.broker import Connection, Message
 from multidrop.transports import TransportLost
 
@@ -88,10 +89,10 @@ async def connected(make: Callable[[], Connection]) -> Connection:
 
 async def again(make: Callable[[], Connection], notify: Callable[[str], None]) -> Connection:
     """Try until there is a connection; say each reason once."""
-    pause, said = FIRST, ""
+    pauses, said = Pauses(FIRST, LONGEST), ""
     while True:
-        await asyncio.sleep(pause)
-        pause = min(2 * pause, LONGEST)
+        await asyncio.sleep(pauses.now)
+        pauses.lengthen()
         try:
             return await connected(make)
         except (TransportLost, Diagnostic) as failure:

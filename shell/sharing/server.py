@@ -17,8 +17,9 @@ from typing import Any, cast
 from multidrop.dialects import Diagnostic, StopPiece
 from multidrop.dialects.text import counted
 from multidrop.shell import configuration
+from multidrop.shell.connect import Pauses
 from multidrop.shell.connect.opening import OpenedPort, open_port
-from multidrop.shell.connect.reconnect import FIRST, next_pause
+from multidrop.shell.connect.reconnect import FIRST, LONGEST, limit_of
 from multidrop.shell.connect.urls import listening, parse
 from multidrop.shell.events import FAILURES
 from multidrop.shell.exit_codes import exit_code
@@ -224,13 +225,13 @@ class SharedPort:
     async def _return(self) -> None:
         """Open the port again, as a lost bus is."""
         assert self._port.reopen is not None
-        pause = FIRST
+        pauses = Pauses(FIRST, LONGEST)
         while self._loss is not None:
-            await asyncio.sleep(pause)
+            await asyncio.sleep(pauses.now)
             try:
                 self._transport = await self._port.reopen(self._transport)
             except TransportLost as failure:
-                pause = next_pause(pause, failure)
+                pauses.lengthen(limit_of(failure))
             else:
                 self._loss, self._purged = None, 0
         self._transport.start(self._received, self._broke)
