@@ -65,8 +65,6 @@ def typed(world: World, data: bytes, session: Session, who: str = "") -> None:
     if data[:1] in (b"y", b"Y"):
         world.history.told.yes.append(world.loop.now)
     if STOP in data:
-        if not who:
-            world.history.told.latches.append((world.loop.now, True))
         buses = {name: bus for name, bus in session.buses.items() if not bus.link.lost}
         forms = {f"{name}{who}": _forms(world, bus) for name, bus in buses.items()}
         trying = session.reconnections.trying
@@ -89,5 +87,5 @@ def _forms(world: World, bus: Bus) -> tuple[bytes, ...]:
         return tuple(purge + telnet.escaped(each) for each in found)
     if kind == "ssh":
         drop = b"" if forms.framed else frame(Kind.DROP)
-        return tuple(beat + drop + bytes((Kind.DATA,)) for each in found for beat in (b"", frame(Kind.BEAT)))
+        return (drop + bytes((Kind.DATA,)),)
     return found

@@ -21,6 +21,8 @@ SOON = 0.05
 
 
 DROP = frame(Kind.DROP)
+CONTROL = re.compile(rb"(?:[PX]\0\0)*(?:[PX]\0?\Z)?")
+"""Drops and signs of life of a relay, of which the last may not have left whole."""
 FULL = Grant("a port that takes nothing", "A port that takes nothing")
 
 
@@ -49,17 +51,20 @@ def _first(world: World) -> Iterator[str | Granted]:
                 begun = b"".join(data for at, data in own if at <= stop.at + SOON)
                 if len(begun) <= rest:  # nothing of what follows the message has left so soon
                     begun = b"".join(data for _, data in after)
-                begins = [begun, *filter(None, [begun[rest:]]), *_behind_a_drop(world, line, first, begun)]
+                begins = [begun, *filter(None, [begun[rest:]])]
+                if world.place(line[:2]).kind == "ssh":
+                    begins = [*_behind_one_drop(world, line, first, begins)]
                 if not any(form.startswith(each) or each.startswith(form) for form in forms for each in begins):
                     yield f"{line}: stop at {stop.at:.6f}, {begun!r} left at {after[0][0]:.6f}"
 
 
-def _behind_a_drop(world: World, line: str, first: int, begun: bytes) -> Iterator[bytes]:
-    """What leaves behind a drop of the stop before, of which nothing else has left: one drop is enough for both."""
-    if world.place(line[:2]).kind == "ssh":
-        before = b"".join(data for _, port, data in world.history.written[:first] if port == line)
-        if before.endswith(DROP):
-            yield DROP + begun
+def _behind_one_drop(world: World, line: str, first: int, begins: list[bytes]) -> Iterator[bytes]:
+    """What leaves behind the drops of the stops before, of which nothing else has left: one drop is enough for all."""
+    before = b"".join(data for _, port, data in world.history.written[:first] if port == line)
+    for whole in (*begins, *(DROP + each for each in begins if before.endswith(DROP))):
+        control = CONTROL.match(whole)
+        assert control is not None
+        yield DROP * (DROP[:1] in control[0]) + whole[control.end() :]
 
 
 def _lost(world: World, line: str, stop: Stop) -> bool:

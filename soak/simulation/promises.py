@@ -82,10 +82,9 @@ def _latched(world: World) -> Iterator[str]:
     """Lines of a macro or a script that began after a stop and before `/resume` are executed before that."""
     told = world.history.told
     for run in told.runs.values():
-        held = [on for at, on in told.latches if at <= run.began][-1:]
-        if not run.automatic or held != [True]:
+        if not run.automatic or not any(on for _, on in told.latches[: run.latches][-1:]):
             continue
-        until = next((at for at, on in told.latches if at > run.began and not on), float("inf"))
+        until = next((at for at, on in told.latches[run.latches :] if not on), float("inf"))
         for each in world.history.executed:
             if (each.line, each.drive, each.text) in run.texts and run.began <= each.at < until:
                 yield f"{each.line}:{each.drive} {each.text!r} of {run.typed!r}, begun after a stop, at {each.at:.3f}"

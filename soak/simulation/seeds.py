@@ -38,6 +38,10 @@ FIXED = {
     2381549: "a state folder that the log had made and not synced, lost in a power cut with the echo mode owed",
     1502: "a stored line that was typed before a stop, too (of the simulation itself)",
     20156: "a stop behind a drop that left in two pieces (of the simulation itself)",
+    100697: "a stop in the moment in which a script began (of the simulation itself)",
+    102161: "the same, where the script's line left in a frame (of the simulation itself)",
+    101585: "a stop behind two drops that left late (of the simulation itself)",
+    100987: "a version that noise changed as it was read, for which a drive was not given its echo mode back",
 }
 DERIVED = 12
 """The number of seeds that follow from the commit."""

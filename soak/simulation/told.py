@@ -38,6 +38,8 @@ class Run:
     """What it may send after its early end."""
     download: Download | None = None
     began: float = -1.0
+    latches: int = 0
+    """The number of latches before it began: a stop may come in the same moment."""
     ended: float = -1.0
     automatic: bool = False
     """A macro or a script, which a stop keeps from beginning until `/resume`."""
@@ -81,7 +83,7 @@ class Told:
     programs: dict[str, float] = field(default_factory=dict)
     """When the first program of a line was started that prints."""
     latches: list[tuple[float, bool]] = field(default_factory=list)
-    """When a stop came, and when `/resume` or the next session let automation run again."""
+    """When the thread of a stop had done its work, and when `/resume` or the next session let automation run again."""
     halts: list[float] = field(default_factory=list)
     """When everything was stopped."""
     stored: list[Put] = field(default_factory=list)

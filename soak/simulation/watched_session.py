@@ -44,6 +44,8 @@ def ahead(world: World) -> Iterator[None]:
     finally:
         del world.stopping[me]
         stop.done = len(world.history.written)
+        if not stop.who:
+            world.history.told.latches.append((world.loop.now, True))
         for name in stop.forms:
             stop.own.setdefault(name, (stop.done, world.kernel.rest(name)))
 

@@ -98,7 +98,7 @@ def wrote(world: World, line: str, data: bytes) -> None:
 
 async def watched(world: World, run: Run, work: Awaitable[Any]) -> None:
     """Do the work of a run, and note its end; after an early one look at the drives."""
-    run.began, run.failure = world.loop.now, ""
+    run.began, run.latches, run.failure = world.loop.now, len(world.history.told.latches), ""
     if run.download is not None:
         run.download.old = held(world, run.download.line, run.download.drive)
     try:
