@@ -17,7 +17,8 @@ from multidrop.dialects.codec import Codec
 class Owed:
     """An echo mode to restore in a drive, or a download to end, or settings, and how to recognise that drive.
 
-    `serial` is empty where the drive does not report one. `lines` restore settings; empty: it is one of the others.
+    `serial` is empty where the drive does not report one; else it is compared, too, and neither version nor part is:
+    noise can change both as they are read. `lines` restore settings; empty: it is one of the others.
     """
 
     em: int
@@ -30,8 +31,9 @@ class Owed:
 
     def like(self, state: DriveState) -> bool:
         """Whether this may be the same drive, apart from its serial number."""
-        own = (self.name, self.product, self.version, self.part)
-        return own == (state.name, state.product, state.version, state.part)
+        if (self.name, self.product) != (state.name, state.product):
+            return False
+        return bool(self.serial) or (self.version, self.part) == (state.version, state.part)
 
 
 @dataclass(frozen=True)

@@ -1,5 +1,7 @@
 """Opening a port after a session that was cut off: half a line is never executed, and what was owed is put back."""
 
+from dataclasses import replace
+
 import pytest
 
 from multidrop.dialects import Hints, Owed
@@ -115,8 +117,8 @@ def test_what_was_owed_is_put_back_and_said(bench, em, party, check, half):
     [
         Owed(1, "b", OWED.product, OWED.version, OWED.part, OWED.serial),
         Owed(1, "a", "LMDOM", OWED.version, OWED.part, OWED.serial),
-        Owed(1, "a", OWED.product, "LMDCM 5.0", OWED.part, OWED.serial),
-        Owed(1, "a", OWED.product, OWED.version, "LMDCM572", OWED.serial),
+        Owed(1, "a", OWED.product, "LMDCM 5.0", OWED.part),
+        Owed(1, "a", OWED.product, OWED.version, "LMDCM572"),
         Owed(1, "a", OWED.product, OWED.version, OWED.part, "040100098"),
     ],
 )
@@ -125,6 +127,12 @@ def test_nothing_is_put_back_in_another_drive(bench, other):
     [state] = found(desk, True, owed=(other,))
     assert (device.programming, device.memory.echo_mode, state.restore) == (None, 0, None)
     assert not any(b"EM=" in data for data in desk.written)
+
+
+def test_a_version_that_noise_had_changed_keeps_nothing_from_the_drive_with_the_serial_number(bench):
+    desk, device, _, owed = killed(bench, check=0)
+    [state] = found(desk, True, owed=(replace(owed, version="LMDCM 6.002,' Hw: 3.2", part="LMDCM5?1"),))
+    assert (device.memory.echo_mode, state.codec.em, state.restore) == (1, 1, None)
 
 
 @pytest.mark.parametrize("em", [1, 2, 3])
