@@ -154,8 +154,11 @@ def _unknown(world: World) -> Iterator[str | Granted]:
         return
     history = world.history
     stops = [each.at for each in history.stops] + history.told.halts + history.deaths + [at for at, _ in history.passed]
+    early = [(run.began, run.ended + OUTAGE) for run in history.told.runs.values() if run.failure]
     for command, _, words in _cases(world):
         if command.outcome is not Outcome.UNKNOWN or command.said == "cancelled":
+            continue
+        if any(began <= command.ended and command.began <= ended for began, ended in early):  # which stops drives
             continue
         switched = [at for (line, _), times in world.cut.items() if line == command.line for at in times]
         if any(command.began - OUTAGE <= at <= command.ended for at in (*stops, *switched)):

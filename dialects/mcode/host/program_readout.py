@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import TypeVar
 
@@ -170,7 +170,11 @@ def read(state: MCodeState, _: Sequence[SourceLine], progress: Progress) -> Proc
     locked = yield from _again(state, lambda: flag(state, "LK"))
     listed = () if locked else (yield from _again(state, lambda: listing(state, "")))
     names = yield from _again(state, lambda: perform(state, "PR UV"))
-    return Held(stored(listed), tuple(name.strip() for name in names if name.strip()), locked)
+    held = Held(stored(listed), tuple(name.strip() for name in names if name.strip()), locked)
+    labels = any(each.kind == LABEL for each in names_of(held).values())
+    if labels and not (held.lines or locked):  # the L was lost on the line
+        held = replace(held, lines=stored((yield from _again(state, lambda: listing(state, "")))))
+    return held
 
 
 def _again(state: MCodeState, ask: Callable[[], Procedure[T]]) -> Procedure[T]:

@@ -156,3 +156,20 @@ def test_a_file_keeps_its_lines_and_gets_the_variables_that_it_lacks(text, names
     made = MCODE.programs.refreshed(text, Held(names=names))
     lines = text.removesuffix("\n").split("\n")
     assert [line for line in made if not line.startswith("VA Q1=5")] == lines and ("VA Q1=5" in made) is bool(names)
+
+
+def test_a_program_whose_listing_was_lost_is_listed_again():
+    desk, state = drive()
+    stores(desk, "PG 1", "LB G1", "MR 100", "E", "PG")
+    device, lost = desk.devices["!"], []
+    execute = device.execute
+
+    def loses_the_first(text, now, **how):
+        if str(text).strip() == "L" and not lost:
+            lost.append(text)
+            return execute("", now, **how)
+        return execute(text, now, **how)
+
+    device.execute = loses_the_first
+    held = desk.run(MCODE.programs.read(state, (), lambda done, total: None), state)
+    assert lost and [line.text for line in held.lines] == ["LB G1", "MR 100", "E"]
