@@ -145,12 +145,16 @@ class Line:
         """What waits for the wire: by priority, then in order."""
         self._tickets = 0
         self._poll_passed_over = False
+        self._nak_of = ""
+        """The drive of the last reply, if that was a NAK: it is asked why before another drive's ACK can come."""
         self._state: State = None
         self._doubt = Doubt()
         self._repeats: list[StopPiece] = []
         """Pieces of the last stop that are still to be repeated."""
         self._partial_until = float("-inf")
         """Until then the drives have part of a line that would do harm if it ended there."""
+        self.overtaken = False
+        """Another thread has written a stop: what comes may be the reply to it. `stop` follows, or `cut_off`."""
         self._events: list[LineEvent] = []
 
     # Requests
@@ -203,6 +207,7 @@ class Line:
 
         Pieces of the last stop that are not written yet go first, so that each drive has its turn.
         """
+        self.overtaken = False
         flight = self._state if isinstance(self._state, Flight) else None
         if flight is not None:
             self._finish(flight, Decoded(Reply(end=End.STOPPED), 0), now)
@@ -228,6 +233,7 @@ class Line:
         `begun`: the drives may hold a part of a line that does harm if it ends there. A reply to the flight may still
         come, once the wire is whole again.
         """
+        self.overtaken = False
         flight = self._state if isinstance(self._state, Flight) else None
         if flight is not None:
             self._doubt.weigh(flight.request, Reply(end=End.STOPPED), now)
@@ -290,6 +296,8 @@ class Line:
         poll_waits, at = self._queue[-1].priority is Priority.POLL, 0
         if poll_waits and self._poll_passed_over:
             at = next(at for at, each in enumerate(self._queue) if each.priority is Priority.POLL)
+        if self._nak_of:
+            at = next((at for at, each in enumerate(self._queue) if each.request.address == self._nak_of), at)
         priority, ticket, request = self._queue.pop(at)
         self._poll_passed_over = poll_waits and priority is not Priority.POLL
         request = copy_with(request, tag=ticket)
@@ -308,8 +316,9 @@ class Line:
         ended = Transaction(flight.request, reply, flight.sent_at, now, flight.transmitted_at, flight.sent)
         self._events.append(Finished(flight.ticket, ended))
         self.inbox.consume(found.used, now)
-        # A mark that ends the wait for another reply recovers too: an ACK may follow it.
-        troubled = weight.ends_wait or reply.end in (End.TIMEOUT, End.DAMAGED)
+        self._nak_of = flight.request.address if reply.end is End.NAK else ""
+        # A mark that ends the wait for another reply recovers too: an ACK may follow it. After a NAK others wait.
+        troubled = weight.ends_wait or reply.end in (End.TIMEOUT, End.DAMAGED) or bool(self._nak_of and self._queue)
         self._state = Recovering(now) if troubled else None
 
     # Replies
@@ -317,6 +326,8 @@ class Line:
     def _decoded(self, flight: Flight, now: float) -> Decoded | None:
         """The reply, if it is whole, if quiet ends it, or if time is up."""
         codec, request, buffer = flight.request.codec, flight.request, self.inbox.buffer
+        if not self._takes_reply(flight):
+            return codec.on_timeout(request, b"") if now >= flight.times(buffer, self.timeout)[1] else None
         found = codec.decode(request, buffer) if buffer else None
         if found is not None:
             return found
@@ -327,6 +338,10 @@ class Line:
         if found is None and now >= timeout:
             return codec.on_timeout(request, buffer)
         return found
+
+    def _takes_reply(self, flight: Flight) -> bool:
+        """Whether what comes is the reply to it: not if a stop of another thread kept it back, or has left since."""
+        return flight.sent and not self.overtaken
 
     def _without_echo(self, flight: Flight, now: float) -> Decoded | None:
         """The end of a request whose bytes were not repeated unchanged: no reply can be trusted."""
@@ -355,6 +370,7 @@ class Line:
             buffer, flight = self.inbox.buffer, self._state
             quiet, timeout = flight.times(buffer, self.timeout)
             by_quiet = flight.judged_length != len(buffer) and not self.inbox.awaits_echo
+            by_quiet = by_quiet and self._takes_reply(flight)
             return min(timeout, quiet) if by_quiet else timeout
         tail = self.inbox.tail_at()
         if not (isinstance(self._state, Recovering) and (self._queue or self._repeats)):

@@ -207,6 +207,7 @@ class Stopping:
         def stop(dropped: int) -> bytes:
             data, whole = forms.written(bool(dropped or link.line.half_sent(now)))
             self._ahead = forms, data, whole
+            link.line.overtaken = True
             return data
 
         link.transport.preempt(forms.framed, stop)

@@ -24,6 +24,10 @@ if TYPE_CHECKING:
     from soak.simulation.clock import SimulatedLoop
 
 
+PROMPT = 0.0005
+"""The longest time, s, that a datagram is on its way which is not late."""
+
+
 class Network:
     """All hosts, what listens on them, and the connections to them."""
 
@@ -31,6 +35,8 @@ class Network:
         self.loop, self.rng, self.climate = loop, rng, climate
         self.doubled: list[tuple[str, bytes]] = []
         """The datagrams that arrived twice, with their hosts."""
+        self.astray: list[tuple[float, str]] = []
+        """When datagrams arrived twice or late, with their hosts."""
         self._hosts: dict[str, Host] = {}
         self._listening: dict[Address, Callable[[], asyncio.BaseProtocol]] = {}
         self._datagrams: dict[Address, Datagrams] = {}
@@ -132,10 +138,13 @@ class Network:
         """Send one: it may be lost, late or doubled."""
         if host.dark > self.loop.now or self.drawn("datagram lost"):
             return
-        for again in (False, True) if self.drawn("datagram doubled") else (False,):
+        twice = self.drawn("datagram doubled")
+        for again in (False, True) if twice else (False,):
             if again:
                 self.doubled.append((host.name, data))
-            self.loop.call_later(self.delay("datagram late"), arrive, data)
+            if (delay := self.delay("datagram late")) > PROMPT or twice:
+                self.astray.append((self.loop.now + delay, host.name))
+            self.loop.call_later(delay, arrive, data)
 
     def at_host(self, host: Host, address: Address, data: bytes, sender: Socket) -> None:
         """A datagram arrives at a host, where nothing may take it."""

@@ -28,8 +28,8 @@ OUTAGE = 10.0
 SEVEN_BITS = Grant("a checksum of seven or eight bits", "The checksum of CK has seven bits")
 NOISY_ACK = Grant("an ACK of noise", "An ACK without its command")
 NOISY_NAK = Grant("a NAK of noise", "A NAK of noise together with a lost ACK")
-DOUBLED = Grant("a datagram that arrives twice", "A datagram that arrives twice")
-OTHERS_REPLY = Grant("a reply to another client's stop", "The reply to another client's stop")
+ASTRAY = Grant("a datagram that arrives twice or late", "A datagram that arrives twice or late")
+STOPS_REPLY = Grant("a reply to a stop, late or to another client", "The reply to a stop")
 BARE_REFUSAL = Grant("a refusal of noise, without a checksum", "A refusal without a checksum")
 BARE_COMMAND = Grant("a damaged command without a checksum", "Noise on the line")
 NO_SIGN = Grant("a mode without a sign of execution", "0010")
@@ -87,7 +87,7 @@ def _twice(world: World) -> Iterator[str | Granted]:
         elif _made(world.history, command, NAK) and _took(world.history, command, ACK):
             yield Granted(NOISY_NAK, words)
         elif _doubled(world, command):
-            yield Granted(DOUBLED, words)
+            yield Granted(ASTRAY, words)
         else:
             yield words
 
@@ -114,18 +114,42 @@ def _refused(world: World) -> Iterator[str | Granted]:
 
 def _lost(world: World) -> Iterator[str | Granted]:
     for command, times, words in _cases(world):
-        if times or command.outcome is not Outcome.OK:
-            continue
-        if not world.place(command.line).checked:
-            noise = _damage(world.history, command.line, command.began - AFTER, command.ended)
-            grant = BARE_COMMAND if noise else OTHERS_REPLY if _stopped_by_another(world, command) else None
+        if not times and command.outcome is Outcome.OK:
+            grant = _confirms_lost(world, command)
             yield Granted(grant, words) if grant else words
-        elif _made(world.history, command, ACK):
-            yield Granted(NOISY_ACK, words)
-        elif _executed_as_another(world, command):
-            yield Granted(SEVEN_BITS, words)
-        else:
-            yield words
+
+
+def _confirms_lost(world: World, command: Command) -> Grant | None:
+    """What can have confirmed a command that was lost."""
+    if _astray(world, command.line, command.began, command.ended):
+        return ASTRAY
+    if not world.place(command.line).checked:
+        if _damage(world.history, command.line, command.began - AFTER, command.ended):
+            return BARE_COMMAND
+        return STOPS_REPLY if _stopped_by_another(world, command) or _stop_unanswered(world, command) else None
+    if _made(world.history, command, ACK):
+        return NOISY_ACK
+    return SEVEN_BITS if _executed_as_another(world, command) else None
+
+
+def _astray(world: World, line: str, since: float, until: float) -> bool:
+    """Whether a datagram of a line arrived twice or late in a time, or so before it that its reply came then."""
+    host = world.place(line).host
+    return any(name == host and since - AFTER <= at <= until for at, name in world.network.astray)
+
+
+def _stop_unanswered(world: World, command: Command) -> bool:
+    """Whether a PMX owed a reply to a stop of its own client as a command began: fewer have come than lines left."""
+    history, line = world.history, command.line
+    own = [stop.at for stop in history.stops if stop.who == command.who and not world.climate.calm]
+    since = min((at for at in own if 0 <= command.began - at <= AFTER), default=inf)
+    left = sum(
+        data.count(b"\r")
+        for at, port, data in history.written
+        if port == line + command.who and since <= at < command.began
+    )
+    came = sum(data.count(b"\r") for at, data in history.received.get(line, []) if since <= at < command.began)
+    return came < left and world.place(line).language == "pmx"
 
 
 def _stopped_by_another(world: World, command: Command) -> bool:
@@ -198,10 +222,13 @@ def _credited(world: World) -> Iterator[str | Granted]:
         if any(shown.form.format(each.number) == shown.text for each in own if each.until > shown.began):
             continue
         words = f"{shown.line}:{shown.drive} printed {shown.text!r}, asked at {shown.began:.3f}"
+        breach: str | Granted = ""
         if origin := _origin(shown, numbers):
-            yield f"{words}: {origin}"
+            breach = f"{words}: {origin}"
         elif own and all(each.restarts == shown.restarts for each in own if each.until > shown.began):
-            yield _never_held(world, shown, f"{words}: it never held that")
+            breach = _never_held(world, shown, f"{words}: it never held that")
+        if breach:
+            yield Granted(ASTRAY, words) if _astray(world, shown.line, shown.began, shown.at) else breach
 
 
 def _origin(shown: Shown, numbers: dict[str, Held]) -> str:
@@ -252,7 +279,7 @@ OUTCOMES = (
         "No command is executed twice.",
         "What is never done twice",
         _twice,
-        (BARE_COMMAND, NOISY_NAK, DOUBLED),
+        (BARE_COMMAND, NOISY_NAK, ASTRAY),
     ),
     Rule("denied", "What was said to be not sent was not executed.", NOISE, _denied, (BARE_COMMAND,)),
     Rule("refused", "What was said to be refused was not executed.", NOISE, _refused, (BARE_REFUSAL,)),
@@ -261,7 +288,7 @@ OUTCOMES = (
         "What was said to be done was executed.",
         NOISE,
         _lost,
-        (BARE_COMMAND, NOISY_ACK, SEVEN_BITS, OTHERS_REPLY),
+        (BARE_COMMAND, NOISY_ACK, SEVEN_BITS, STOPS_REPLY, ASTRAY),
     ),
     Rule(
         "unknown",
@@ -276,6 +303,6 @@ OUTCOMES = (
         "A value is credited to the drive that gave it, and to the question that asked for it.",
         NOISE,
         _credited,
-        (BARE_VALUE, SEVEN_BITS),
+        (BARE_VALUE, SEVEN_BITS, ASTRAY),
     ),
 )

@@ -42,6 +42,11 @@ FIXED = {
     102161: "the same, where the script's line left in a frame (of the simulation itself)",
     101585: "a stop behind two drops that left late (of the simulation itself)",
     100987: "a version that noise changed as it was read, for which a drive was not given its echo mode back",
+    100575: "the reply to a stop of another thread, taken for that to a line which this stop had kept from the wire",
+    100321: "a line to another drive between a NAK and the question why, after which neither was known",
+    100155: "a datagram that came late, and confirmed a command that was lost (of the simulation itself)",
+    100924: "a datagram that came twice, and was shown as the next value (of the simulation itself)",
+    100531: "a late reply of a PMX to a stop, which confirmed a command that was lost (of the simulation itself)",
 }
 DERIVED = 12
 """The number of seeds that follow from the commit."""

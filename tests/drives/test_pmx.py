@@ -5,7 +5,7 @@ from random import Random
 
 import pytest
 
-from multidrop.dialects import End, Hints, NoAnswer, Priority, Refused, StopPiece
+from multidrop.dialects import End, Hints, NoAnswer, Priority, Refused, Stopped, StopPiece
 from multidrop.dialects.pmx.host.codec import GAP, Pmx
 from multidrop.drives.bus import Bus
 from multidrop.drives.events import Unsolicited
@@ -61,12 +61,44 @@ class Wire(Transport):
         pass
 
 
-async def opened(*numbers, **answers):
-    wire = Wire(asyncio.get_running_loop(), *numbers, **answers)
+class Overtaken(Wire):
+    """A wire on which another thread writes a stop; what the loop writes is dropped until it has taken that over."""
+
+    held = False
+
+    def preempt(self, whole, make):
+        self.held = super().write(make(self.discard(whole)))
+        return True
+
+    def yielded(self):
+        self.held = False
+        return True
+
+    def write(self, data):
+        return not self.held and super().write(data)
+
+
+async def opened(*numbers, kind=Wire, **answers):
+    wire = kind(asyncio.get_running_loop(), *numbers, **answers)
     bus = Bus("cell", wire, baud=9600, family="pmx")
     bus.start()
     await bus.identify(Hints(drives=numbers))
     return bus, wire
+
+
+@pytest.mark.parametrize(("left", "said"), [(True, "it is not known"), (False, "it was not sent")])
+async def test_the_reply_to_a_stop_that_the_loop_has_not_taken_over_is_none_to_a_command(left, said):
+    bus, _ = await opened("00", kind=Overtaken, **{"V1=5": None})
+    send = bus.drives["00"].send
+    sent = asyncio.ensure_future(send("V1=5"))
+    if left:
+        await asyncio.sleep(0.01)
+    bus.stop_ahead()
+    await asyncio.sleep(0.1)
+    assert not sent.done()
+    bus.stop()
+    with pytest.raises(Stopped, match=said):
+        await sent
 
 
 async def test_a_stop_reaches_every_known_number_and_no_answers_run_into_it():

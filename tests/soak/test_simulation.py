@@ -103,10 +103,10 @@ def test_docs_list_every_rule_by_its_name_and_its_sentence() -> None:
     )
 
 
-def found(history: History, checksum: int = 1) -> dict[str, list[str | Granted]]:
+def found(history: History, checksum: int = 1, *astray: tuple[float, str]) -> dict[str, list[str | Granted]]:
     """What the rules of commands and values find on a line of two drives, `a` and `b`."""
     place = Place("l", "mcode", ("a", "b"), 1, checksum, 9600, True)
-    network = SimpleNamespace(doubled=[])
+    network = SimpleNamespace(doubled=[], astray=astray)
     calm = SimpleNamespace(calm=False)
     world: Any = SimpleNamespace(history=history, network=network, place=lambda line: place, climate=calm)
     return {rule.name: list(rule.check(world)) for rule in OUTCOMES if list(rule.check(world))}
@@ -118,6 +118,14 @@ def told(outcome: Outcome, executions: int, noise: tuple[bytes, bytes] | None = 
     history = History(commands={"@l:a MR 7": command}, executed=[Executed(1.5, "l", "a", "MR 7")] * executions)
     if noise is not None:
         history.damage["l"] = [Damage(1.4, *noise)]
+    return history
+
+
+def shown(text: str, drive: str = "a", restarts: int = 0) -> History:
+    """A value that was shown as a drive's from 5 s to 6 s: `a` held 70000001, then 70000002; `b` 70000003."""
+    history = History(shown=[Shown("l", drive, text, "v{}", 5.0, 6.0, restarts)])
+    for drive, number, at in (("a", "70000001", 1.0), ("b", "70000003", 1.0), ("a", "70000002", 4.0)):
+        history.holds(Held("l", drive, number, at, 0))
     return history
 
 
@@ -154,6 +162,15 @@ def test_what_no_host_can_know_is_granted(history: History, checksum: int, grant
     assert each.grant.name == grant
 
 
+@pytest.mark.parametrize("what", [told(Outcome.OK, 0), shown("v70000001")], ids=["lost", "credited"])
+def test_a_datagram_that_arrives_late_or_twice_is_granted(what: History) -> None:
+    [[each]] = found(what, 1, (1.2 if what.commands else 5.2, "l.plant")).values()
+    assert isinstance(each, Granted)
+    assert each.grant.name == "a datagram that arrives twice or late"
+    [[each]] = found(what, 1, (9.0, "l.plant"), (5.2, "m.plant"), (1.2, "m.plant")).values()
+    assert isinstance(each, str)
+
+
 def test_with_a_checksum_noise_alone_excepts_nothing() -> None:
     inserted = told(Outcome.UNKNOWN, 2, (b"", b"\x15"))  # and the ACK was there
     for history in (inserted, told(Outcome.NOT_SENT, 1, (b"8", b"7")), told(Outcome.OK, 0, (b"7", b"8"))):
@@ -167,14 +184,6 @@ def test_a_command_that_became_another_one_with_a_right_checksum_is_granted() ->
     [[each]] = found(history).values()
     assert isinstance(each, Granted)
     assert each.grant.name == "a checksum of seven or eight bits"
-
-
-def shown(text: str, drive: str = "a", restarts: int = 0) -> History:
-    """A value that was shown as a drive's from 5 s to 6 s: `a` held 70000001, then 70000002; `b` 70000003."""
-    history = History(shown=[Shown("l", drive, text, "v{}", 5.0, 6.0, restarts)])
-    for drive, number, at in (("a", "70000001", 1.0), ("b", "70000003", 1.0), ("a", "70000002", 4.0)):
-        history.holds(Held("l", drive, number, at, 0))
-    return history
 
 
 def test_a_value_of_the_drive_at_that_time_is_right() -> None:
