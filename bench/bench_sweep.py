@@ -99,8 +99,8 @@ def _note() -> str:
 
 def _on_a_cluster(one: list[float]) -> Iterator[Row]:
     with cluster() as address:
-        swept(CASES, "--cluster", address)  # the workers import what they need
-        found = [CASES / swept(CASES, "--cluster", address) for _ in range(ROUNDS)]
+        swept(CASES, "--cluster", address, "--yes")  # the workers import what they need
+        found = [CASES / swept(CASES, "--cluster", address, "--yes") for _ in range(ROUNDS)]
     ours, theirs = statistics.median(found), statistics.median(one)
     yield Row("cases, a cluster of 2 workers", "/s", ours, theirs, "1 process", ours / theirs, note=_note())
 
