@@ -66,7 +66,7 @@ coverage: measured
 	$(BIN)/coverage report
 
 readme: $(VENV)/.dev
-	$(PYTEST) tests/docs
+	$(PYTEST) --nightly tests/docs
 
 bench: $(VENV)/.dev
 	$(BIN)/python bench/run.py $(if $(ONLY),--only $(ONLY)) $(if $(FULL),--full) $(if $(KEEP),--keep)

@@ -95,6 +95,7 @@ class Link:
         return self.departure.under_way
 
     def resume(self, transport: Transport) -> None:
+        self.line.overtaken = False  # a stop that met the loss went to the old transport
         self.transport, self.lost = transport, None
         self.start()
 

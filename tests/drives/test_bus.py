@@ -90,6 +90,16 @@ async def test_a_drive_that_no_stop_reaches_is_named_in_the_end(desk):
     assert not any(text.startswith("b: stopped") for text in desk.told) and desk.moving("b")
 
 
+async def test_a_stop_that_meets_the_loss_hides_no_reply_once_the_line_is_back():
+    desk = SimulatedBus()
+    desk.floor.command("/sim unplug w")
+    await until(lambda: desk.bus.lost)
+    desk.bus.line.overtaken = True  # by a thread that had not seen the loss
+    desk.floor.command("/sim plug w")
+    desk.bus.resume(desk.pipe("sim:#w", desk.floor, "w", lambda: None))
+    assert not desk.bus.line.overtaken
+
+
 async def test_a_lost_pipe_fails_all_that_waits_and_whatever_follows(desk):
     waiting = [asyncio.create_task(desk.send(address, "PR P")) for address in "aabb"]
     await asyncio.sleep(0.001)
