@@ -39,6 +39,7 @@ PAINT = 0.5
 CALM = (UNKNOWN, ENDED, MOVING, AT_REST)
 WHERE, NAME, STATE, NUMBER, AGE = 16, 16, 10, 14, 7
 UNREACHED = "‼ NOT REACHED: Ctrl+X at {}, or the emergency stop there; this page only reads"
+PARTS = ("heading", "columns", "drives", "ignored", "footer")
 KEYS = (("↑↓", "choose"), ("Enter", "follow"), ("Esc", "back"), ("type", "narrows"), ("^Q", "quit"))
 
 
@@ -73,12 +74,10 @@ class PlantApp(App[int]):
 
     def compose(self) -> ComposeResult:
         yield Roles()
-        yield Lines(id="heading")
+        heading, *others = (Lines(id=part) for part in PARTS)
+        yield heading
         yield Banner()
-        yield Lines(id="columns")
-        yield Lines(id="drives")
-        yield Lines(id="ignored")
-        yield Lines(id="footer")
+        yield from others
 
     async def watch_broker(self, over: asyncio.Event) -> bool:
         """Connect; return whether that was done before `over`. Raises TransportLost or Diagnostic."""
@@ -173,6 +172,9 @@ class PlantApp(App[int]):
         return self._rows[self._at()] if self._rows else None
 
     def paint(self) -> None:
+        parts = {part.id: part for part in self.query(Lines)}
+        if not parts.keys() >= set(PARTS):
+            return  # a timer of an app whose screen is being taken down
         plant, everything = self.broker.plant, self.broker.rows()
         wanted = self._words.casefold().split()
         self._rows = [row for row in everything if all(word in _text(row) for word in wanted)]
@@ -184,20 +186,20 @@ class PlantApp(App[int]):
         states = " · ".join(f"{counts[state]} {state}" for state in URGENCY if counts[state])
         broker = [("BROKER LOST ", "error")] if self.broker.lost else [(f"{self.target.text} ", "dim")]
         left = [(" PLANT   ", "strong"), (states or "nothing is published here yet", "text")]
-        self.query_one("#heading", Lines).put([spread(left, broker, width)])
+        parts["heading"].put([spread(left, broker, width)])
         below = " · ".join(filter(None, (self._told, summary(plant, everything))))
-        self.query_one("#ignored", Lines).put([((fit(f" {below}", width), "strong" if self._told else "dim"),)])
+        parts["ignored"].put([((fit(f" {below}", width), "strong" if self._told else "dim"),)])
         footer: Shown = tuple(span for key, word in KEYS for span in ((f" {key}", "key"), (f" {word} ", "dim")))
         words = [(f"{self._words}▏ ", "strong")] if self._words else []
-        self.query_one("#footer", Lines).put([spread([*footer, ("  read only", "dim")], words, width)])
-        body = self.query_one("#drives", Lines)
+        parts["footer"].put([spread([*footer, ("  read only", "dim")], words, width)])
+        body = parts["drives"]
         if plant.followed is not None:
             head, rows = self._drive(plant.followed)
         else:
             head = _columns(width)
             at = self._at()
             rows = [_drive_row(row, width, here == at) for here, row in in_view(self._rows, at, body.size.height)]
-        self.query_one("#columns", Lines).put([head])
+        parts["columns"].put([head])
         body.put(rows[: body.size.height])
 
     def _drive(self, place: Place) -> tuple[Shown, list[Shown]]:

@@ -91,6 +91,13 @@ async def test_ctrl_x_says_that_nothing_was_reached_and_where_to_go(before: tupl
         assert not any("NOT REACHED" in row for row in await plant.press("escape"))
 
 
+async def test_a_timer_that_fires_while_the_screen_is_taken_down_paints_nothing() -> None:
+    async with page() as plant:
+        await plant.app.query("#heading").remove()
+        plant.app.paint()
+        assert plant.shown[1].startswith("▸hall-1"), "what is left stands as it was"
+
+
 async def test_one_drive_is_followed_with_the_age_of_each_value() -> None:
     async with page() as plant:
         await plant.press("down", "down", "down", "enter")

@@ -243,7 +243,12 @@ async def test_a_loss_is_an_object_at_its_place_in_a_stream_of_objects(monkeypat
         assert [each["number"] for each in objects] == list(range(500 - loss["lost"])) and last == {"number": 500}
         since, until = (datetime.fromisoformat(loss[name]) for name in ("from", "to"))
         assert list(loss) == ["lost", "from", "to"] and since <= until and since.tzinfo is not None
-        assert taken(errors).decode().startswith(f"{loss['lost']} lines lost, ")
+        told = b""  # a thread of its own writes each stream
+        async with asyncio.timeout(PATIENCE):
+            while not told.endswith(b"\n"):
+                told += taken(errors)
+                await asyncio.sleep(0.001)
+        assert told.decode().startswith(f"{loss['lost']} lines lost, ")
 
 
 @pytest.mark.fork
