@@ -203,10 +203,11 @@ class ModbusLanguage(MCodeLanguage):
     stop = rb"(?s:....)\0\x06.A *E"
 
     def carries(self, data: bytes, text: str) -> bool:
-        """Whether a command is in what left: function 16 with its two registers."""
+        """Whether a command is in what left: a whole message of function 16 with its two registers."""
         name, value = re.split("[= ]", text)
         words = int(value) & 0xFFFF, int(value) >> 16
-        return pack(">BHHBHH", 16, REGISTERS[name].address, 2, 4, *words) in data
+        sent = pack(">BHHBHH", 16, REGISTERS[name].address, 2, 4, *words)
+        return sent in data and bool(re.search(rb"(?s)..\0\0\0\x0b." + re.escape(sent), data))
 
     @staticmethod
     def asks(line: str) -> bool:

@@ -47,6 +47,7 @@ FIXED = {
     100155: "a datagram that came late, and confirmed a command that was lost (of the simulation itself)",
     100924: "a datagram that came twice, and was shown as the next value (of the simulation itself)",
     100531: "a late reply of a PMX to a stop, which confirmed a command that was lost (of the simulation itself)",
+    200066: "the rest of a Modbus message that was half-sent at a stop (of the simulation itself)",
 }
 DERIVED = 12
 """The number of seeds that follow from the commit."""
