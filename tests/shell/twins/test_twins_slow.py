@@ -57,7 +57,8 @@ def moves(family: str, number: int, random: Random) -> list[str]:
         jog = [f"{'ROR' if way > 0 else 'ROL'} 0, {abs(way) // 2 + 500}", wait]
         return random.choice([[f"MVP REL, 0, {way}"], [*jog, "MST 0"], [*jog, "ROR 0, 9000", wait, "MST 0"]])
     if family == "PMX":
-        return random.choice([[f"X{way}"], [f"Y{way}"], ["JX+" if way > 0 else "JX-", wait, "STOPX"]])
+        chosen = random.choice([[f"X{way}"], [f"Y{way}"], ["JX+" if way > 0 else "JX-", wait, "STOPX"]])
+        return [*chosen, "/wait stopped"]  # a target is absolute: the way to it may be long
     return random.choice([[f"MR {way}"], [f"SL {way}", wait, "SL 0"], [f"SL {way}", wait, f"SL {way // 2}", "SL 0"]])
 
 
