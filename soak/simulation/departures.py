@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import re
-from bisect import bisect_left
 from collections.abc import Iterator
 from dataclasses import dataclass
+from math import inf
 
 from multidrop.transports import telnet
 from multidrop.transports.relay import Frames, Kind
@@ -86,11 +86,11 @@ def _never_again(world: World) -> Iterator[str]:
 
 
 def _owed(world: World) -> Iterator[str]:
-    """A line that was lost at a stop is back, and something else leaves first. A killed session owes nothing."""
+    """A line that was lost at a stop is back, and something else leaves first. An ended session owes nothing."""
     history = world.history
     for stop in history.stops:
-        death = bisect_left(history.deaths, stop.at)
-        until = history.deaths[death] if death < len(history.deaths) and not stop.who else float("inf")
+        ends = [at for at in (*history.deaths, *history.began) if at >= stop.at and not stop.who]
+        until = min(ends, default=inf)
         for line in stop.lost:
             if line in stop.own:
                 continue  # it was back as its thread came to it, which wrote the stop

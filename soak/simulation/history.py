@@ -148,8 +148,8 @@ class History:
     """When a process was killed, or lost its terminal."""
     unshown: list[str] = field(default_factory=list)
     """What a terminal has neither shown nor counted."""
-    lives: int = 0
-    """The number of processes that have run."""
+    began: list[float] = field(default_factory=list)
+    """When each process began."""
     power: bool = False
     """The kill that is armed is a power cut."""
     unreadable: list[str] = field(default_factory=list)
@@ -175,6 +175,11 @@ class History:
         self._hash.update(row.encode())  # type: ignore[attr-defined]
         if self.keep:
             self.lines.append((at, kind, text))
+
+    @property
+    def lives(self) -> int:
+        """The number of processes that have run."""
+        return len(self.began)
 
     @property
     def trace(self) -> str:

@@ -47,6 +47,9 @@ FIXED = {
     100155: "a datagram that came late, and confirmed a command that was lost (of the simulation itself)",
     100924: "a datagram that came twice, and was shown as the next value (of the simulation itself)",
     100531: "a late reply of a PMX to a stop, which confirmed a command that was lost (of the simulation itself)",
+    200663: "the error of a Modbus command before, whose flag was not read, which the next line was blamed for",
+    200726: "a drive that a stop without a name reached, which the session said (of the simulation itself)",
+    201394: "a stop that was typed before the terminal hung up, and read after it (of the simulation itself)",
     200066: "the rest of a Modbus message that was half-sent at a stop (of the simulation itself)",
 }
 DERIVED = 12

@@ -246,7 +246,8 @@ class World:
 
     async def _live(self) -> None:
         """Start a process with a session on what the disk holds, and open the lines."""
-        lives = self.history.lives = self.history.lives + 1
+        self.history.began.append(self.loop.now)
+        lives = self.history.lives
         self.history.unreadable += unreadable(self.folder, f"life {lives}", self.history)
         self.process = process = Process(4000 + lives, self.loop)
         process.at_death += (self._died, partial(self.disk.close_all, process), partial(self.scheduler.forget, process))

@@ -119,9 +119,13 @@ def carried_out(state: ModbusState, text: str, pdu: bytes) -> Procedure[bytes]:
     """
     if state.error and (code := (yield from error_number(state))):
         state.note(f"{who(state)}: an old error, now cleared: {described(code, state)}")
+    clear = not state.error
     state.error_flag_read(True)  # until it is read: a command that is not answered in time may still be refused
     answer = yield from answered(state, request(state, text, pdu))
     if code := (yield from error_number(state)):
+        if not clear:
+            old = f"{described(code, state)}; it may be older than '{text}', as the flag could not be read before"
+            raise NoAnswer(f"{who(state)}: {old}: it is not known whether '{text}' was executed; it was sent once")
         raise Refused(f"{who(state)} refused '{text}': {described(code, state)}", code)
     return answer
 

@@ -168,8 +168,16 @@ def _only_ended_by(world: World, run: Run, started: Executed) -> bool:
         or world.climate.wire.harmful
         or world.history.damage.get(started.line)
         or any(at >= started.at for at in world.cut.get((started.line, started.drive), []))
-        or _said(world, started.line, started.at, re.compile("stopped as well|trying again|was lost|restart"))
+        or _said(world, started.line, started.at, re.compile("trying again|was lost|restart"))
+        or _stopped_as_well(world, started)
     )
+
+
+def _stopped_as_well(world: World, started: Executed) -> bool:
+    """Whether the session said that a stop without a name has reached a drive, too; one line alone is not named."""
+    names = {started.drive, f"{started.line}:{started.drive}"}
+    said = [text for at, text in world.history.notices if at >= started.at and text.startswith("stopped as well")]
+    return any(names & set(text.rpartition("has no name: ")[2].split(", ")) for text in said)
 
 
 def _said(world: World, line: str, since: float, words: re.Pattern[str]) -> bool:

@@ -258,6 +258,16 @@ def test_an_error_whose_flag_could_not_be_read_is_told_before_the_next_command_a
     assert any("an old error, now cleared: error 85" in note for note in drive.notes)
 
 
+def test_an_error_whose_flag_could_not_be_read_before_a_command_may_be_older_than_it():
+    far, drive = Far(EF=1, ER=85), state(error=True)
+    procedure = ProcedureRunner(MODBUS.perform(drive, "R2=5"))
+    procedure.answer(Reply(end=End.TIMEOUT))
+    with pytest.raises(NoAnswer, match=r"error 85: .*may be older than 'R2=5'.*not known whether 'R2=5' was executed"):
+        while procedure.request is not None:
+            procedure.answer(far(procedure.request))
+    assert far.get("R2") == 5 and not drive.error
+
+
 def test_the_error_of_a_command_that_was_not_answered_in_time_is_not_blamed_on_the_next():
     far, drive = Far(), state()
     far.silent = {"MR"}
