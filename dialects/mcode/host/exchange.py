@@ -111,7 +111,12 @@ def answered(state: MCodeState, request: Request) -> Procedure[Reply]:
     """Send a request; repeat it only after a NAK with ER=0. Raises Refused or NoAnswer."""
     for _ in range(1 + REPEATS):
         stood = state.error
-        reply = yield request
+        try:
+            reply = yield request
+        except Stopped:
+            if not state.codec.checksum:  # noise may have made a print of it that the drive refuses
+                state.error_possible()
+            raise
         if not reply.doubtful:
             note_error(state, reply)
         if reply.end is End.NAK and not reply.doubtful:
