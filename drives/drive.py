@@ -202,6 +202,11 @@ class Drive:
         return self.state.programming
 
     @property
+    def stores(self) -> bool:
+        """Whether it stores a line that is sent now: not behind a conversation, as a download, which ends that mode."""
+        return self.state.programming and not self.engaged
+
+    @property
     def label(self) -> str:
         """The name that a person gave it; empty without one."""
         return self.state.label
@@ -268,7 +273,7 @@ class Drive:
             procedure = _checked(check(self), procedure)
         if to_all:
             return await self.run(self._to_all(procedure, text))
-        stored, before = self.state.programming, self._sent
+        stored, before = self.stores, self._sent
         known = protection(self.link, self.family) if not self.state.address else None
         refused = False
         try:
@@ -344,7 +349,7 @@ class Drive:
 
     def starts(self, text: str) -> bool:
         """Whether a line can start motion or a program in it; in program mode the line is stored."""
-        return not self.state.programming and self.state.codec.starts_motion(text)
+        return not self.stores and self.state.codec.starts_motion(text)
 
     def starts_now(self) -> None:
         """Note that something that can start it is being sent; with a global address, note it for all drives."""

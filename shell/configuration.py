@@ -84,9 +84,9 @@ class Guarding:
     also: frozenset[str] = frozenset()
 
     def what(self, family: Family[Any], state: DriveState, text: str) -> str:
-        """The effect of a line for a drive, if a person must agree to it; empty: it needs no yes."""
+        """The effect of a line that a drive executes, if a person must agree to it; empty: it needs no yes."""
         guards = family.guards
-        if guards is None or state.programming:
+        if guards is None:
             return ""
         found = guards.find(state, text)
         if found is not None and found.name not in self.off:

@@ -355,6 +355,8 @@ class LinePath:
 
     async def guard(self, drive: Drive, text: str, by: By = By.OPERATOR) -> None:
         """Ask before a guarded line. Raises Diagnostic where it is not agreed to, and by a script or a macro."""
+        if drive.stores:
+            return
         what = self._session.settings.guards.what(drive.family, drive.state, text)
         if what:
             await self._session.questions.confirm(what, self._session.display_name(drive), by=by)
@@ -389,7 +391,7 @@ class LinePath:
 
 def _only_reads(drive: Drive, text: str) -> bool:
     guards = drive.family.guards
-    return guards is not None and not drive.programming and (guards.only_reads(text) or guards.only_ends(text))
+    return guards is not None and not drive.stores and (guards.only_reads(text) or guards.only_ends(text))
 
 
 def _raw_line(workspace: Workspace, line: str | TypedLine) -> DriveLine | None:

@@ -22,7 +22,7 @@ BEYOND: ContextVar[bool] = ContextVar("beyond", default=False)
 
 async def ask(units: Units, drive: Drive, text: str, by: By) -> None:
     """Ask before a move that leaves the travel of its axis; say once where the end is not known."""
-    if drive.programming or (drive.address in EVERYONE and not units.workspace.bus(drive.link.name).all_drives):
+    if drive.stores or (drive.address in EVERYONE and not units.workspace.bus(drive.link.name).all_drives):
         return
     for each in units.meant(drive):
         limited = {name: axis for name, axis in units.axes(each).items() if axis.scale.travel is not None}

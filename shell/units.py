@@ -257,7 +257,7 @@ class Units:
 
     async def _converted(self, drive: Drive, text: str, found: Sequence[re.Match[str]]) -> Line:
         name = self.workspace.display_name(drive) or drive.shown
-        if drive.programming:
+        if drive.stores:
             raise Refused(f"{name} is in program mode, which takes no quantity; nothing was sent")
         drives = self.meant(drive)
         fields = {field.start: field for field in drive.family.units.fields(drives[0].state, text)}
@@ -382,7 +382,7 @@ class Units:
                 f"{text}: '{question}' prints no quantity", self.name(drive, ""), "compare it with a number"
             )
         axis, takes = found
-        if drive.programming:
+        if drive.stores:
             raise Refused(f"{self.name(drive, '')} is in program mode, which takes no quantity")
         measure, given = await self.measure(drive, axis), quantity(text.strip("{}"), self.own)
         if within:

@@ -165,9 +165,9 @@ class TmclLanguage:
 
     @staticmethod
     def carries(data: bytes, text: str) -> bool:
-        """Whether a command is in what left."""
+        """Whether a command is in what left: a frame from its address on."""
         word, value = text.split()[0], int(text.split()[-1])
-        return (b"\x05\xc2\0" if word == "SAP" else b"\x04\0\0") + value.to_bytes(4) in data
+        return data.find((b"\x05\xc2\0" if word == "SAP" else b"\x04\0\0") + value.to_bytes(4)) > 0
 
     @staticmethod
     def refused(answer: Any) -> bool:

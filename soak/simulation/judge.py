@@ -95,9 +95,11 @@ SAID = Grant("a session that says that it cannot", "What a report means")
 def _restored(world: World) -> Iterator[str | Granted]:
     said = re.compile(r"may be EM=0 now|the next one cannot repair this port")
     for found in world.history.owing:
-        line = found[:2]
+        line, _, drive = found.partition(" ")[0].partition(":")
+        silent = f"{line}: {drive} does not reply"  # what is owed to it is kept for the session after this one
         warned = any(line in text and said.search(text) for _, text in world.history.notices)
-        yield Granted(SAID, found) if warned else found
+        asked = any(text == silent and at >= world.history.began[-1] for at, text in world.history.notices)
+        yield Granted(SAID, found) if warned or asked else found
 
 
 def _ends(world: World) -> Iterator[str]:

@@ -23,9 +23,11 @@ GAP = 0.03
 """Seconds of quiet after a command of a stop, so that its reply does not collide with the next command."""
 FACTORY = "00"
 """The device number of a new unit."""
-DONE, VALUE = "OK", "(?![OK]+$).*"
+DONE, VALUE = "OK", "(?![OK]*$).*"
 """The reply to a command that reads nothing, and to one that reads (manual 9). A late one of the other kind is none.
-Neither is what is left of several: no value has these letters alone."""
+Neither is what is left of several: no value has these letters alone, and none is empty."""
+STORED, TOKEN = re.compile(r"SA\d+", re.ASCII), "(?![OK]+$).*"
+"""A read of a line of a program, and its reply, which is empty where nothing is stored."""
 WRITES_FLASH = re.compile(r"STORE|SA\d+=", re.ASCII)
 MARKED = re.compile(r"\?Q(\d\d)?\d{3}", re.ASCII)
 """The reply to a sync mark (`exchange`)."""
@@ -57,7 +59,8 @@ class Pmx(Codec):
         if size > LONGEST:
             raise Inexpressible(f"the command has {size} characters with its number, {LONGEST} are sent at most")
         timeout = FLASH if WRITES_FLASH.match(text) else None
-        kind, expect = (Kind.PRINT, VALUE) if reads(text) else (Kind.COMMAND, DONE if lookup(text) else None)
+        value = TOKEN if STORED.fullmatch(text) else VALUE
+        kind, expect = (Kind.PRINT, value) if reads(text) else (Kind.COMMAND, DONE if lookup(text) else None)
         return Request(address, text, kind, self, timeout=timeout, expect=expect)
 
     def encode(self, request: Request) -> bytes:
