@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
-from multidrop.dialects.codec import Request
 from multidrop.dialects.errors import Refused
 from multidrop.dialects.mcode.host.codec import MCode
 from multidrop.dialects.mcode.manual import errors
@@ -169,10 +168,6 @@ def refuse_in_program(state: MCodeState, then: str = "") -> None:
     if state.programming:
         more = f", then {then}" if then else ""
         raise Refused(f"{who(state)} is in program mode and would store it: PG ends that{more}")
-
-
-def unknown(state: DriveState, request: Request) -> str:
-    return f"{who(state)} does not reply: it is not known whether '{request.text}' was executed; it was sent once"
 
 
 def report_error(state: DriveState, code: int) -> None:
