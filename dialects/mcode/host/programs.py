@@ -16,19 +16,7 @@ from multidrop.dialects.mcode.host import classify, operations, program_readout
 from multidrop.dialects.mcode.host.before_request import value_of
 from multidrop.dialects.mcode.host.download import clears_itself, download
 from multidrop.dialects.mcode.host.operations import immediate
-from multidrop.dialects.mcode.host.program_readout import (
-    FileProgram,
-    annotated,
-    declared,
-    file_of,
-    immediate_lines,
-    names_of,
-    programs_of,
-    readable,
-    refreshed,
-    size,
-    size_of_file,
-)
+from multidrop.dialects.mcode.host.program_readout import FileProgram
 from multidrop.dialects.mcode.host.state import MCodeState, who
 from multidrop.dialects.mcode.manual import guards
 from multidrop.dialects.mcode.manual.grammar import Argument, Compare, LineError, Name, Number, Statement, Unary, parse
@@ -54,10 +42,10 @@ def differences(
 
     `before`: what the drive held before the file was sent. A line of that after a program is another program's.
     """
-    names = names_of(held)
-    found = programs_of(lines)
+    names = program_readout.names_of(held)
+    found = program_readout.programs_of(lines)
     starts = {start for each in found if (start := each.start(names)) is not None}
-    known = {*names, *(each[1] for line in lines if (each := declared(line.text)) is not None)}
+    known = {*names, *(each[1] for line in lines if (each := program_readout.declared(line.text)) is not None)}
     made: list[Difference] = []
     for program in found:
         start = program.start(names)
@@ -72,7 +60,7 @@ def _not_replaced(program: FileProgram, start: int, starts: set[int], product: s
     others = starts - {start}
     inside: list[SourceLine] = []
     for line in program.lines:
-        end = start + size(line.text, product)
+        end = start + program_readout.size(line.text, product)
         if any(start <= other < end for other in others):
             break
         inside.append(line)
@@ -97,7 +85,7 @@ def _there(program: FileProgram, start: int | None, starts: set[int], held: Held
 
 
 def _follows(before: Stored, line: Stored, product: str) -> bool:
-    return before.at + size(before.text, product) == line.at
+    return before.at + program_readout.size(before.text, product) == line.at
 
 
 def _compared(here: Sequence[SourceLine], there: Sequence[Stored], names: set[str]) -> Iterator[Difference]:
@@ -120,9 +108,9 @@ def to_send(state: MCodeState, lines: Sequence[SourceLine], held: Held) -> Proce
     """Return why a file must be sent; empty where the drive holds its programs, variables and settings already."""
     if why := first_difference(differences(state, lines, held)):
         return why
-    if clears_itself(lines) and size_of_file(lines) != len(held.lines):
+    if clears_itself(lines) and program_readout.size_of_file(lines) != len(held.lines):
         return "the drive holds other programs, which the file clears"
-    for line in immediate_lines(lines):
+    for line in program_readout.immediate_lines(lines):
         if why := (yield from _unlike(state, line, held)):
             return why
     return ""
@@ -130,11 +118,11 @@ def to_send(state: MCodeState, lines: Sequence[SourceLine], held: Held) -> Proce
 
 def _unlike(state: MCodeState, line: SourceLine, held: Held) -> Procedure[str]:
     """Return why a line outside of programs must be sent; empty where the drive has its value."""
-    names = names_of(held)
+    names = program_readout.names_of(held)
     statement = _statement(line.text, set(names))
     if statement is None or statement.word in STEADY:
         return ""
-    named = declared(line.text)
+    named = program_readout.declared(line.text)
     name = named[1] if named is not None else statement.word
     if named is not None:
         first = statement.arguments[0]
@@ -198,10 +186,10 @@ def _as_number(text: str) -> float | None:
 
 PROGRAMS: Programs[MCodeState] = Programs(
     listing=operations.listing,
-    readable=readable,
+    readable=program_readout.readable,
     who=who,
     read=program_readout.read,
-    file=file_of,
+    file=program_readout.file_of,
     executed=program_readout.immediate_lines,
     size=program_readout.size_of_file,
     end=program_readout.end_program,
@@ -209,8 +197,8 @@ PROGRAMS: Programs[MCodeState] = Programs(
     differences=differences,
     to_send=to_send,
     start=program_readout.start_line,
-    refreshed=refreshed,
-    annotated=annotated,
+    refreshed=program_readout.refreshed,
+    annotated=program_readout.annotated,
     acts=guards.acts,
     save="S",
     remark="'",

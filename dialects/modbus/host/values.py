@@ -190,10 +190,7 @@ def check(state: ModbusState, word: str) -> str:
 
 
 def again(state: ModbusState, word: str, priority: Priority) -> Procedure[float]:
-    try:
-        return printed_number(who(state), word, (yield from printed(state, word, priority)))
-    except ValueError as wrong:
-        raise Refused(str(wrong)) from None
+    return printed_number(who(state), word, (yield from printed(state, word, priority)))
 
 
 SERIAL = 5

@@ -18,7 +18,7 @@ from multidrop.dialects.debugging import Debugging, Look, Neighbours, Row, Stepp
 from multidrop.dialects.errors import Diagnostic, DriveError, Inexpressible, Refused, Stopped
 from multidrop.dialects.family import Programs, Progress
 from multidrop.dialects.files import SourceLine, lines_of_text
-from multidrop.dialects.program_files import Difference, Held, Stored, first_difference
+from multidrop.dialects.program_files import Difference, Held, Stored, first_difference, numbered
 from multidrop.dialects.text import counted, whole
 from multidrop.dialects.tmcl.host.codec import TmclState, call_of, line_in, parse_reply
 from multidrop.dialects.tmcl.host.operations import LACKS, answered, busy, moving, perform, read, store, who
@@ -70,7 +70,7 @@ def held_of(memory: Mapping[int, Call]) -> Held:
 
 def calls_of(held: Held) -> dict[int, Call]:
     """The lines of the memory that `held_of` wrote."""
-    made = program_file.assembled([program_file.ProgramLine(n, line.text) for n, line in enumerate(held.lines, 1)])
+    made = program_file.assembled(numbered([line.text for line in held.lines]))
     return {line.at: placed.call for line, placed in zip(held.lines, made.lines, strict=True)}
 
 
@@ -229,7 +229,7 @@ def start(lines: Sequence[SourceLine], label: str) -> str:
 def annotated(text: str, held: Held) -> tuple[str, ...]:
     """The lines of a file, each with its address where it gives a line of the memory."""
     lines = lines_of_text(text)
-    made = program_file.assembled([program_file.ProgramLine(number, line) for number, line in enumerate(lines, 1)])
+    made = program_file.assembled(numbered(lines))
     places = {each.source: each.at for each in made.lines}
     width = len(str(len(made.lines)))
     return tuple(f"{places.get(number, ''):>{width}}  {line}".rstrip() for number, line in enumerate(lines, 1))
