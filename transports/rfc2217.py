@@ -109,7 +109,10 @@ class Rfc2217Pipe(Transport):
         await self._settled(answers[what] for what in needed)
         wrong = [what for what, (_, value) in needed.items() if _answer(answers[what]) != value]
         if wrong:
-            raise self._refused(_refusal(wrong, baud, _answer(answers[telnet.NAMES[Setting.BAUD]])))
+            rate = telnet.NAMES[Setting.BAUD]
+            kept = f" (it has {found})" if rate in wrong and (found := _answer(answers[rate])) else ""
+            named = ", ".join(f"{each} {baud}{kept}" if each == rate else each for each in wrong)
+            raise self._refused(f"the server does not accept {named}; check the settings of its port")
         self.control.baud = baud
         await self._settled((answers[what] for what in _WISHES), GRACE)
         if ignored := [what for what in _WISHES if _answer(answers[what]) is None]:
@@ -236,12 +239,6 @@ _NAMED = {int(setting): name for setting, name in telnet.NAMES.items()} | {int(S
 def _answer(answer: asyncio.Future[int]) -> int | None:
     """The value that a server confirmed; None: it confirmed none."""
     return answer.result() if answer.done() and not answer.cancelled() else None
-
-
-def _refusal(wrong: list[str], baud: int, found: int | None) -> str:
-    kept = f" (it has {found})" if telnet.NAMES[Setting.BAUD] in wrong and found else ""
-    named = ", ".join(f"{each} {baud}{kept}" if each == telnet.NAMES[Setting.BAUD] else each for each in wrong)
-    return f"the server does not accept {named}; check the settings of its port"
 
 
 class Rfc2217Control(PortControl):

@@ -247,7 +247,6 @@ def refreshed(text: str, held: Held) -> tuple[str, ...]:
 
 
 def annotated(text: str, held: Held) -> tuple[str, ...]:
-    """Return a listing with the remarks and the layout of the file that it came from."""
     addresses = iter(held.lines)
     width = max((len(str(line.at)) for line in held.lines), default=0)
     made: list[str] = []

@@ -1,4 +1,4 @@
-"""Programs in MCode drives: the family's record, and a file compared with what a drive holds."""
+"""Programs in MCode drives: the family's record; a file and what a drive holds, compared in canonical spelling."""
 
 from __future__ import annotations
 
@@ -25,9 +25,6 @@ from multidrop.dialects.mcode.manual.statements import canonical
 from multidrop.dialects.mcode.manual.table import lookup
 from multidrop.dialects.program_files import Difference, Held, Stored, first_difference
 from multidrop.dialects.text import counted
-
-# A program file and what a drive holds, compared line by line in canonical spelling.
-
 
 HOLDING = ("variable", "flag")
 """The kinds of words that hold a value."""
@@ -119,7 +116,10 @@ def to_send(state: MCodeState, lines: Sequence[SourceLine], held: Held) -> Proce
 def _unlike(state: MCodeState, line: SourceLine, held: Held) -> Procedure[str]:
     """Return why a line outside of programs must be sent; empty where the drive has its value."""
     names = program_readout.names_of(held)
-    statement = _statement(line.text, set(names))
+    try:
+        statement = parse(line.text, set(names))
+    except LineError:
+        statement = Statement(classify.word_of(line.text)[0], ())
     if statement is None or statement.word in STEADY:
         return ""
     named = program_readout.declared(line.text)
@@ -148,13 +148,6 @@ def _values(state: MCodeState, statement: Statement) -> Procedure[list[float | N
     return [_literal(each) for each in statement.arguments]
 
 
-def _statement(text: str, names: set[str]) -> Statement | None:
-    try:
-        return parse(text, names)
-    except LineError:
-        return Statement(classify.word_of(text)[0], ())
-
-
 def _literal(argument: Argument | None) -> float | None:
     """Return a number as written; None for anything else."""
     match argument:
@@ -179,9 +172,6 @@ def _as_number(text: str) -> float | None:
         return float(text)
     except ValueError:
         return None
-
-
-# Programs in MCode drives: the conversations and the files of the family's record.
 
 
 PROGRAMS: Programs[MCodeState] = Programs(

@@ -14,7 +14,7 @@ import re
 from collections.abc import Callable, Mapping
 
 from multidrop.dialects.family import ADDRESSES, EVERYONE, Guard, Protection, to_all
-from multidrop.dialects.mcode.manual.grammar import LineError, Number, Statement, parse, parsed
+from multidrop.dialects.mcode.manual.grammar import LineError, Number, parse, parsed
 from multidrop.dialects.mcode.manual.mnemonic import ETHERNET
 from multidrop.dialects.mcode.manual.program_file import bare
 from multidrop.dialects.mcode.manual.table import lookup
@@ -119,16 +119,12 @@ def _read(line: str, product: str) -> tuple[str, int | str] | None:
         return (found[1].upper(), found[2].strip()) if found is not None and known else None
     if statement is None or lookup(statement.word, product) is None:
         return None
-    return statement.word, _value(statement)
-
-
-def _value(statement: Statement) -> int | str:
-    if not statement.arguments:
-        return ""
-    first = statement.arguments[0]
-    if len(statement.arguments) == 1 and isinstance(first, Number) and first.value == int(first.value):
-        return int(first.value)
-    return "?"
+    match statement.arguments:
+        case ():
+            return statement.word, ""
+        case (Number(value),) if value == int(value):
+            return statement.word, int(value)
+    return statement.word, "?"
 
 
 TEXT = (

@@ -192,13 +192,11 @@ def differences(
 
 
 def to_send(state: PmxState, lines: Sequence[SourceLine], held: Held) -> Procedure[str]:
-    """Return why a file must be sent; empty where the controller holds its lines."""
     yield from ()
     return first_difference(differences(state, lines, held), "controller")
 
 
 def start(lines: Sequence[SourceLine], label: str) -> str:
-    """Return the line that starts a program by its number. Raises Diagnostic where the file has no such program."""
     marks = {token for _, _, token in program_file.compiled(lines) if token.startswith("PS")} or {"PS0"}
     if f"PS{label}" not in marks:
         hint = f"programs: {', '.join(sorted(mark[2:] for mark in marks))}"
@@ -221,7 +219,6 @@ def readable(held: Held) -> tuple[str, ...]:
 
 
 def file_of(_: PmxState, held: Held, raw: bool) -> tuple[str, ...]:
-    """Return the lines of a file that reproduces what a controller holds."""
     return tuple(f"SA{line.at}={line.text}" for line in held.lines) if raw else readable(held)
 
 

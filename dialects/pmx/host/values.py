@@ -119,7 +119,6 @@ NAMES = tuple(
 
 
 def plan(state: PmxState, present: Readings, wanted: Mapping[str, Value], allowed: Permission) -> Plan:
-    """Order the steps to the wanted values. Raises Diagnostic for a value that the controller refuses."""
     now = present.values
     changed = {name.upper(): value for name, value in wanted.items() if not same(value, now.get(name.upper()))}
     withheld = {name: reason for name in changed if (reason := _risk(name, changed[name], now, allowed))}
@@ -201,7 +200,6 @@ def _read_setting(state: PmxState, name: str) -> Procedure[Reading]:
 
 
 def conflict(plan: Plan, others: Collection[str]) -> str:
-    """Return the reason for which a device name is another controller's; empty: it is none's."""
     numbers = [str(change.after)[-2:] for change in plan if change.name == "DN"]
     return f"another controller of the line has number {numbers[0]}" if numbers and numbers[0] in others else ""
 
@@ -339,7 +337,6 @@ def again(state: PmxState, word: str, priority: Priority) -> Procedure[float]:
 
 
 def take(state: PmxState, progress: Progress) -> Procedure[Snapshot]:
-    """Read a controller. Raises NoAnswer."""
     readings = yield from read_settings(state, progress)
     identity = yield from answered(state, state.codec.request(state.address, "ID"))
     remarks = []

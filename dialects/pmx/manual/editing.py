@@ -61,7 +61,6 @@ def _found(code: str) -> Iterator[tuple[str, str, int, int]]:
 
 
 def fixed(name: UserName) -> str:
-    """Return why a name cannot be another one; empty if it can."""
     if name.kind == "program":
         return f"the host starts {name.word} by its number (SR{name.word[4:]}=1)"
     if name.word == f"SUB {script_parser.HANDLER}":
@@ -141,7 +140,6 @@ def words(line: str, names: Container[str]) -> list[Word]:  # noqa: ARG001
 
 
 def describe(word: str, product: str) -> list[str]:  # noqa: ARG001
-    """Return the help on a word; empty where there is none."""
     return script_parser.describe(word)
 
 

@@ -214,12 +214,10 @@ entries = script_parser.entries
 
 
 def load(path: str | Path) -> list[ProgramLine]:
-    """Read the lines of a correct file. Raises Diagnostic with the first error and its place."""
     return read(program_text_of(path), str(path))
 
 
 def read(text: str, name: str) -> list[ProgramLine]:
-    """Read the lines of a program; `name` is the file's name in a Diagnostic."""
     refuse(check(text), name)
     return _lines(text)
 

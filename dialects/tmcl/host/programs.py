@@ -145,7 +145,9 @@ def download(
         if state.programming:
             yield from _leave(state)
     progress(len(stored), len(stored))
-    _say_what_stays(state, held, len(stored))
+    if rest := [line.at for line in held.lines if line.at > len(stored)] if held is not None else []:
+        count = counted(len(rest), "line")
+        state.remark(f"{who(state)}: {count} from address {rest[0]} on stay as they were: the file does not reach them")
     return lines
 
 
@@ -165,13 +167,6 @@ def _incomplete(state: TmclState, done: int, total: int) -> str:
     if not done:
         return f"no line of the file is known to be stored in {who(state)}"
     return f"{done} of {total} lines are stored: the program in {who(state)} is incomplete"
-
-
-def _say_what_stays(state: TmclState, held: Held | None, end: int) -> None:
-    rest = [line.at for line in held.lines if line.at > end] if held is not None else []
-    if rest:
-        count = counted(len(rest), "line")
-        state.remark(f"{who(state)}: {count} from address {rest[0]} on stay as they were: the file does not reach them")
 
 
 def end(state: TmclState) -> Procedure[bool]:
@@ -216,7 +211,6 @@ def to_send(state: TmclState, lines: Sequence[SourceLine], held: Held) -> Proced
 
 
 def start(lines: Sequence[SourceLine], label: str) -> str:
-    """The line that runs a program from a label, or an address of the file. Raises Diagnostic."""
     made = program_file.assembled(lines)
     address = made.labels.get(label.upper(), whole(label, 0, max(len(made.lines) - 1, 0)))
     if address is None or address >= len(made.lines):

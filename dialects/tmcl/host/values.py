@@ -93,7 +93,6 @@ def reading(name: str, value: int, module: Module) -> Reading:
 
 
 def plan(state: TmclState, present: Readings, wanted: Mapping[str, Value], allowed: Permission) -> Plan:
-    """Order the steps to the wanted values. Raises Diagnostic for a value that the module refuses."""
     module = module_of(state.product)
     now, names = present.values, setting_names(module, state.motors or 1)
     changed = {
@@ -274,7 +273,6 @@ def again(state: TmclState, word: str, priority: Priority) -> Procedure[float]:
 
 
 def take(state: TmclState, progress: Progress) -> Procedure[Snapshot]:
-    """Read a module. Raises NoAnswer."""
     readings = yield from read_settings(state, progress)
     remarks = []
     if active := (yield from moving(state)):

@@ -61,7 +61,6 @@ def fixed(name: UserName) -> str:  # noqa: ARG001
 
 
 def renamed(text: str, name: UserName, new: str, product: str) -> str:  # noqa: ARG001
-    """Return the new name. Raises Diagnostic where it is none, or is in use."""
     word = new.strip()
     if not NAME.fullmatch(word):
         raise Diagnostic(f"{new!r} is not a name", "", "letters, digits and _, and no digit first")
@@ -87,7 +86,6 @@ def words(line: str, names: Container[str]) -> list[Word]:  # noqa: ARG001
 
 
 def describe(word: str, product: str) -> list[str]:
-    """Return the help on a word; empty where there is none."""
     row = instructions.WORDS.get(word.upper())
     if row is None:
         return []
@@ -98,7 +96,6 @@ def describe(word: str, product: str) -> list[str]:
 
 
 def typing(before: str) -> str:
-    """Return the word at the end of a begun line that may be completed."""
     last = _LAST.search(before)
     return last[0] if last and remark_at(before) == len(before) else ""
 

@@ -183,15 +183,12 @@ def _command(made: Assembled, line: Divided, word: Piece) -> Call | None:
     number, fields = row
     if len(line.fields) != len(fields):
         what = f"{word.text} takes {'no field' if not fields else counted(len(fields), 'field')}"
-        made.wrong(line.number, word, what, _syntax(word.text, fields))
+        syntax = f"write {word.text.upper()} {', '.join(each.title for each in fields)}".strip()
+        made.wrong(line.number, word, what, syntax)
         return None
     values = [_value(made, line, piece, each) for piece, each in zip(line.fields, fields, strict=True)]
     known = tuple(value for value in values if value is not None)
     return call_with(number, fields, known) if len(known) == len(fields) else None
-
-
-def _syntax(word: str, fields: Sequence[Field]) -> str:
-    return f"write {word.upper()} {', '.join(each.title for each in fields)}".strip()
 
 
 def _value(made: Assembled, line: Divided, given: Piece, wanted: Field) -> int | None:
@@ -204,12 +201,8 @@ def _value(made: Assembled, line: Divided, given: Piece, wanted: Field) -> int |
         number = made.labels.get(name)
     if number is not None:
         return number
-    if not any(each.line == line.number for each in made.problems):
-        _refuse(made, line, given, wanted)
-    return None
-
-
-def _refuse(made: Assembled, line: Divided, given: Piece, wanted: Field) -> None:
+    if any(each.line == line.number for each in made.problems):
+        return None
     if not given.text:
         made.wrong(line.number, given, f"{wanted.name} is missing", wanted.hint)
     elif wanted.label and NAME.fullmatch(given.text) and given.text.upper() not in made.constants:
@@ -218,6 +211,7 @@ def _refuse(made: Assembled, line: Divided, given: Piece, wanted: Field) -> None
         made.wrong(line.number, given, f"no label {given.text}", hint)
     else:
         made.wrong(line.number, given, f"{wanted.name} cannot be {given.text!r}", wanted.hint)
+    return None
 
 
 # The file language
