@@ -171,7 +171,6 @@ class Drive:
 
     @property
     def codec(self) -> Codec:
-        """Its language, as it is set."""
         return self.state.codec
 
     @property
@@ -430,7 +429,6 @@ class Drive:
         return await awaited(lambda over: self.start(procedure, over))
 
     def start(self, procedure: Procedure[T], on_over: OnOver[T]) -> Conversation[T]:
-        """Begin a conversation with this drive."""
         state = self.state
         address, *_ = before = (state.address, state.programming, state.codec)
         commanded = self._neighbours.conversation_begins(self)

@@ -247,7 +247,6 @@ class Outcome(Generic[T]):
     last: Transaction | None = None
 
     def value(self) -> T:
-        """Return the result, or raise the error."""
         if self.error is not None:
             raise self.error
         return self.result[0]
@@ -284,7 +283,6 @@ class Witnesses:
         return leave
 
     def report(self, concluded: Concluded) -> None:
-        """Call each with a conversation that is over."""
         for witness in self.all:
             with self._isolated:
                 witness(concluded)

@@ -59,7 +59,6 @@ class MacroStore:
         return _hiding(name, self.folders) if hides else ""
 
     def is_project(self, name: str) -> bool:
-        """True for a macro beside the project."""
         return self.path(name).parent == self.project
 
     def _names_in(self, folder: Path) -> set[str]:

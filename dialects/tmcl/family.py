@@ -95,7 +95,6 @@ def word_of(text: str) -> str:
 
 
 def only_reads(text: str) -> bool:
-    """Whether a line only asks for a value."""
     return word_of(text) in (Command.GAP.name, Command.GGP.name, Command.GIO.name)
 
 

@@ -59,7 +59,6 @@ class Program:
 
     @property
     def start(self) -> int:
-        """The address of its first line."""
         return self.lines[0].at
 
     def declared(self, word: str) -> set[str]:

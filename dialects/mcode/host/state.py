@@ -60,7 +60,6 @@ class MCodeState(DriveState):
     # Settings
 
     def codec_assumed(self, codec: MCode) -> None:
-        """Use a codec that the drive has not confirmed."""
         self.codec = codec
 
     def settings_read(self, address: str, codec: MCode, *, error: bool, running: bool) -> None:
@@ -113,7 +112,6 @@ class MCodeState(DriveState):
         self.error_possible()
 
     def program_started(self) -> None:
-        """Record that a command that starts a program is on its way."""
         self.running, self.stepping = True, False
 
     def program_read(self, *, error: bool, running: bool) -> None:

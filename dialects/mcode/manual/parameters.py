@@ -142,7 +142,6 @@ def _lacking(version: str, part: str) -> frozenset[str]:
 
 
 def form_of(row: Mnemonic) -> Form:
-    """How PR prints a word."""
     if row.name in TRIPS:
         return Form.TRIP
     if row.low is None:

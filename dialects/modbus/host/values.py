@@ -201,7 +201,6 @@ NO_PROGRAM = ("its program and variables", "Modbus reads neither; MCode/TCP (tcp
 
 
 def take(state: ModbusState, progress: Progress) -> Procedure[Snapshot]:
-    """Read a drive. Raises Refused or NoAnswer."""
     readings = yield from read_settings(state, progress)
     if not state.serial:
         state.serial_read((yield from identification(state)).get(SERIAL, ""))

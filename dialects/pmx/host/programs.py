@@ -9,11 +9,10 @@ which is the address of a compiled line. (PMX-2ED-SA manual 7.19.1 to 7.19.3, ta
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 from multidrop.dialects.codec import End, Procedure
-from multidrop.dialects.debugging import Debugging, Look, Neighbours, Row
-from multidrop.dialects.errors import Diagnostic, DriveError, Inexpressible, NoAnswer, Refused, Stopped
+from multidrop.dialects.debugging import Debugging, Look, Neighbours, Row, lacking
+from multidrop.dialects.errors import Diagnostic, DriveError, NoAnswer, Refused, Stopped
 from multidrop.dialects.family import Programs, Progress
 from multidrop.dialects.files import SourceLine, lines_of_text
 from multidrop.dialects.pmx.host.codec import PmxState
@@ -243,6 +242,8 @@ RUNNING, PAUSED = 1, 2
 START, PAUSE, CONTINUE = 1, 2, 3
 """Values of SR."""
 NO_STEP = "a PMX has no single step: /break now pauses a program, /continue goes on"
+no_step = lacking(who, NO_STEP)
+no_break = lacking(who, "a PMX has no break points: /break now pauses a program; program test --break has them")
 
 
 def stored_rows(state: PmxState) -> Procedure[tuple[Row, ...]]:
@@ -265,7 +266,7 @@ def _rows(held: tuple[Row, ...]) -> tuple[Row, ...]:
 
 def idle(state: PmxState, program: str, neighbours: Neighbours | None) -> Procedure[None]:
     if neighbours is None:
-        raise _lacks(state, NO_STEP)
+        yield from no_step(state)
     if (yield from _status(state, program)) in (RUNNING, PAUSED):
         raise Refused(f"{who(state)}: program {program} runs already; not started; SR{program}=0 ends it")
 
@@ -305,20 +306,6 @@ def _program(place: str) -> str:
     if (place or "0") not in ("0", "1"):
         raise Diagnostic(f"no program {place}", "", "valid: 0 or 1")
     return place or "0"
-
-
-def no_step(state: PmxState, *_: object) -> Procedure[Any]:
-    raise _lacks(state, NO_STEP)
-    yield  # a procedure
-
-
-def no_break(state: PmxState, *_: object) -> Procedure[None]:
-    raise _lacks(state, "a PMX has no break points: /break now pauses a program; program test --break has them")
-    yield  # a procedure
-
-
-def _lacks(state: PmxState, what: str) -> Inexpressible:
-    return Inexpressible(f"{who(state)}: {what}; nothing was sent")
 
 
 def check_names(state: PmxState, names: Sequence[str]) -> None:

@@ -125,7 +125,6 @@ _WITH_NUMBER = ("PRG", "SUB", "GOSUB")
 
 
 def parts(line: str) -> list[Part]:
-    """Return the parts of a line that differ from plain text. Never fails."""
     code, semicolon, _ = line.partition(";")
     found = [
         Part(word.start, word.stop, kind)

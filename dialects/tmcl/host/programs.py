@@ -14,7 +14,7 @@ from contextlib import suppress
 from typing import Any
 
 from multidrop.dialects.codec import Procedure
-from multidrop.dialects.debugging import Debugging, Look, Neighbours, Row, Stepped
+from multidrop.dialects.debugging import Debugging, Look, Neighbours, Row, Stepped, lacking
 from multidrop.dialects.errors import Diagnostic, DriveError, Inexpressible, Refused, Stopped
 from multidrop.dialects.family import Programs, Progress
 from multidrop.dialects.files import SourceLine, lines_of_text
@@ -250,6 +250,7 @@ PROGRAM_FILES: Programs[TmclState] = Programs(
 
 
 NO_PLACE = "does not report the address of its next line (global parameter 130)"
+no_break = lacking(who, "TMCL has no break points: /break now halts a program; program test --break has them")
 
 
 def stored_rows(state: TmclState) -> Procedure[tuple[Row, ...]]:
@@ -331,12 +332,6 @@ def break_now(state: TmclState, place: str) -> Procedure[None]:  # noqa: ARG001
         raise Refused(f"{who(state)}: its program does not run; nothing was sent")
     yield from perform(state, "128 0, 0, 0")
     state.program_halted(True)
-
-
-def no_break(state: TmclState, *_: object) -> Procedure[None]:
-    what = "TMCL has no break points: /break now halts a program; program test --break has them"
-    raise Inexpressible(f"{who(state)}: {what}; nothing was sent")
-    yield  # a procedure
 
 
 def check_names(state: TmclState, names: Sequence[str]) -> None:  # noqa: ARG001

@@ -379,7 +379,6 @@ def asked(name: str) -> str | None:
 
 
 def assigned(name: str, value: str) -> str | None:
-    """The line that sets a parameter."""
     call = parameter(name)
     word = "SGP" if call is not None and call.command == Command.GGP else "SAP"
     return f"{word} {call.type}, {call.motor}, {value}" if call is not None else None
