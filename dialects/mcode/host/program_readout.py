@@ -216,7 +216,7 @@ def end_program(state: MCodeState) -> Procedure[bool]:
 # The program of an MCode drive as a file, with the remarks of the file that it came from.
 
 
-def file_of(state: MCodeState, held: Held, raw: bool) -> tuple[str, ...]:  # noqa: ARG001
+def file_of(state: MCodeState, held: Held, raw: bool) -> tuple[str, ...]:
     """Return a file that reproduces what a drive holds: VA, PG, the lines, PG, S; none where that is nothing."""
     made = [f"VA {name}={called.value}" for name, called in names_of(held).items() if called.kind == GLOBAL]
     for program in programs(held.lines, state.product, fine=True):

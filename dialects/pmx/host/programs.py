@@ -50,10 +50,7 @@ def read_line(state: PmxState, at: int) -> Procedure[str]:
 
 
 def download(
-    state: PmxState,
-    lines: Sequence[SourceLine],
-    held: Held | None,  # noqa: ARG001
-    progress: Progress,
+    state: PmxState, lines: Sequence[SourceLine], held: Held | None, progress: Progress
 ) -> Procedure[Sequence[SourceLine]]:
     """Write a program and read back each line. Both programs must be idle. Raises Refused, NoAnswer or Diagnostic.
 
@@ -172,10 +169,7 @@ def _command(state: PmxState, text: str) -> Procedure[None]:
 
 
 def differences(
-    state: PmxState,  # noqa: ARG001
-    lines: Sequence[SourceLine],
-    held: Held,
-    before: Held | None = None,  # noqa: ARG001
+    state: PmxState, lines: Sequence[SourceLine], held: Held, before: Held | None = None
 ) -> tuple[Difference, ...]:
     """Compare the compiled lines of a file with the stored ones; a script is all that the controller holds."""
     there = dict(held.lines)

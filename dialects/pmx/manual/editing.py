@@ -68,7 +68,7 @@ def fixed(name: UserName) -> str:
     return ""
 
 
-def renamed(text: str, name: UserName, new: str, product: str) -> str:  # noqa: ARG001
+def renamed(text: str, name: UserName, new: str, product: str) -> str:
     """Return the variable, or the number of the subroutine. Raises Diagnostic where that is none, or is in use."""
     if reason := fixed(name):
         raise Diagnostic(reason)
@@ -124,7 +124,7 @@ _ENDS = {"END": "PRG", "ENDSUB": "SUB", "ENDIF": "IF", "ENDWHILE": "WHILE"}
 _KINDS = {"PRG": "program", "SUB": "subroutine", "IF": "block", "WHILE": "block"}
 
 
-def words(line: str, names: Container[str]) -> list[Word]:  # noqa: ARG001
+def words(line: str, names: Container[str]) -> list[Word]:
     """Return the words of a line; each axis of a move is one."""
     found = []
     for word in script_parser.words(line):
@@ -139,7 +139,7 @@ def words(line: str, names: Container[str]) -> list[Word]:  # noqa: ARG001
     return found
 
 
-def describe(word: str, product: str) -> list[str]:  # noqa: ARG001
+def describe(word: str, product: str) -> list[str]:
     return script_parser.describe(word)
 
 
@@ -153,7 +153,7 @@ def typing(before: str) -> str:
     return last[0] if last else ""
 
 
-def offers(before: str, names: Iterable[UserName], product: str) -> list[Offer]:  # noqa: ARG001
+def offers(before: str, names: Iterable[UserName], product: str) -> list[Offer]:
     """Return subroutines after GOSUB, what can be read in values, and all else at the head of a line."""
     if ";" in before or _NEW.match(before):
         return []

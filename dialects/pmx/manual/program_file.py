@@ -7,7 +7,7 @@ the form that the maker's program copies (manual 8.1.9). A remark begins with a 
 from __future__ import annotations
 
 import re
-from collections.abc import Container, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
 from multidrop.dialects.files import SourceLine, program_text_of, split_lines, wrong_characters
@@ -192,7 +192,7 @@ class _Reader:
 _STORED = re.compile(r"SA\d+=", re.ASCII)
 
 
-def canonical(text: str, names: Container[str] = ()) -> str:  # noqa: ARG001
+def canonical(text: str) -> str:
     """Return a line in canonical spelling, without its remark. The language has no names of the user's.
 
     A compiled line and a line with an error stay as they are.
@@ -232,7 +232,7 @@ def formatted(text: str) -> str:
     return respelled(text, lambda line: len(line.partition(";")[0]), canonical)
 
 
-def check(text: str, product: str = "") -> list[Problem]:  # noqa: ARG001
+def check(text: str, product: str = "") -> list[Problem]:
     """Report every error of a program, by line; there is one product."""
     unreadable = [Problem(*place, "lines end at LF or CR LF") for place in wrong_characters(split_lines(text))]
     lines = _lines(text)

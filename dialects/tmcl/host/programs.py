@@ -188,10 +188,7 @@ def end(state: TmclState) -> Procedure[bool]:
 
 
 def differences(
-    state: TmclState,  # noqa: ARG001
-    lines: Sequence[SourceLine],
-    held: Held,
-    before: Held | None = None,  # noqa: ARG001
+    state: TmclState, lines: Sequence[SourceLine], held: Held, before: Held | None = None
 ) -> tuple[Difference, ...]:
     """Compare the lines of a file with the stored ones, and see that an empty line follows them."""
     stored, there = program_file.compiled(lines), {line.at: line.text for line in held.lines}
@@ -283,12 +280,12 @@ def trace(state: TmclState, place: str) -> Procedure[None]:
     yield from perform(state, program_file.run_at(address_of(place)))
 
 
-def begin(state: TmclState, place: str) -> Procedure[None]:  # noqa: ARG001
+def begin(state: TmclState, place: str) -> Procedure[None]:
     yield from perform(state, "131 0, 0, 0")
     state.program_halted(True)
 
 
-def look(state: TmclState, place: str) -> Procedure[Look]:  # noqa: ARG001
+def look(state: TmclState, place: str) -> Procedure[Look]:
     runs = yield from busy(state)
     state.program_halted(state.halted and not runs)
     if not runs and not state.halted:
@@ -306,7 +303,7 @@ def counter(state: TmclState) -> Procedure[int | None]:
         raise
 
 
-def waits(state: TmclState, place: str, last: Row | None) -> Procedure[None]:  # noqa: ARG001
+def waits(state: TmclState, place: str, last: Row | None) -> Procedure[None]:
     if not state.halted or (yield from busy(state)):
         raise Refused(f"{who(state)}: its program is not known to be halted; nothing was sent")
 
@@ -322,19 +319,19 @@ def step(state: TmclState, listed: Sequence[Row]) -> Procedure[Stepped]:
     return Stepped(row)
 
 
-def go_on(state: TmclState, place: str) -> Procedure[None]:  # noqa: ARG001
+def go_on(state: TmclState, place: str) -> Procedure[None]:
     state.program_halted(False)
     yield from perform(state, "129 0, 0, 0")
 
 
-def break_now(state: TmclState, place: str) -> Procedure[None]:  # noqa: ARG001
+def break_now(state: TmclState, place: str) -> Procedure[None]:
     if not (yield from busy(state)):
         raise Refused(f"{who(state)}: its program does not run; nothing was sent")
     yield from perform(state, "128 0, 0, 0")
     state.program_halted(True)
 
 
-def check_names(state: TmclState, names: Sequence[str]) -> None:  # noqa: ARG001
+def check_names(state: TmclState, names: Sequence[str]) -> None:
     for name in names:
         watched_call(name)
 

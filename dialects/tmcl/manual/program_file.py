@@ -237,7 +237,7 @@ def compiled(lines: Sequence[SourceLine]) -> list[Placed]:
     return made.lines
 
 
-def check(text: str, product: str = "") -> list[Problem]:  # noqa: ARG001
+def check(text: str, product: str = "") -> list[Problem]:
     """Report every error of a program, and warn of what runs otherwise than it reads."""
     lines = split_lines(text)
     unreadable = [Problem(*place, "lines end at LF or CR LF") for place in wrong_characters(lines)]
@@ -303,7 +303,7 @@ def formatted(text: str) -> str:
     return respelled(text, remark_at, canonical)
 
 
-def canonical(text: str, names: Container[str] = ()) -> str:  # noqa: ARG001
+def canonical(text: str) -> str:
     """A line in canonical spelling, without its remark: words in capitals, `, ` between fields, `Label: `."""
     found = divided(text)
     if found is None:
