@@ -220,16 +220,8 @@ class EventQueue(Publisher[BusEvent]):
             return
         self._telling = True
         try:
-            event, callbacks, over = self._events.popleft(), iter(self._callbacks), False
-            while not over:  # after a subscriber that fails, the next one
-                with self._isolated:
-                    while True:
-                        for callback in callbacks:
-                            callback(event)
-                        if not self._events:
-                            break
-                        event, callbacks = self._events.popleft(), iter(self._callbacks)
-                    over = True
+            while self._events:
+                super().publish(self._events.popleft())
         finally:
             self._telling = False
 
