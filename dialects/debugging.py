@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Generic, NamedTuple, TypeVar
+from typing import Any, Generic, NamedTuple, TypeVar
 
 from multidrop.dialects.codec import Procedure
+from multidrop.dialects.errors import Inexpressible
 from multidrop.dialects.program_files import Held
 from multidrop.dialects.state import DriveState
 
@@ -42,6 +43,16 @@ class Look(NamedTuple):
 def _never_broken(*_: object) -> Procedure[int | None]:
     return None
     yield  # a procedure
+
+
+def lacking(who: Callable[[Any], str], what: str) -> Callable[..., Procedure[Any]]:
+    """Make the conversation that stands for what the drives of a family lack: it raises Inexpressible."""
+
+    def refuse(state: DriveState, *_: object) -> Procedure[Any]:
+        raise Inexpressible(f"{who(state)}: {what}; nothing was sent")
+        yield  # a procedure
+
+    return refuse
 
 
 @dataclass(frozen=True)

@@ -74,9 +74,9 @@ class Exchange(Generic[S]):
             )
 
 
-def unanswered(who: str, request: Request, reply: Reply) -> NoAnswer:
+def unanswered(who: str, request: Request, reply: Reply | None = None) -> NoAnswer:
     """Describe a reply that did not come, or came damaged."""
-    if reply.end is End.DAMAGED:
+    if reply is not None and reply.end is End.DAMAGED:
         return NoAnswer(
             f"{who}: the reply to '{request.text}' is damaged ({reply.detail}); it may have been executed and "
             "was not sent again"

@@ -206,6 +206,19 @@ class ProgramFiles(NamedTuple):
         return cast("EditingLanguage", importlib.import_module(self.editing_module))
 
 
+@dataclass(frozen=True)
+class ProgramLine:
+    """A line of a file, without its remark: its number from 1, and its text."""
+
+    number: int
+    text: str
+
+
+def numbered(lines: Sequence[str]) -> list[ProgramLine]:
+    """Return the lines of a file that are not empty."""
+    return [ProgramLine(number, line) for number, line in enumerate(lines, 1) if line]
+
+
 BLANKS = " \t"
 TAB = 8
 """Columns from one tab stop to the next."""

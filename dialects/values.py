@@ -11,12 +11,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cache
 from math import isclose
 from types import MappingProxyType
 from typing import Any, Generic, TypeVar
 
 from multidrop.dialects.codec import Priority, Procedure
 from multidrop.dialects.errors import Refused
+from multidrop.dialects.files import rows
 from multidrop.dialects.state import DriveState
 
 # Settings, and the steps that change them
@@ -268,11 +270,11 @@ class Part(Generic[S]):
 
 
 def printed_number(who: str, word: str, text: str) -> float:
-    """Convert a printed value. Raises ValueError with one line for a person where it is not one number."""
+    """Convert a printed value. Raises Refused where it is not one number."""
     try:
         return float(text)
     except ValueError:
-        raise ValueError(f"{who}: {word} is not a number: {text.strip() or 'nothing'}") from None
+        raise Refused(f"{who}: {word} is not a number: {text.strip() or 'nothing'}") from None
 
 
 @dataclass(frozen=True)
@@ -349,6 +351,19 @@ class Control:
 
 Controls = Mapping[str, Control]
 """Controls by name; every name of `NAMES` is there."""
+
+
+@cache
+def controls_of(module: str, axis: str = "", number: int = 1) -> Controls:
+    """Read the controls of an axis: `controls.csv` beside a module, whose `__file__` is given.
+
+    Its lines are divided by ` // `; in them `{axis}` is the name of the axis, and `{number}` its number.
+    """
+    found = {}
+    for row in rows(module, "controls.csv"):
+        lines = row["lines"].replace("{axis}", axis).replace("{number}", str(number)).split(" // ")
+        found[row["name"]] = Control(tuple(filter(None, lines)), row["about"], row.get("absent", ""))
+    return found
 
 
 @dataclass(frozen=True)

@@ -7,25 +7,13 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol, TypeVar
 
-from multidrop.dialects import (
-    Codec,
-    Command,
-    DriveError,
-    DriveState,
-    Family,
-    Inexpressible,
-    Motion,
-    NoAnswer,
-    Priority,
-    Procedure,
-    Refused,
-    SourceLine,
-    Stopped,
-)
-from multidrop.dialects.errors import Differs, Unreferenced
+from multidrop.dialects.codec import Codec, Command, Priority, Procedure
+from multidrop.dialects.errors import Differs, DriveError, Inexpressible, NoAnswer, Refused, Stopped, Unreferenced
 from multidrop.dialects.families import FAMILIES, program_languages
-from multidrop.dialects.family import Programs
+from multidrop.dialects.family import Family, Motion, Programs
+from multidrop.dialects.files import SourceLine
 from multidrop.dialects.program_files import Held, ProgramFiles
+from multidrop.dialects.state import DriveState
 from multidrop.dialects.values import Value
 from multidrop.drives.conversations import ASKING, Conversation, Conversations, OnOver, awaited
 from multidrop.drives.events import Changed, Outcome, Transaction
@@ -171,7 +159,6 @@ class Drive:
 
     @property
     def codec(self) -> Codec:
-        """Its language, as it is set."""
         return self.state.codec
 
     @property
@@ -435,7 +422,6 @@ class Drive:
         return await awaited(lambda over: self.start(procedure, over))
 
     def start(self, procedure: Procedure[T], on_over: OnOver[T]) -> Conversation[T]:
-        """Begin a conversation with this drive."""
         state = self.state
         address, *_ = before = (state.address, state.programming, state.codec)
         commanded = self._neighbours.conversation_begins(self)

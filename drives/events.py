@@ -220,16 +220,8 @@ class EventQueue(Publisher[BusEvent]):
             return
         self._telling = True
         try:
-            event, callbacks, over = self._events.popleft(), iter(self._callbacks), False
-            while not over:  # after a subscriber that fails, the next one
-                with self._isolated:
-                    while True:
-                        for callback in callbacks:
-                            callback(event)
-                        if not self._events:
-                            break
-                        event, callbacks = self._events.popleft(), iter(self._callbacks)
-                    over = True
+            while self._events:
+                super().publish(self._events.popleft())
         finally:
             self._telling = False
 
@@ -247,7 +239,6 @@ class Outcome(Generic[T]):
     last: Transaction | None = None
 
     def value(self) -> T:
-        """Return the result, or raise the error."""
         if self.error is not None:
             raise self.error
         return self.result[0]
@@ -284,7 +275,6 @@ class Witnesses:
         return leave
 
     def report(self, concluded: Concluded) -> None:
-        """Call each with a conversation that is over."""
         for witness in self.all:
             with self._isolated:
                 witness(concluded)

@@ -293,7 +293,6 @@ class Inbox:
     # Bytes
 
     def receive(self, data: bytes, now: float) -> None:
-        """Take received bytes."""
         self.received_at = now
         if not self.buffer:
             self._begun_at = now

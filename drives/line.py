@@ -176,7 +176,6 @@ class Line:
     # Bytes
 
     def receive(self, data: bytes, now: float) -> None:
-        """Take received bytes."""
         if isinstance(self._state, Flight):
             self._state.received_at = now
         else:
@@ -307,7 +306,6 @@ class Line:
         self._events.append(Write(data, request))
 
     def _finish(self, flight: Flight, found: Decoded, now: float) -> None:
-        """End the flight with a reply."""
         if found.strays:  # first: a proof forgets which replies are outstanding
             self._publish(now, found.strays)
         weight = self._doubt.weigh(flight.request, found.reply, now)

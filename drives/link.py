@@ -108,7 +108,6 @@ class Link:
     # Events
 
     def notify(self, text: str, address: str = "", warning: bool = False) -> None:
-        """Publish a message for the user."""
         self.publish(events.Notice(self.now(), text, address, warning))
 
     # Requests

@@ -214,7 +214,6 @@ class Roster:
         return Drive(self.conversations, self, state)
 
     def conversation_begins(self, drive: Drive) -> bool:
-        """List the drive for the stop; return whether it was addressed before without being listed."""
         address = drive.state.address
         commanded = address in self.unlisted
         if address not in GLOBAL and address not in self.drives:
@@ -222,7 +221,6 @@ class Roster:
         return commanded
 
     def replied_again(self, drive: Drive) -> None:
-        """Look for a restart of a drive after a missing reply."""
         if self.drives.get(drive.address) is drive:
             self.restarts.replied_again(drive)
 

@@ -382,7 +382,7 @@ class _ConditionPoller(_Poller[str]):
     def _readable(self, drive: Drive) -> bool:
         return drive in self._roster.drives.values()
 
-    def _begin(self, thing: str, due: _Due, drive: Drive) -> None:  # noqa: ARG002
+    def _begin(self, thing: str, due: _Due, drive: Drive) -> None:
         due.at = self._link.now() + self.periods[thing]
         self._busy = True
         self._task = asyncio.get_running_loop().create_task(self._read(thing, due))

@@ -242,7 +242,6 @@ class Macro:
 
     @property
     def length(self) -> str:
-        """The number of its lines, in words."""
         return counted(len(self.steps), "line")
 
     @property

@@ -59,7 +59,6 @@ class MacroStore:
         return _hiding(name, self.folders) if hides else ""
 
     def is_project(self, name: str) -> bool:
-        """True for a macro beside the project."""
         return self.path(name).parent == self.project
 
     def _names_in(self, folder: Path) -> set[str]:
@@ -102,19 +101,6 @@ class MacroStore:
             return None
         except OSError as error:
             raise _unreadable(path, error) from None
-
-    def by_key(self, key: str, page: str = FIRST_PAGE) -> Macro | None:
-        """The macro on a key of a page, or None.
-
-        Raises Diagnostic for several, and where there is none but a file that cannot be read.
-        """
-        found, broken = self.on_key(key, page)
-        if len(found) > 1:
-            problem = describe_clash(key.upper(), [macro.name for macro in found])
-            raise Diagnostic(problem, str(self.folder), "give one another key")
-        if not found and broken:
-            raise broken[0]
-        return found[0] if found else None
 
     def on_key(self, key: str, page: str = FIRST_PAGE) -> tuple[list[Macro], list[Diagnostic]]:
         """Every macro on a key of a page, and the problems of the files that are unreadable."""

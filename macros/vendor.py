@@ -152,7 +152,6 @@ def _macro(row: str, where: str) -> Macro:
 
 
 def _check_chains(macros: Mapping[str, Macro], where: str, known: set[str]) -> None:
-    """Check that every chain has an end."""
     chains = {
         name: [f"f{match['number']}" for step in macro.steps if (match := PLAY.fullmatch(step.line))]
         for name, macro in macros.items()

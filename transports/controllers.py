@@ -45,7 +45,6 @@ class Found:
 
     @property
     def url(self) -> str:
-        """The URL of this one."""
         return f"usb:{self.number}@{self.place}"
 
 
@@ -66,7 +65,6 @@ def library() -> ModuleType:
 
 
 def controllers(usb1: ModuleType, context: Any) -> list[Found]:
-    """The controllers in the order of their places."""
     found = []
     for device in context.getDeviceIterator(skip_on_error=True):
         if (device.getVendorID(), device.getProductID()) == (performax.VENDOR, performax.PRODUCT):

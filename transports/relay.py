@@ -176,9 +176,6 @@ class Relay:
                 break
             self._settled += taken
             del self.queue[:taken]
-        self.report()
-
-    def report(self) -> None:
         sent = self._settled - self.port.unsent()
         if sent > self._reported:
             self._reported = sent

@@ -11,21 +11,7 @@ from collections.abc import Callable, Iterable
 
 from multidrop.transports import Lost, PortControl, Received, Transport, TransportLost, Unreachable, telnet
 from multidrop.transports.sockets import open_tcp
-from multidrop.transports.telnet import (
-    BREAK,
-    FLOW,
-    NAMES,
-    NEEDED,
-    OPTION,
-    PURGE_BOTH,
-    PURGE_UNSENT,
-    REPLY,
-    Control,
-    Setting,
-    group_of,
-    message,
-    parsed,
-)
+from multidrop.transports.telnet import Control, Setting
 
 CONFIRM = 3.0
 """Seconds that a server has to confirm a setting."""
@@ -38,25 +24,25 @@ QUOTED = 80
 _HELLO = b"".join(
     telnet.option(verb, number)
     for verb, number in (
-        (telnet.WILL, OPTION),
+        (telnet.WILL, telnet.OPTION),
         (telnet.WILL, telnet.BINARY),
         (telnet.DO, telnet.BINARY),
         (telnet.WILL, telnet.SGA),
         (telnet.DO, telnet.SGA),
     )
 )
-_OURS = (OPTION, telnet.BINARY, telnet.SGA)
+_OURS = (telnet.OPTION, telnet.BINARY, telnet.SGA)
 _THEIRS = (telnet.BINARY, telnet.SGA)
 _LINES = {
     "DTR": (Control.DTR_ON, Control.DTR_OFF),
     "RTS": (Control.RTS_ON, Control.RTS_OFF),
-    BREAK: (Control.BREAK_ON, Control.BREAK_OFF),
+    telnet.BREAK: (Control.BREAK_ON, Control.BREAK_OFF),
 }
 _WISHES = {
-    FLOW: (Setting.CONTROL, Control.NO_FLOW),
+    telnet.FLOW: (Setting.CONTROL, Control.NO_FLOW),
     "DTR": (Setting.CONTROL, Control.DTR_ON),
     "RTS": (Setting.CONTROL, Control.RTS_ON),
-    "a purge": (Setting.PURGE, PURGE_BOTH),
+    "a purge": (Setting.PURGE, telnet.PURGE_BOTH),
 }
 
 
@@ -116,12 +102,17 @@ class Rfc2217Pipe(Transport):
                 "the server does not support RFC 2217; if it passes bytes on unchanged, use tcp://"
             ) from None
         self._check()
-        needed = {NAMES[each]: (int(each), value) for each, value in {Setting.BAUD: baud, **NEEDED}.items()}
+        needed = {
+            telnet.NAMES[each]: (int(each), value) for each, value in {Setting.BAUD: baud, **telnet.NEEDED}.items()
+        }
         answers = {what: self._ask(what, *each) for what, each in (needed | _WISHES).items()}
         await self._settled(answers[what] for what in needed)
         wrong = [what for what, (_, value) in needed.items() if _answer(answers[what]) != value]
         if wrong:
-            raise self._refused(_refusal(wrong, baud, _answer(answers[NAMES[Setting.BAUD]])))
+            rate = telnet.NAMES[Setting.BAUD]
+            kept = f" (it has {found})" if rate in wrong and (found := _answer(answers[rate])) else ""
+            named = ", ".join(f"{each} {baud}{kept}" if each == rate else each for each in wrong)
+            raise self._refused(f"the server does not accept {named}; check the settings of its port")
         self.control.baud = baud
         await self._settled((answers[what] for what in _WISHES), GRACE)
         if ignored := [what for what in _WISHES if _answer(answers[what]) is None]:
@@ -146,7 +137,7 @@ class Rfc2217Pipe(Transport):
         """Ask for a setting; the future has the value that the server confirms."""
         answer: asyncio.Future[int] = self._loop.create_future()
         self._asked[what] = value, answer
-        self._inner.write(message(setting, value))
+        self._inner.write(telnet.message(setting, value))
         return answer
 
     async def ask(self, what: str, setting: int, value: int) -> int:
@@ -172,22 +163,22 @@ class Rfc2217Pipe(Transport):
             elif isinstance(event, telnet.Option):
                 # Take an option. What was offered above needs no reply, anything else that the server wants is
                 # refused.
-                if event.option == OPTION and event.verb in (telnet.DO, telnet.WILL):
+                if event.option == telnet.OPTION and event.verb in (telnet.DO, telnet.WILL):
                     self._agreed.set()
                 elif event.verb in telnet.REFUSAL and event.option not in (
                     _OURS if event.verb == telnet.DO else _THEIRS
                 ):
                     self._inner.write(telnet.option(telnet.REFUSAL[event.verb], event.option))
-            elif isinstance(event, telnet.Subnegotiation) and (found := parsed(event.body)):
+            elif isinstance(event, telnet.Subnegotiation) and (found := telnet.parsed(event.body)):
                 self._confirmed(*found)
 
     def _confirmed(self, number: int, value: bytes) -> None:
-        setting = number - REPLY
+        setting = number - telnet.REPLY
         if setting == Setting.SIGNATURE:
             self._farewell = value.decode("utf-8", "replace")
             return
         found = int.from_bytes(value)
-        what = group_of(found) if setting == Setting.CONTROL else _NAMED.get(setting, "")
+        what = telnet.group_of(found) if setting == Setting.CONTROL else _NAMED.get(setting, "")
         if what in self._asked and not self._asked[what][1].done():
             self._asked[what][1].set_result(found)
 
@@ -241,19 +232,13 @@ class Rfc2217Pipe(Transport):
         await self._inner.close()
 
 
-_PURGE = message(Setting.PURGE, PURGE_UNSENT)
-_NAMED = {int(setting): name for setting, name in NAMES.items()} | {int(Setting.PURGE): "a purge"}
+_PURGE = telnet.message(Setting.PURGE, telnet.PURGE_UNSENT)
+_NAMED = {int(setting): name for setting, name in telnet.NAMES.items()} | {int(Setting.PURGE): "a purge"}
 
 
 def _answer(answer: asyncio.Future[int]) -> int | None:
     """The value that a server confirmed; None: it confirmed none."""
     return answer.result() if answer.done() and not answer.cancelled() else None
-
-
-def _refusal(wrong: list[str], baud: int, found: int | None) -> str:
-    kept = f" (it has {found})" if NAMES[Setting.BAUD] in wrong and found else ""
-    named = ", ".join(f"{each} {baud}{kept}" if each == NAMES[Setting.BAUD] else each for each in wrong)
-    return f"the server does not accept {named}; check the settings of its port"
 
 
 class Rfc2217Control(PortControl):
@@ -267,7 +252,7 @@ class Rfc2217Control(PortControl):
         self.baud = 0
 
     def set_baud(self, baud: int) -> None:
-        found = self._ask(NAMES[Setting.BAUD], Setting.BAUD, baud)
+        found = self._ask(telnet.NAMES[Setting.BAUD], Setting.BAUD, baud)
         if found != baud:
             raise OSError(f"the server does not accept {baud} baud (it has {found})")
         self.baud = baud

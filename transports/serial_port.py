@@ -174,9 +174,6 @@ class SerialDevice:
         except TypeError as error:
             raise OSError(*error.args) from error
 
-    def purge(self) -> None:
-        """Do nothing: the other end has no command for it."""
-
     def abort(self) -> int:
         """Empty the driver's output queue; on Windows this also ends a waiting write."""
         with contextlib.suppress(OSError):

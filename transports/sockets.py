@@ -254,9 +254,6 @@ class SocketDevice(_Socket):
             with contextlib.suppress(TimeoutError):
                 data = data[self._socket.send(data) :]
 
-    def purge(self) -> None:
-        """Do nothing: the other end has no command for it."""
-
     def abort(self) -> int:
         return 0
 

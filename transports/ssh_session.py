@@ -87,7 +87,8 @@ def arguments(far: FarPort, baud: int, way: str = "") -> list[str]:
 def far_command(path: str, baud: int, way: str = "") -> str:
     """The command for the far shell. Without a terminal its PATH may lack the folder of pipx."""
     relay = f"exec multidrop relay --baud {baud} -- {shlex.quote(path)}"
-    address = f"OPEN:{_SPECIAL.sub(_escaped, path)},b{baud},{_LINE}"
+    escaped = _SPECIAL.sub(r"\\\1", path)
+    address = f"OPEN:{escaped},b{baud},{_LINE}"
     claim = _CLAIM.format(path=shlex.quote(path))
     socat = f'{claim}; echo {SOCAT_WORD}; exec socat STDIO {shlex.quote(address)}"$x"'
     steps = [
@@ -96,10 +97,6 @@ def far_command(path: str, baud: int, way: str = "") -> str:
         if way in ("", program)
     ]
     return "; ".join(['PATH="$PATH:$HOME/.local/bin:/usr/local/bin"', *steps, f"exit {MISSING}"])
-
-
-def _escaped(found: re.Match[str]) -> str:
-    return f"\\{found[1]}"
 
 
 def unknown_greeting(line: str) -> str:

@@ -46,9 +46,6 @@ class Device(Protocol):
     def write(self, data: bytes) -> None:
         """Write all bytes. Called in the writing thread."""
 
-    def purge(self) -> None:
-        """Tell the other end to drop what it has not sent. Called in the writing thread, before the next write."""
-
     def abort(self) -> int:
         """Drop what this machine holds; return how many bytes are known of. Never blocks; any thread."""
 
@@ -72,7 +69,7 @@ class ThreadedPipe(Pipe):
         self._queue: deque[bytes] = deque()
         self._arrived = bytearray()
         """What was received and waits for the loop."""
-        self._purge = self._busy = self._ending = False
+        self._busy = self._ending = False
         self._begun = False
         """The head of the queue is the rest of a write."""
         self._preempted = 0
@@ -96,7 +93,7 @@ class ThreadedPipe(Pipe):
             return sum(map(len, self._queue))
 
     def discard(self, whole: bool = False) -> int:
-        """Drop what is queued and what is held here, at the other end too if it can; `whole`: what has not begun."""
+        """Drop what is queued and what is held here; `whole`: what has not begun."""
         if not self._usable:
             return 0
         with self._turn:
@@ -106,7 +103,6 @@ class ThreadedPipe(Pipe):
         begun = [self._queue[0]] if whole and self._begun and self._queue else []
         dropped = sum(map(len, self._queue)) - sum(map(len, begun))
         self._queue, self._begun = deque(begun), bool(begun)
-        self._purge = self._purge or not whole
         self._turn.notify_all()
         return dropped + (0 if whole else self._device.abort())
 
@@ -165,14 +161,11 @@ class ThreadedPipe(Pipe):
         while True:
             with self._turn:
                 self._busy = False
-                self._turn.wait_for(lambda: self._queue or self._purge or self._ending)
+                self._turn.wait_for(lambda: self._queue or self._ending)
                 if self._ending:
                     return
-                purge, self._purge, self._busy = self._purge, False, True
-                piece = self._take() if self._queue else b""
+                self._busy, piece = True, self._take()
             try:
-                if purge:
-                    self._device.purge()
                 if piece:
                     self._device.write(piece)
             except OSError as error:

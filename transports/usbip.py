@@ -55,7 +55,6 @@ class Exported:
     interfaces: int = 1
 
     def pack(self) -> bytes:
-        """The record of the device."""
         path, bus_id = f"/sys/devices/multidrop/{self.bus_id}".encode(), self.bus_id.encode()
         classes = (0, 0, 0, 1, 1, self.interfaces)  # the interface has the class
         return _DEVICE.pack(
@@ -64,7 +63,6 @@ class Exported:
 
     @classmethod
     def read(cls, data: bytes) -> Exported:
-        """Read the record of a device."""
         _, bus_id, bus, device, _, vendor, product, version, *_, interfaces = _DEVICE.unpack(data)
         name = bus_id.partition(b"\0")[0].decode("ascii", "replace")
         return cls(name, bus, device, vendor, product, version, interfaces)
@@ -90,7 +88,6 @@ class Transfer:
     """The transfer that is to be cancelled."""
 
     def pack(self, device: int = 0) -> bytes:
-        """The message."""
         direction = self.endpoint >> 7
         if self.kind == SUBMIT:
             rest = _SUBMITTED.pack(0, self.length, 0, 0, 0, self.setup)
@@ -149,7 +146,6 @@ class Transfers:
 
 
 def operation(code: int, status: int = 0, rest: bytes = b"") -> bytes:
-    """An operation or its answer."""
     return OPERATION.pack(VERSION, code, status) + rest
 
 

@@ -19,7 +19,6 @@ def guarded(state: MCodeState, text: str) -> Guard | None:
 
 
 def homed(state: MCodeState) -> Procedure[bool]:
-    """Whether no error is set after a homing."""
     return not (yield from operations.flag(state, "EF"))
 
 

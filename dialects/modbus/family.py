@@ -23,7 +23,6 @@ def guarded(state: ModbusState, text: str) -> Guard | None:
 
 
 def homed(state: ModbusState) -> Procedure[bool]:
-    """Whether no error is set after a homing."""
     return not (yield from operations.flag(state, "EF"))
 
 

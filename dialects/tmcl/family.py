@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from multidrop.dialects.family import ADDRESSES, EVERYONE, Family, Guard, Guards, to_all
+from multidrop.dialects.files import rows
 from multidrop.dialects.tmcl.host import codec, operations
 from multidrop.dialects.tmcl.host.codec import STOP_BYTES, Tmcl, TmclState
 from multidrop.dialects.tmcl.host.operations import identify
@@ -28,48 +29,26 @@ def move_to(axis: str, position: int | str) -> tuple[str, ...]:
     return (f"MVP ABS, {axis or FIRST}, {position}",)
 
 
-BOOTLOADER = 242
-"""The command that starts the bootloader."""
-_EEPROM = "writes to the EEPROM, which wears out"
+_ROWS = list(rows(__file__, "guards.csv"))
+"""The guards on commands, by their word or number, and on setting a global parameter of bank 0, or restoring it from
+EEPROM. `switch`: a 0 switches it off, which needs no agreement.
+"""
 GUARDS: Mapping[str, str] = {
-    "STAP": _EEPROM,
-    "STGP": _EEPROM,
-    "FACTORY": "restores the factory settings, and gives no reply",
-    "BOOTLOADER": "starts the bootloader; the module then obeys no command, a stop included",
-    "DOWNLOAD": "erases the program from that line on; the module then stores every command until 133",
-    "AUTOSTART": "has the module start its program at each power-up",
-    "BAUD": "changes the baud rate from the next message on",
-    "ADDRESS": "changes the address of the module from the next message on",
-    "TEXTMODE": "may have the module reply in text mode, which multidrop does not read",
-    "REPLIES": "may have the module send no more replies: nothing can be read, and no stop confirmed",
+    **{row["name"]: row["what"] for row in _ROWS},
     EVERYONE: "can start every drive of the line",
 }
 """Every guard, and what its lines do."""
 _COMMANDS: Mapping[int, str] = {
-    Command.STAP: "STAP",
-    Command.STGP: "STGP",
-    Command.DOWNLOAD: "DOWNLOAD",
-    Command.FACTORY: "FACTORY",
-    BOOTLOADER: "BOOTLOADER",
+    int(word) if word.isdigit() else Command[word]: row["name"] for row in _ROWS if (word := row["command"])
 }
-_PARAMETERS: Mapping[int, str] = {
-    Global.BAUD: "BAUD",
-    Global.ADDRESS: "ADDRESS",
-    Global.TEXT_MODE: "TEXTMODE",
-    Global.AUTOSTART: "AUTOSTART",
-    Global.SUPPRESS_REPLY: "REPLIES",
-}
-"""Guards on setting a global parameter of bank 0, or restoring it from EEPROM."""
-_SWITCHES = frozenset({Global.TEXT_MODE, Global.AUTOSTART, Global.SUPPRESS_REPLY})
-"""Those that a 0 switches off, which needs no agreement."""
+_PARAMETERS: Mapping[int, str] = {Global[row["parameter"]]: row["name"] for row in _ROWS if row["parameter"]}
+_SWITCHES = frozenset(Global[row["parameter"]] for row in _ROWS if row["switch"])
 
 
 def guarded(text: str, address: str) -> Guard | None:
     """Find the guard of a line for a module; None: the line needs no agreement, as an invalid one."""
     line = text.strip()
-    try:
-        call = commands.parse(text)
-    except commands.LineError:
+    if (call := commands.parsed(text)) is None:
         return None
     name = _COMMANDS.get(call.command, "")
     off = call.command == Command.SGP and call.type in _SWITCHES and not call.value
@@ -82,11 +61,8 @@ def guarded(text: str, address: str) -> Guard | None:
 
 def only_ends(text: str) -> bool:
     """Whether a line is a command of motion that can only end it: a velocity of 0."""
-    try:
-        call = commands.parse(text)
-    except commands.LineError:
-        return False
-    return call.command in (Command.ROR, Command.ROL) and call.value == 0
+    call = commands.parsed(text)
+    return call is not None and call.command in (Command.ROR, Command.ROL) and call.value == 0
 
 
 def word_of(text: str) -> str:
@@ -95,7 +71,6 @@ def word_of(text: str) -> str:
 
 
 def only_reads(text: str) -> bool:
-    """Whether a line only asks for a value."""
     return word_of(text) in (Command.GAP.name, Command.GGP.name, Command.GIO.name)
 
 

@@ -159,12 +159,12 @@ def test_a_macro_that_is_not_there_is_told_with_those_that_are(store: MacroStore
 
 def test_a_key_plays_its_macro_whatever_other_files_are_broken(store: MacroStore) -> None:
     store.save(SHUTTLE)
-    assert store.by_key("F3") == store.by_key("f3") == SHUTTLE
-    assert store.by_key("F4") is None
+    assert store.on_key("F3") == store.on_key("f3") == ([SHUTTLE], [])
+    assert store.on_key("F4") == ([], [])
     put(store, "broken", b"name =")
-    assert store.by_key("F3") == SHUTTLE
-    with pytest.raises(Diagnostic, match=r"broken\.toml"):
-        store.by_key("F4")
+    assert store.on_key("F3")[0] == [SHUTTLE]
+    found, [problem] = store.on_key("F4")
+    assert found == [] and problem.where.startswith(str(store.path("broken")))
 
 
 def test_a_second_macro_on_a_key_is_refused(store: MacroStore) -> None:
@@ -176,11 +176,11 @@ def test_a_second_macro_on_a_key_is_refused(store: MacroStore) -> None:
     store.save(again, store.contents("shuttle"))
 
 
-def test_two_files_on_a_key_are_told_when_it_is_pressed(store: MacroStore) -> None:
+def test_two_files_on_a_key_are_told(store: MacroStore) -> None:
     for name in "ab":
         put(store, name, f'key = "F5"\n{GOOD}'.replace('"a"', f'"{name}"').encode())
-    with pytest.raises(Diagnostic, match="a and b are both on F5"):
-        store.by_key("F5")
+    assert [macro.name for macro in store.on_key("F5")[0]] == ["a", "b"]
+    assert store.clashes() == ["a and b are both on F5, which plays none of them"]
 
 
 def test_a_deleted_macro_is_gone(store: MacroStore) -> None:

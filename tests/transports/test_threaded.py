@@ -34,9 +34,6 @@ class Endless:
     def write(self, data: bytes) -> None:
         """Take it."""
 
-    def purge(self) -> None:
-        """There is nothing."""
-
     def abort(self) -> int:
         return 0
 

@@ -11,12 +11,13 @@ from dataclasses import replace
 
 from multidrop.dialects.codec import End, Kind, Procedure, Request
 from multidrop.dialects.errors import Inexpressible, NoAnswer
+from multidrop.dialects.exchange import unanswered
 from multidrop.dialects.mcode.host import classify
 from multidrop.dialects.mcode.host.codec import MCode
 from multidrop.dialects.mcode.host.exchange import printed_value, question, read_error, refused, synchronise, value
 from multidrop.dialects.mcode.host.framing import NAK
 from multidrop.dialects.mcode.host.identity import activate_party, asked, find, find_in_text, look_in, pinged
-from multidrop.dialects.mcode.host.state import MCodeState, Place, described, unknown, who
+from multidrop.dialects.mcode.host.state import MCodeState, Place, described, who
 
 
 def before_request(state: MCodeState, request: Request) -> Procedure[Request]:
@@ -163,7 +164,7 @@ def first_print(state: MCodeState, request: Request) -> Procedure[tuple[str, ...
         return None
     if state.error:
         yield from refused(state, request)
-    raise NoAnswer(unknown(state, request))
+    raise unanswered(who(state), request)
 
 
 def _present(state: MCodeState, place: Place) -> Procedure[Place | None]:

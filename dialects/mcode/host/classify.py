@@ -24,9 +24,6 @@ from multidrop.dialects.mcode.manual.statements import device_name
 from multidrop.dialects.mcode.manual.table import PRINTS_LINES, lookup
 from multidrop.dialects.state import DriveState
 
-# The reply that a typed MCode line will get, and the settings that it changes.
-
-
 WORD = re.compile(r"\s*([A-Za-z_]+)\s*=?\s*(.*)", re.S)
 BLANK = re.compile(r'\s*PR[\s,"]*;?', re.I)
 SLOW = {"S", "IP", "CP", "FD"}

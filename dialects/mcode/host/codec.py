@@ -13,18 +13,7 @@ from typing import ClassVar
 
 from multidrop.dialects.codec import Codec, Decoded, End, Kind, Reply, Request, StopPiece
 from multidrop.dialects.errors import Inexpressible
-from multidrop.dialects.mcode.host import classify
-from multidrop.dialects.mcode.host.framing import (
-    ACK,
-    NAK,
-    SIGN_ON,
-    UNPRINTED,
-    pieces,
-    printable,
-    sealed,
-    unasked,
-    unsealed,
-)
+from multidrop.dialects.mcode.host import classify, framing
 from multidrop.dialects.mcode.host.reply_parser import ENDLESS, ReplyLines, ReplyParser, divided
 from multidrop.dialects.mcode.manual.program_file import LONGEST, bare, unsendable
 from multidrop.dialects.mcode.manual.statements import UNNAMED
@@ -51,7 +40,9 @@ def ends_by_itself(request: Request, buffer: bytes, checksum: bool) -> bool:
     if not found:
         return False
     before, after = text[: found[-1].start()], text[found[-1].end() :]
-    if checksum and not (_ACK in before and unsealed(found[-1][0].rstrip("\r\n").encode("latin-1")) is not None):
+    if checksum and not (
+        _ACK in before and framing.unsealed(found[-1][0].rstrip("\r\n").encode("latin-1")) is not None
+    ):
         return False  # an ACK may follow the print
     return after in _PROMPTS if "PR " in before else not after
 
@@ -96,7 +87,7 @@ def _ends_in_empty_line(buffer: bytes, em: int, checksum: int) -> bool:
     if not buffer.endswith(own):
         return False
     before = buffer[: -len(own)]
-    return before[-1:] in (b"\n", ACK) or (not before and (em == 2 or checksum > 0))
+    return before[-1:] in (b"\n", framing.ACK) or (not before and (em == 2 or checksum > 0))
 
 
 def _is_whole(request: Request, found: re.Match[bytes], buffer: bytes, checksum: int) -> bool:
@@ -104,7 +95,7 @@ def _is_whole(request: Request, found: re.Match[bytes], buffer: bytes, checksum:
     em = found.groupdict().get("em")
     if em is None:
         return ends_by_itself(request, buffer, checksum > 0)
-    if checksum and em != b"2" and not (ACK in buffer or NAK in buffer):
+    if checksum and em != b"2" and not (framing.ACK in buffer or framing.NAK in buffer):
         return False
     return re.search(rb"\n[>?]\Z" if em == b"0" else rb"\n\Z", buffer[found.end() :]) is not None
 
@@ -202,7 +193,7 @@ class MCode(Codec):
 
     def _frame(self, request: Request) -> bytes:
         body = self._body(request)
-        return sealed(body) if self.checksum and body else body
+        return framing.sealed(body) if self.checksum and body else body
 
     @property
     def terminator(self) -> bytes:
@@ -256,12 +247,12 @@ class MCode(Codec):
         if request.kind is not Kind.PRINT or not request.expect:
             return (), ()
         got = ReplyLines(request, self.em, self.checksum, self._body(request))
-        for piece in pieces(buffer, 0, self.checksum != 0):
+        for piece in framing.pieces(buffer, 0, self.checksum != 0):
             text = piece.shown.lstrip(b">?") if self.em == 0 else piece.shown
             if piece.what == "line" and text and buffer[piece.end - 2 : piece.end] == b"\r\n":
                 got.add_earlier(text)
             elif text:
-                got.collided.append(printable(text))
+                got.collided.append(framing.printable(text))
         gathered = [] if request.rows else got.lines
         strays, own = divided(request, gathered + got.strays, whole=False)
         return strays, (*got.collided, *own)
@@ -293,7 +284,7 @@ class MCode(Codec):
             return EXECUTED if _ends_in_empty_line(buffer, em, checksum) else LIST_QUIET
         if em == 0 and buffer[-1:] == b"?":
             return SHORT
-        if checksum and NAK in buffer:
+        if checksum and framing.NAK in buffer:
             return PATIENT
         if request.kind in SILENT:
             if classify.word_of(request.text)[0] in classify.SLOW:
@@ -303,14 +294,14 @@ class MCode(Codec):
             # The time after `EM=`. The next question shows the mode and ignores what is left of this reply.
             if em == 2 and not buffer:
                 return EXECUTING
-            executed = ACK in buffer if checksum else b"\n" in buffer
+            executed = framing.ACK in buffer if checksum else b"\n" in buffer
             if not executed:
                 return PATIENT
             return 0.0 if buffer[-1:] == b">" else EXECUTED
         return SHORT if checksum == 2 and buffer[-1:] == b"\n" else PATIENT
 
     def parse_unsolicited(self, buffer: bytes) -> tuple[tuple[str, ...], int]:
-        return unasked(buffer, self.em, self.checksum)
+        return framing.unasked(buffer, self.em, self.checksum)
 
     def stop(self, addresses: Sequence[str], sure: bool = True, half_sent: bool = False) -> bytes:
         """Return the escape that ES selects, or every form where ES is unknown (5.1.41).
@@ -345,7 +336,7 @@ class MCode(Codec):
         return classify.starts_motion(text)
 
     def damaged(self, line: str) -> bool:
-        return self.checksum > 0 and UNPRINTED.search(line) is not None and not self.restarted(line)
+        return self.checksum > 0 and framing.UNPRINTED.search(line) is not None and not self.restarted(line)
 
     def answers_host(self, line: str) -> bool:
         """Whether a signature ends the line: the name after a value, or a mark; a check byte may follow."""
@@ -356,7 +347,7 @@ class MCode(Codec):
 
     def restarted(self, line: str) -> bool:
         """Whether a line is the sign-on, which a drive in party mode does not send (3.4.4)."""
-        return SIGN_ON.match(line) is not None
+        return framing.SIGN_ON.match(line) is not None
 
     def invalidate(self) -> bytes:
         """Return a full buffer of tildes: the half-sent line overflows, which every drive refuses (5.1.102)."""

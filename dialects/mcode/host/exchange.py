@@ -5,14 +5,14 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import NoReturn
 
 from multidrop.dialects.codec import End, Kind, Priority, Procedure, Reply, Request
 from multidrop.dialects.errors import Inexpressible, NoAnswer, Refused, Stopped
+from multidrop.dialects.exchange import unanswered
 from multidrop.dialects.mcode.host import classify
 from multidrop.dialects.mcode.host.classify import INTEGER, NOTHING
 from multidrop.dialects.mcode.host.framing import ACK
-from multidrop.dialects.mcode.host.state import MCodeState, described, unknown, who
+from multidrop.dialects.mcode.host.state import MCodeState, described, who
 from multidrop.dialects.mcode.manual import errors
 from multidrop.dialects.mcode.manual.errors import ErrorNumber
 
@@ -122,15 +122,14 @@ def answered(state: MCodeState, request: Request) -> Procedure[Reply]:
         if reply.end is End.NAK and not reply.doubtful:
             yield from _refused_unless_damaged(state, request, stood)
             if reply.detail:
-                _raise_damaged(state, request, reply)
+                state.reply_lost()
+                raise unanswered(who(state), request, replace(reply, end=End.DAMAGED))
             continue
         if reply.end is End.REFUSED:
             yield from refused(state, request)
-        if reply.end in (End.TIMEOUT, End.NAK):  # the NAK may be another drive's
+        if reply.end in (End.TIMEOUT, End.DAMAGED, End.NAK):  # the NAK may be another drive's
             state.reply_lost()
-            raise NoAnswer(unknown(state, request))
-        if reply.end is End.DAMAGED:
-            _raise_damaged(state, request, reply)
+            raise unanswered(who(state), request, reply)
         if ends_in_program_mode(reply) and request.kind is not Kind.PROGRAM:
             state.may_be_in_program_mode()
             raise Refused(
@@ -183,14 +182,6 @@ def printed_value(state: MCodeState, items: str, form: str) -> Procedure[str]:
     reply = yield from answered(state, question(state, items, form))
     check_printed(state, reply)
     return value(state, reply)
-
-
-def _raise_damaged(state: MCodeState, request: Request, reply: Reply) -> NoReturn:
-    state.reply_lost()
-    raise NoAnswer(
-        f"{who(state)}: the reply to '{request.text}' is damaged ({reply.detail}); it may have been executed "
-        "and was not sent again"
-    )
 
 
 def _refused_unless_damaged(state: MCodeState, request: Request, stood: bool) -> Procedure[None]:
@@ -256,11 +247,11 @@ def check_error_flag(state: MCodeState, request: Request, silent: bool = False) 
     try:
         reply = yield from answered(state, asked)
     except NoAnswer:
-        raise NoAnswer(unknown(state, request)) from None
+        raise unanswered(who(state), request) from None
     if reply.end is End.SILENT:
         state.reply_lost()
     if reply.end is End.SILENT and state.codec.em == 2:
-        raise NoAnswer(unknown(state, request))
+        raise unanswered(who(state), request)
     if reply.end is End.SILENT:
         raise NoAnswer(
             f"{who(state)} prints nothing after '{request.text}', and it is not known whether that was executed: it "
@@ -275,7 +266,7 @@ def check_error_flag(state: MCodeState, request: Request, silent: bool = False) 
     late = silent and not reply.doubtful and _came_late(state, reply)
     if silent and not taken and not late:
         state.settings_may_have_changed()  # or its settings make it silent
-        raise NoAnswer(unknown(state, request))
+        raise unanswered(who(state), request)
     return late
 
 

@@ -6,9 +6,6 @@ import re
 from dataclasses import dataclass
 from os.path import commonprefix
 
-# Bytes from a drive, cut into lines, ACKs and NAKs; echoes; unsolicited lines.
-
-
 ACK, NAK, CR, LF = b"\x06", b"\x15", b"\r", b"\n"
 ADDRESS_PROMPT = re.compile(rb"\d{1,9}  ")
 SIGN_ON = re.compile(r"Copyright\W*\d{4}.*(Schneider|Intelligent Motion)")

@@ -11,25 +11,10 @@ from multidrop.dialects.certifying import repaired
 from multidrop.dialects.codec import End, Kind, Priority, Procedure, Reply, Request
 from multidrop.dialects.errors import DriveError, Inexpressible, NoAnswer, Refused
 from multidrop.dialects.family import Motion
-from multidrop.dialects.mcode.host import classify
+from multidrop.dialects.mcode.host import classify, exchange
 from multidrop.dialects.mcode.host.before_request import before_request, find_again, first_print, value_of
 from multidrop.dialects.mcode.host.classify import INTEGER
 from multidrop.dialects.mcode.host.codec import EVERY_DRIVE, MCode
-from multidrop.dialects.mcode.host.exchange import (
-    Sign,
-    answered,
-    attempted,
-    check_error_flag,
-    check_printed,
-    ends_in_program_mode,
-    mark,
-    print_mark,
-    question,
-    sign,
-    signed,
-    take_out,
-    value,
-)
 from multidrop.dialects.mcode.host.identity import set_wire
 from multidrop.dialects.mcode.host.state import MCodeState, refuse_in_program, report_error, who
 from multidrop.dialects.mcode.manual import grammar
@@ -59,15 +44,15 @@ def enter_program(state: MCodeState, request: Request) -> Procedure[tuple[str, .
     request = replace(request, codec=state.codec)
     state.may_be_in_program_mode()  # until the reply shows it: no other line may slip in
     try:
-        reply = yield from answered(state, request)
-        if not ends_in_program_mode(reply):
+        reply = yield from exchange.answered(state, request)
+        if not exchange.ends_in_program_mode(reply):
             raise Refused(f"{who(state)} did not go into program mode after '{request.text}'")
     except Refused:
         state.left_program_mode()
         yield from put_back(state)
         raise
     except DriveError:
-        yield from take_out(state, "made sure that it is not in program mode")
+        yield from exchange.take_out(state, "made sure that it is not in program mode")
         yield from put_back(state)
         raise
     state.remark(f"{who(state)}: program mode: every line is stored until PG")
@@ -92,13 +77,13 @@ def serial_number(state: MCodeState) -> Procedure[str]:
     if not (state.product.startswith("LM") or mode.party or mode.checksum):
         return ""
     try:
-        reply = yield from answered(state, question(state, "SN", "[!-~][ -~]*"))
+        reply = yield from exchange.answered(state, exchange.question(state, "SN", "[!-~][ -~]*"))
     except Refused:
         return ""
     if reply.end is not End.DONE:
         state.reply_lost()
         return ""
-    return value(state, reply)
+    return exchange.value(state, reply)
 
 
 def restore_echo(state: MCodeState) -> Procedure[None]:
@@ -153,7 +138,7 @@ def program_line(state: MCodeState, request: Request) -> Procedure[tuple[str, ..
     if reply.end in (End.TIMEOUT, End.DAMAGED):
         state.reply_lost()
         raise NoAnswer(f"{who(state)}: it is not known whether '{request.text}' was stored ({reply.end.value})")
-    leaving, inside = classify.leaves_program(request.text), ends_in_program_mode(reply)
+    leaving, inside = classify.leaves_program(request.text), exchange.ends_in_program_mode(reply)
     if leaving and not inside:
         yield from _left(state, reply)
     elif reply.end in (End.REFUSED, End.NAK):
@@ -176,7 +161,7 @@ def _left(state: MCodeState, reply: Reply) -> Procedure[None]:
 def _make_sure(state: MCodeState, request: Request, fate: str) -> Procedure[None]:
     """Verify by its prompt that the drive is still in program mode. Raises NoAnswer or Refused where it is not."""
     reply = yield Request(state.address, "", Kind.PROGRAM, state.codec)
-    if ends_in_program_mode(reply):
+    if exchange.ends_in_program_mode(reply):
         state.synchronised()
         state.settings_confirmed()
         return
@@ -259,13 +244,13 @@ def written(text: str) -> tuple[str, int] | None:
 
 def _numbers(state: MCodeState, items: str, form: str) -> Procedure[list[int]]:
     try:
-        reply = yield from answered(state, question(state, items, form))
+        reply = yield from exchange.answered(state, exchange.question(state, items, form))
     except (NoAnswer, Refused):
         return []
     if not reply.lines:
         state.reply_lost()
         return []
-    return [int(each) for each in value(state, reply).split()]
+    return [int(each) for each in exchange.value(state, reply).split()]
 
 
 # Typed lines, lists, motion, flags. `exchange` has the single request.
@@ -327,21 +312,21 @@ def immediate(state: MCodeState, request: Request) -> Procedure[tuple[str, ...]]
     target = classify.target_of(request.text, state.rest)
     if displaces := classify.may_displace(request.text):
         state.heads_for(None)
-    reply = yield from attempted(state, request)
+    reply = yield from exchange.attempted(state, request)
     if request.kind is Kind.LIST:
         # Print a mark after a list: EM 1 to 3 give a list no end.
         lines = reply.lines
         if state.codec.em != 0:
-            rest = yield from print_mark(state, request.priority)
+            rest = yield from exchange.print_mark(state, request.priority)
             if rest is None:
                 state.reply_lost()
                 raise NoAnswer(f"{who(state)}: the list may be incomplete: its end was not seen; ask again")
             lines += rest[:-1]
             if not lines:
-                yield from check_error_flag(state, request)
+                yield from exchange.check_error_flag(state, request)
         return tuple(line for line in lines if line)
     if not reply.acknowledged:
-        late = yield from check_error_flag(state, request, silent=reply.end is End.SILENT)
+        late = yield from exchange.check_error_flag(state, request, silent=reply.end is End.SILENT)
         if reply.doubtful or (reply.end is End.SILENT and not late):
             yield from confirm_effect(state, request, before)
     if displaces:
@@ -351,17 +336,17 @@ def immediate(state: MCodeState, request: Request) -> Procedure[tuple[str, ...]]
 
 def _print(state: MCodeState, request: Request) -> Procedure[tuple[str, ...]]:
     """Send a person's print, signed so that no other line is taken for it."""
-    request = signed(state, request)
-    reply = yield from attempted(state, request)
+    request = exchange.signed(state, request)
+    reply = yield from exchange.attempted(state, request)
     if reply.end is End.SILENT:
         # Find the reason for an empty print: a refusal, or a loss (with EM=2, where not even a line feed is sent).
         if state.codec.em == 2:
             state.reply_outstanding()
-            yield from mark(state, request)
-        yield from check_error_flag(state, request)
+            yield from exchange.mark(state, request)
+        yield from exchange.check_error_flag(state, request)
         if not classify.may_be_blank(request.text, request.expect):
             raise NoAnswer(f"{who(state)} printed nothing for '{request.text}', and has no error")
-    own = sign(state).shown if request.signed else ""
+    own = exchange.sign(state).shown if request.signed else ""
     lines = tuple(line.removesuffix(own) for line in reply.lines)
     if classify.reads_error(request.text) and lines and lines[-1].strip().isdecimal():
         report_error(state, int(lines[-1]))
@@ -380,10 +365,10 @@ def motion(state: MCodeState, priority: Priority) -> Procedure[tuple[Motion, ...
     read before the velocity: after BY=0 no program sets a new one.
     """
     refuse_in_program(state, "ask again")
-    yield from before_request(state, _motion(state.codec, state.address, sign(state), priority))
-    request = _motion(state.codec, state.address, sign(state), priority)
+    yield from before_request(state, _motion(state.codec, state.address, exchange.sign(state), priority))
+    request = _motion(state.codec, state.address, exchange.sign(state), priority)
     reply = yield request
-    check_printed(state, reply)
+    exchange.check_printed(state, reply)
     found = re.fullmatch(request.expect or "", reply.text)
     assert found is not None
     return (Motion(int(found[2]), int(found[3]), program=found[1] == "1" if found[1] else None),)
@@ -406,7 +391,7 @@ def status(state: MCodeState) -> Procedure[tuple[str, ...]]:
 
 
 @lru_cache(maxsize=256)
-def _motion(codec: MCode, address: str, own: Sign, priority: Priority) -> Request:
+def _motion(codec: MCode, address: str, own: exchange.Sign, priority: Priority) -> Request:
     """Build the request once for each drive; telemetry sends it as fast as the wire allows."""
     busy = priority is not Priority.POLL
     asked = codec.request(address, f"PR {'BY,' if busy else ''}P,{own.item},V")

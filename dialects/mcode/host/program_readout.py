@@ -59,7 +59,6 @@ class Program:
 
     @property
     def start(self) -> int:
-        """The address of its first line."""
         return self.lines[0].at
 
     def declared(self, word: str) -> set[str]:
@@ -217,7 +216,7 @@ def end_program(state: MCodeState) -> Procedure[bool]:
 # The program of an MCode drive as a file, with the remarks of the file that it came from.
 
 
-def file_of(state: MCodeState, held: Held, raw: bool) -> tuple[str, ...]:  # noqa: ARG001
+def file_of(state: MCodeState, held: Held, raw: bool) -> tuple[str, ...]:
     """Return a file that reproduces what a drive holds: VA, PG, the lines, PG, S; none where that is nothing."""
     made = [f"VA {name}={called.value}" for name, called in names_of(held).items() if called.kind == GLOBAL]
     for program in programs(held.lines, state.product, fine=True):
@@ -247,7 +246,6 @@ def refreshed(text: str, held: Held) -> tuple[str, ...]:
 
 
 def annotated(text: str, held: Held) -> tuple[str, ...]:
-    """Return a listing with the remarks and the layout of the file that it came from."""
     addresses = iter(held.lines)
     width = max((len(str(line.at)) for line in held.lines), default=0)
     made: list[str] = []

@@ -1,4 +1,4 @@
-"""Programs in MCode drives: the family's record, and a file compared with what a drive holds."""
+"""Programs in MCode drives: the family's record; a file and what a drive holds, compared in canonical spelling."""
 
 from __future__ import annotations
 
@@ -16,19 +16,7 @@ from multidrop.dialects.mcode.host import classify, operations, program_readout
 from multidrop.dialects.mcode.host.before_request import value_of
 from multidrop.dialects.mcode.host.download import clears_itself, download
 from multidrop.dialects.mcode.host.operations import immediate
-from multidrop.dialects.mcode.host.program_readout import (
-    FileProgram,
-    annotated,
-    declared,
-    file_of,
-    immediate_lines,
-    names_of,
-    programs_of,
-    readable,
-    refreshed,
-    size,
-    size_of_file,
-)
+from multidrop.dialects.mcode.host.program_readout import FileProgram
 from multidrop.dialects.mcode.host.state import MCodeState, who
 from multidrop.dialects.mcode.manual import guards
 from multidrop.dialects.mcode.manual.grammar import Argument, Compare, LineError, Name, Number, Statement, Unary, parse
@@ -37,9 +25,6 @@ from multidrop.dialects.mcode.manual.statements import canonical
 from multidrop.dialects.mcode.manual.table import lookup
 from multidrop.dialects.program_files import Difference, Held, Stored, first_difference
 from multidrop.dialects.text import counted
-
-# A program file and what a drive holds, compared line by line in canonical spelling.
-
 
 HOLDING = ("variable", "flag")
 """The kinds of words that hold a value."""
@@ -54,10 +39,10 @@ def differences(
 
     `before`: what the drive held before the file was sent. A line of that after a program is another program's.
     """
-    names = names_of(held)
-    found = programs_of(lines)
+    names = program_readout.names_of(held)
+    found = program_readout.programs_of(lines)
     starts = {start for each in found if (start := each.start(names)) is not None}
-    known = {*names, *(each[1] for line in lines if (each := declared(line.text)) is not None)}
+    known = {*names, *(each[1] for line in lines if (each := program_readout.declared(line.text)) is not None)}
     made: list[Difference] = []
     for program in found:
         start = program.start(names)
@@ -72,7 +57,7 @@ def _not_replaced(program: FileProgram, start: int, starts: set[int], product: s
     others = starts - {start}
     inside: list[SourceLine] = []
     for line in program.lines:
-        end = start + size(line.text, product)
+        end = start + program_readout.size(line.text, product)
         if any(start <= other < end for other in others):
             break
         inside.append(line)
@@ -97,7 +82,7 @@ def _there(program: FileProgram, start: int | None, starts: set[int], held: Held
 
 
 def _follows(before: Stored, line: Stored, product: str) -> bool:
-    return before.at + size(before.text, product) == line.at
+    return before.at + program_readout.size(before.text, product) == line.at
 
 
 def _compared(here: Sequence[SourceLine], there: Sequence[Stored], names: set[str]) -> Iterator[Difference]:
@@ -120,9 +105,9 @@ def to_send(state: MCodeState, lines: Sequence[SourceLine], held: Held) -> Proce
     """Return why a file must be sent; empty where the drive holds its programs, variables and settings already."""
     if why := first_difference(differences(state, lines, held)):
         return why
-    if clears_itself(lines) and size_of_file(lines) != len(held.lines):
+    if clears_itself(lines) and program_readout.size_of_file(lines) != len(held.lines):
         return "the drive holds other programs, which the file clears"
-    for line in immediate_lines(lines):
+    for line in program_readout.immediate_lines(lines):
         if why := (yield from _unlike(state, line, held)):
             return why
     return ""
@@ -130,11 +115,14 @@ def to_send(state: MCodeState, lines: Sequence[SourceLine], held: Held) -> Proce
 
 def _unlike(state: MCodeState, line: SourceLine, held: Held) -> Procedure[str]:
     """Return why a line outside of programs must be sent; empty where the drive has its value."""
-    names = names_of(held)
-    statement = _statement(line.text, set(names))
+    names = program_readout.names_of(held)
+    try:
+        statement = parse(line.text, set(names))
+    except LineError:
+        statement = Statement(classify.word_of(line.text)[0], ())
     if statement is None or statement.word in STEADY:
         return ""
-    named = declared(line.text)
+    named = program_readout.declared(line.text)
     name = named[1] if named is not None else statement.word
     if named is not None:
         first = statement.arguments[0]
@@ -158,13 +146,6 @@ def _values(state: MCodeState, statement: Statement) -> Procedure[list[float | N
         case (Name(word),) if (row := lookup(word, state.product)) is not None and row.kind in HOLDING:
             return (yield from _read_setting(state, word, []))
     return [_literal(each) for each in statement.arguments]
-
-
-def _statement(text: str, names: set[str]) -> Statement | None:
-    try:
-        return parse(text, names)
-    except LineError:
-        return Statement(classify.word_of(text)[0], ())
 
 
 def _literal(argument: Argument | None) -> float | None:
@@ -193,15 +174,12 @@ def _as_number(text: str) -> float | None:
         return None
 
 
-# Programs in MCode drives: the conversations and the files of the family's record.
-
-
 PROGRAMS: Programs[MCodeState] = Programs(
     listing=operations.listing,
-    readable=readable,
+    readable=program_readout.readable,
     who=who,
     read=program_readout.read,
-    file=file_of,
+    file=program_readout.file_of,
     executed=program_readout.immediate_lines,
     size=program_readout.size_of_file,
     end=program_readout.end_program,
@@ -209,8 +187,8 @@ PROGRAMS: Programs[MCodeState] = Programs(
     differences=differences,
     to_send=to_send,
     start=program_readout.start_line,
-    refreshed=refreshed,
-    annotated=annotated,
+    refreshed=program_readout.refreshed,
+    annotated=program_readout.annotated,
     acts=guards.acts,
     save="S",
     remark="'",

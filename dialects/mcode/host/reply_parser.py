@@ -1,4 +1,4 @@
-"""The lines and signs of an MCode drive's reply, and the outcome that they prove (`reply_parser` has the theory)."""
+"""The lines and signs of an MCode drive's reply, and the outcome that they prove (`ReplyParser` has the theory)."""
 
 from __future__ import annotations
 

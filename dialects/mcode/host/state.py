@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
-from multidrop.dialects.codec import Request
 from multidrop.dialects.errors import Refused
 from multidrop.dialects.mcode.host.codec import MCode
 from multidrop.dialects.mcode.manual import errors
@@ -61,7 +60,6 @@ class MCodeState(DriveState):
     # Settings
 
     def codec_assumed(self, codec: MCode) -> None:
-        """Use a codec that the drive has not confirmed."""
         self.codec = codec
 
     def settings_read(self, address: str, codec: MCode, *, error: bool, running: bool) -> None:
@@ -114,7 +112,6 @@ class MCodeState(DriveState):
         self.error_possible()
 
     def program_started(self) -> None:
-        """Record that a command that starts a program is on its way."""
         self.running, self.stepping = True, False
 
     def program_read(self, *, error: bool, running: bool) -> None:
@@ -169,10 +166,6 @@ def refuse_in_program(state: MCodeState, then: str = "") -> None:
     if state.programming:
         more = f", then {then}" if then else ""
         raise Refused(f"{who(state)} is in program mode and would store it: PG ends that{more}")
-
-
-def unknown(state: DriveState, request: Request) -> str:
-    return f"{who(state)} does not reply: it is not known whether '{request.text}' was executed; it was sent once"
 
 
 def report_error(state: DriveState, code: int) -> None:

@@ -372,10 +372,7 @@ def first(state: MCodeState, word: str) -> Procedure[float]:
     found = yield from debugging.values(state, [word])
     if word not in found:
         raise Refused(f"{who(state)} has no variable {word}")
-    try:
-        return printed_number(who(state), word, found[word])
-    except ValueError as wrong:
-        raise Refused(str(wrong)) from None
+    return printed_number(who(state), word, found[word])
 
 
 def again(state: MCodeState, word: str, priority: Priority) -> Procedure[float]:

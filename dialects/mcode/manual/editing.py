@@ -107,7 +107,6 @@ def _uses(line: _Line, words: Container[str]) -> Iterator[tuple[int, Token]]:
 
 
 def fixed(name: UserName) -> str:
-    """Return why a name cannot be another one; empty if it can."""
     if name.word == AT_POWER_UP:
         return f"{AT_POWER_UP} is the label of the program that runs at power-up: by another name it would not run"
     return ""
@@ -155,9 +154,6 @@ def _tokens(line: _Line, words: frozenset[str], new: Mapping[str, str]) -> list[
         upper = token.text.upper()
         found[number] = new.get(upper, upper)
     return found
-
-
-# MCode program files in an editor: the `EditingLanguage` of the language.
 
 
 _ACCESS = {"RW", "RO", "RC"}

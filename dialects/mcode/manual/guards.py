@@ -1,4 +1,4 @@
-"""The lines of MCode that a person must agree to before they are sent, in one table.
+"""The lines of MCode that a person must agree to before they are sent: `guards.csv` has their words.
 
 A guarded line erases, takes the drive out of reach, or starts it in a way that its word does not show. A stop is never
 guarded. (MCode reference 5.1.6, 5.1.9, 5.1.23, 5.1.33, 5.1.45, 5.1.63, 5.1.75, 5.1.105, 5.1.133.)
@@ -14,29 +14,22 @@ import re
 from collections.abc import Callable, Mapping
 
 from multidrop.dialects.family import ADDRESSES, EVERYONE, Guard, Protection, to_all
-from multidrop.dialects.mcode.manual.grammar import LineError, Number, Statement, parse, parsed
+from multidrop.dialects.files import rows
+from multidrop.dialects.mcode.manual.grammar import LineError, Number, parse, parsed
 from multidrop.dialects.mcode.manual.mnemonic import ETHERNET
 from multidrop.dialects.mcode.manual.program_file import bare
 from multidrop.dialects.mcode.manual.table import lookup
 
-AT_ONCE: Mapping[str, str] = {
-    "FD": "erases all programs, variables and settings, and resets the drive",
-    "CP": "erases the program",
-    "UG": "makes the drive wait for a firmware upgrade, and obey nothing else until that is complete",
-    "IP": "puts every variable and flag back to its saved value; values that were not saved are lost",
-}
+_ROWS = list(rows(__file__, "guards.csv"))
+AT_ONCE: Mapping[str, str] = {row["word"]: row["what"] for row in _ROWS if not row["value"]}
 """Instructions, with or without a value."""
-SETTINGS: Mapping[str, str] = {
-    "AS": "starts the motor at once, in torque mode",
-    "BD": "changes the baud rate: after S and a reset the drive replies at that rate only",
-    "DN": "changes the name by which the drive is addressed",
-    "LK": "hides the program: once that is saved, only CP or FD opens it, and both erase",
-    "PY": "takes the drive out of party mode: it then obeys lines that are for other drives",
-}
+SETTINGS: Mapping[str, str] = {row["word"]: row["what"] for row in _ROWS if row["value"]}
 """Settings, where a value is written."""
 NAMES: Mapping[str, str] = {**AT_ONCE, **SETTINGS, EVERYONE: "can start every drive of the line"}
 """Every guard, and what its lines do."""
-HARMLESS: Mapping[str, frozenset[int]] = {"AS": frozenset({0, 1, 2}), "LK": frozenset({0}), "PY": frozenset({1})}
+HARMLESS: Mapping[str, frozenset[int]] = {
+    row["word"]: frozenset(map(int, row["harmless"].split())) for row in _ROWS if row["harmless"]
+}
 """The values of a setting that are not guarded; an expression may have any value, so it is."""
 STOPS_AT_0 = frozenset({"SL", "JE", "DE", "AS", "TQ"})
 """Words whose 0 ends motion or torque: no address makes them a guarded line."""
@@ -119,16 +112,12 @@ def _read(line: str, product: str) -> tuple[str, int | str] | None:
         return (found[1].upper(), found[2].strip()) if found is not None and known else None
     if statement is None or lookup(statement.word, product) is None:
         return None
-    return statement.word, _value(statement)
-
-
-def _value(statement: Statement) -> int | str:
-    if not statement.arguments:
-        return ""
-    first = statement.arguments[0]
-    if len(statement.arguments) == 1 and isinstance(first, Number) and first.value == int(first.value):
-        return int(first.value)
-    return "?"
+    match statement.arguments:
+        case ():
+            return statement.word, ""
+        case (Number(value),) if value == int(value):
+            return statement.word, int(value)
+    return statement.word, "?"
 
 
 TEXT = (

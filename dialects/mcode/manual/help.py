@@ -88,7 +88,6 @@ def complete(prefix: str, product: str = "") -> list[tuple[str, str]]:
 
 
 def offered(prefix: str, product: str = "") -> list[Mnemonic]:
-    """The rows that `complete` offers."""
     head, rows = prefix.strip().upper(), words(product)
     return [row for row in rows.values() if row.name.startswith(head) and _offered(row, product)]
 

@@ -75,12 +75,10 @@ def impossible(name: str, value: Value, now: Mapping[str, Value | None], labels:
         return "torque mode (AS=3) fixes it"
     if not writable(value):
         return "a line cannot hold its digits"
-    return _impossible_trip(name, value, labels) if name in TRIPS else ""
-
-
-def _impossible_trip(name: str, value: Value, labels: Collection[str]) -> str:
+    if name not in TRIPS or (value == 0 and name in REMOVABLE):
+        return ""
     if value == 0:
-        return "" if name in REMOVABLE else "a drive cannot forget a trip; FD does"
+        return "a drive cannot forget a trip; FD does"
     targets = value[1:2] if isinstance(value, tuple) else (value,)
     missing = [each for each in targets if isinstance(each, str) and each.upper() not in labels]
     return f"the program in the drive has no label {missing[0]}; download it first" if missing else ""

@@ -142,7 +142,6 @@ def _lacking(version: str, part: str) -> frozenset[str]:
 
 
 def form_of(row: Mnemonic) -> Form:
-    """How PR prints a word."""
     if row.name in TRIPS:
         return Form.TRIP
     if row.low is None:
@@ -246,7 +245,10 @@ def checked(name: str, value: Value, product: str, counts: bool, labels: Collect
         if not (isinstance(value, str) and len(value) == 1 and value.isascii() and value.isalnum()):
             raise Diagnostic(f"DN = {value}: takes one letter or digit")
     elif not (isinstance(value, (int, float)) and row.accepts(value, counts)):
-        raise _out_of_range(name, value, row, counts)
+        low, high = row.bounds(counts)
+        valid_ones = ", ".join(map(str, row.values)) if row.values else f"{low} to {high}"
+        unit = " (with EE=1)" if counts and row.low_encoder else ""
+        raise Diagnostic(f"{name} = {value}: valid: {valid_ones}{unit}")
     return value
 
 
@@ -256,12 +258,6 @@ def _fields_of(name: str) -> int | None:
     if name in FIELDS:
         return FIELDS[name]
     return (2 if name in PAIRED else 3) if POINT.fullmatch(name) else None
-
-
-def _out_of_range(name: str, value: Value, row: Mnemonic, counts: bool) -> Diagnostic:
-    low, high = row.bounds(counts)
-    valid = ", ".join(map(str, row.values)) if row.values else f"{low} to {high}"
-    return Diagnostic(f"{name} = {value}: valid: {valid}" + (" (with EE=1)" if counts and row.low_encoder else ""))
 
 
 def writable(value: Value) -> bool:

@@ -7,24 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from multidrop.dialects.mcode.manual.mnemonic import EXPANDED
 from multidrop.dialects.mcode.manual.parameters import counting
 from multidrop.dialects.state import DriveState
-from multidrop.dialects.values import (
-    BY,
-    DISABLE,
-    ENABLE,
-    HOME_MINUS,
-    HOME_PLUS,
-    STOP,
-    TO,
-    UNREAD,
-    Actions,
-    Conditions,
-    Control,
-    Controls,
-    Facts,
-    Lamp,
-    Pace,
-    number,
-)
+from multidrop.dialects.values import UNREAD, Actions, Conditions, Controls, Facts, Lamp, Pace, controls_of, number
 
 INPUTS = (1, 2, 3, 4)
 EXPANDED_INPUTS = (*INPUTS, 9, 10, 11, 12)
@@ -152,20 +135,9 @@ def assign(word: str, value: str) -> str:
     return f"{word}={value}"
 
 
-CONTROLS: Controls = {
-    BY: Control(("MR {by}",)),
-    TO: Control(("MA {to}",)),
-    HOME_MINUS: Control(("HM 1",), "seek it in minus, creep off in plus"),
-    HOME_PLUS: Control(("HM 3",), "seek it in plus, creep off in minus"),
-    STOP: Control(("SL 0",), "slows down with D; a program goes on"),
-    ENABLE: Control(("DE=1",), "current in the motor"),
-    DISABLE: Control(("DE=0",), "no current: nothing holds the load"),
-}
-"""The same over Modbus. (MCode reference 5.1.30, 5.1.54, 5.1.80, 5.1.84, 5.1.117.)"""
-
-
 def controls(state: DriveState, axis: str) -> Controls:
-    return CONTROLS
+    """The same over Modbus. (MCode reference 5.1.30, 5.1.54, 5.1.80, 5.1.84, 5.1.117.)"""
+    return controls_of(__file__)
 
 
 def homings(axis: str) -> Mapping[str, Mapping[str, str]]:

@@ -216,7 +216,6 @@ MOVES = frozenset({"CF", "HF", "HI", "HM", "MA", "MR", "SL"})
 
 
 def parts(line: str) -> list[Part]:
-    """Return the parts of a line that differ from plain text. Never fails."""
     end = remark_at(line)
     found = tokens(line[:end])
     declares = bool(found) and found[0].text.upper() in _DECLARE

@@ -16,7 +16,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from multidrop.dialects.files import rows
-from multidrop.dialects.mcode.manual.mnemonic import EVERY, LEXIUM, MDRIVE_PLUS, READ_ONLY, Default, Mnemonic, Number
+from multidrop.dialects.mcode.manual.mnemonic import EVERY, LEXIUM, MDRIVE_PLUS, READ_ONLY, Mnemonic, Number
 
 
 def _number(text: str) -> Number | None:
@@ -25,16 +25,12 @@ def _number(text: str) -> Number | None:
     return int(text) if text.lstrip("-").isdigit() else float(text)
 
 
-def _default(text: str) -> Default:
-    return text if text == "!" or "," in text else _number(text)
-
-
 def _products(text: str, everywhere: frozenset[str]) -> frozenset[str]:
     return frozenset(text.split()) - {"-"} if text else everywhere
 
 
 def _mnemonic(row: Mapping[str, str], products: frozenset[str]) -> Mnemonic:
-    marks = row["marks"].split()
+    marks, default = row["marks"].split(), row["default"]
     values, gap = ([int(n) if n.isdigit() else float(n) for n in row[field].split()] for field in ("values", "gap"))
     return Mnemonic(
         name=row["name"],
@@ -49,7 +45,7 @@ def _mnemonic(row: Mapping[str, str], products: frozenset[str]) -> Mnemonic:
         low=_number(row["low"]),
         high=_number(row["high"]),
         unit=row["unit"],
-        default=_default(row["default"]),
+        default=default if default == "!" or "," in default else _number(default),
         low_encoder=_number(row["low_encoder"]),
         high_encoder=_number(row["high_encoder"]),
         unit_encoder=row["unit_encoder"],

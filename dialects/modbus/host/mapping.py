@@ -149,11 +149,9 @@ def reading(word: str) -> Reading:
         return Reading(asked, lambda answer: pdu_codec().objects(answer)[0].get(thing, ""))
     row = lookup(word)
     register = REGISTERS.get(word)
-    if word == "E" or word in CONTROLS or (register is not None and not register.readable):
-        raise Refused(f"{word} cannot be printed: error {UNREADABLE}: {errors.text(UNREADABLE)}", UNREADABLE)
-    if register is None:
+    if register is None and word != "E" and word not in CONTROLS:
         raise unavailable(word)
-    if row is not None and row.access == "-":
+    if register is None or not register.readable or (row is not None and row.access == "-"):
         raise Refused(f"{word} cannot be printed: error {UNREADABLE}: {errors.text(UNREADABLE)}", UNREADABLE)
     return Reading(read(register), lambda answer: str(value_of(register, pdu_codec().registers(answer))))
 

@@ -3,7 +3,7 @@
 Theory of operation. pymodbus packs and unpacks PDUs, and its framer adds the header. Nothing else of it is used: its
 framer loses frames that it cuts (`framing.first` cuts them), and its classes accept almost any reply (`framing.fits`
 decides). So this module reads only replies that fit. Functions 65 and 66 belong to this drive and have classes here.
-Importing this module imports pymodbus, asyncio and logging, which is slow; `messages.pdu_codec` does that for the first
+Importing this module imports pymodbus, asyncio and logging, which is slow; `codec.pdu_codec` does that for the first
 message. pymodbus logs what it cannot decode, and would print to the screen: its logger is silenced for this process.
 (Modbus/TCP manual 4.1 to 4.3; docs/decisions/0008-modbus-codec.md.)
 """

@@ -190,10 +190,7 @@ def check(state: ModbusState, word: str) -> str:
 
 
 def again(state: ModbusState, word: str, priority: Priority) -> Procedure[float]:
-    try:
-        return printed_number(who(state), word, (yield from printed(state, word, priority)))
-    except ValueError as wrong:
-        raise Refused(str(wrong)) from None
+    return printed_number(who(state), word, (yield from printed(state, word, priority)))
 
 
 SERIAL = 5
@@ -204,7 +201,6 @@ NO_PROGRAM = ("its program and variables", "Modbus reads neither; MCode/TCP (tcp
 
 
 def take(state: ModbusState, progress: Progress) -> Procedure[Snapshot]:
-    """Read a drive. Raises Refused or NoAnswer."""
     readings = yield from read_settings(state, progress)
     if not state.serial:
         state.serial_read((yield from identification(state)).get(SERIAL, ""))

@@ -55,7 +55,6 @@ class Register:
         return tuple((int(low), int(high or low)) for low, high in found)
 
     def allows(self, value: int) -> bool:
-        """Whether the manual's range includes the value."""
         return not self.spans or any(low <= value <= high for low, high in self.spans)
 
 

@@ -32,7 +32,7 @@ def who(state: PmxState) -> str:
     return state.label or state.address or "the controller"
 
 
-def _mark(state: PmxState, request: Request, sent: bool) -> Procedure[tuple[str, ...] | None]:  # noqa: ARG001
+def _mark(state: PmxState, request: Request, sent: bool) -> Procedure[tuple[str, ...] | None]:
     """Send an unknown word with a fresh number, which precedes every reply to it."""
     text = f"{MARK}{state.address}{state.next_sync_mark() % 1000:03}"
     asked = replace(state.codec.request(state.address, text), kind=Kind.PRINT)

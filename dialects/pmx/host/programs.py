@@ -9,11 +9,10 @@ which is the address of a compiled line. (PMX-2ED-SA manual 7.19.1 to 7.19.3, ta
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 from multidrop.dialects.codec import End, Procedure
-from multidrop.dialects.debugging import Debugging, Look, Neighbours, Row
-from multidrop.dialects.errors import Diagnostic, DriveError, Inexpressible, NoAnswer, Refused, Stopped
+from multidrop.dialects.debugging import Debugging, Look, Neighbours, Row, lacking
+from multidrop.dialects.errors import Diagnostic, DriveError, NoAnswer, Refused, Stopped
 from multidrop.dialects.family import Programs, Progress
 from multidrop.dialects.files import SourceLine, lines_of_text
 from multidrop.dialects.pmx.host.codec import PmxState
@@ -51,10 +50,7 @@ def read_line(state: PmxState, at: int) -> Procedure[str]:
 
 
 def download(
-    state: PmxState,
-    lines: Sequence[SourceLine],
-    held: Held | None,  # noqa: ARG001
-    progress: Progress,
+    state: PmxState, lines: Sequence[SourceLine], held: Held | None, progress: Progress
 ) -> Procedure[Sequence[SourceLine]]:
     """Write a program and read back each line. Both programs must be idle. Raises Refused, NoAnswer or Diagnostic.
 
@@ -173,10 +169,7 @@ def _command(state: PmxState, text: str) -> Procedure[None]:
 
 
 def differences(
-    state: PmxState,  # noqa: ARG001
-    lines: Sequence[SourceLine],
-    held: Held,
-    before: Held | None = None,  # noqa: ARG001
+    state: PmxState, lines: Sequence[SourceLine], held: Held, before: Held | None = None
 ) -> tuple[Difference, ...]:
     """Compare the compiled lines of a file with the stored ones; a script is all that the controller holds."""
     there = dict(held.lines)
@@ -192,13 +185,11 @@ def differences(
 
 
 def to_send(state: PmxState, lines: Sequence[SourceLine], held: Held) -> Procedure[str]:
-    """Return why a file must be sent; empty where the controller holds its lines."""
     yield from ()
     return first_difference(differences(state, lines, held), "controller")
 
 
 def start(lines: Sequence[SourceLine], label: str) -> str:
-    """Return the line that starts a program by its number. Raises Diagnostic where the file has no such program."""
     marks = {token for _, _, token in program_file.compiled(lines) if token.startswith("PS")} or {"PS0"}
     if f"PS{label}" not in marks:
         hint = f"programs: {', '.join(sorted(mark[2:] for mark in marks))}"
@@ -221,7 +212,6 @@ def readable(held: Held) -> tuple[str, ...]:
 
 
 def file_of(_: PmxState, held: Held, raw: bool) -> tuple[str, ...]:
-    """Return the lines of a file that reproduces what a controller holds."""
     return tuple(f"SA{line.at}={line.text}" for line in held.lines) if raw else readable(held)
 
 
@@ -246,6 +236,8 @@ RUNNING, PAUSED = 1, 2
 START, PAUSE, CONTINUE = 1, 2, 3
 """Values of SR."""
 NO_STEP = "a PMX has no single step: /break now pauses a program, /continue goes on"
+no_step = lacking(who, NO_STEP)
+no_break = lacking(who, "a PMX has no break points: /break now pauses a program; program test --break has them")
 
 
 def stored_rows(state: PmxState) -> Procedure[tuple[Row, ...]]:
@@ -268,7 +260,7 @@ def _rows(held: tuple[Row, ...]) -> tuple[Row, ...]:
 
 def idle(state: PmxState, program: str, neighbours: Neighbours | None) -> Procedure[None]:
     if neighbours is None:
-        raise _lacks(state, NO_STEP)
+        yield from no_step(state)
     if (yield from _status(state, program)) in (RUNNING, PAUSED):
         raise Refused(f"{who(state)}: program {program} runs already; not started; SR{program}=0 ends it")
 
@@ -308,20 +300,6 @@ def _program(place: str) -> str:
     if (place or "0") not in ("0", "1"):
         raise Diagnostic(f"no program {place}", "", "valid: 0 or 1")
     return place or "0"
-
-
-def no_step(state: PmxState, *_: object) -> Procedure[Any]:
-    raise _lacks(state, NO_STEP)
-    yield  # a procedure
-
-
-def no_break(state: PmxState, *_: object) -> Procedure[None]:
-    raise _lacks(state, "a PMX has no break points: /break now pauses a program; program test --break has them")
-    yield  # a procedure
-
-
-def _lacks(state: PmxState, what: str) -> Inexpressible:
-    return Inexpressible(f"{who(state)}: {what}; nothing was sent")
 
 
 def check_names(state: PmxState, names: Sequence[str]) -> None:

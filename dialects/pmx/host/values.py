@@ -18,7 +18,7 @@ from dataclasses import replace
 from functools import partial
 
 from multidrop.dialects.codec import Priority, Procedure, Request
-from multidrop.dialects.errors import Diagnostic, Inexpressible, Refused
+from multidrop.dialects.errors import Diagnostic, Inexpressible
 from multidrop.dialects.pmx.host.codec import PmxState
 from multidrop.dialects.pmx.host.operations import (
     LATER,
@@ -32,34 +32,15 @@ from multidrop.dialects.pmx.host.operations import (
     who,
 )
 from multidrop.dialects.pmx.host.programs import listing
+from multidrop.dialects.pmx.manual import table
 from multidrop.dialects.pmx.manual.program_file import RAW
-from multidrop.dialects.pmx.manual.table import (
-    AXES,
-    COMMANDS,
-    LIMIT_ERROR,
-    LOOP_ERRORS,
-    MOVING,
-    lookup,
-    loop_words,
-    program_words,
-    status_words,
-    trouble_words,
-)
 from multidrop.dialects.state import DriveState
 from multidrop.dialects.values import (
-    BY,
     COMMUNICATION,
-    DISABLE,
-    ENABLE,
-    HOME_MINUS,
-    HOME_PLUS,
-    STOP,
-    TO,
     VARIABLES,
     Actions,
     Change,
     Conditions,
-    Control,
     Controls,
     Facts,
     Lamp,
@@ -75,6 +56,7 @@ from multidrop.dialects.values import (
     Snapshot,
     Value,
     Values,
+    controls_of,
     printed_number,
     read_each,
     reference_lost,
@@ -99,19 +81,19 @@ RANGES: Mapping[str, tuple[int, int]] = {
 """Ranges of whole numbers; others are whole numbers of 32 bits."""
 SIGNED = ("V", "JL")
 RATIO = "SLR"
-_AXIS = re.compile(rf"([A-Z]+?)([{''.join(AXES)}])\Z")
+_AXIS = re.compile(rf"([A-Z]+?)([{''.join(table.AXES)}])\Z")
 
 
 def base(name: str) -> str:
-    if name in COMMANDS:
+    if name in table.COMMANDS:
         return name
     found = _AXIS.match(name)
-    return found[1] if found is not None and found[1] in COMMANDS else name.rstrip("0123456789")
+    return found[1] if found is not None and found[1] in table.COMMANDS else name.rstrip("0123456789")
 
 
 def axis(name: str) -> str:
     found = _AXIS.match(name)
-    return found[2] if found is not None and name not in COMMANDS and found[1] in COMMANDS else ""
+    return found[2] if found is not None and name not in table.COMMANDS and found[1] in table.COMMANDS else ""
 
 
 def reading(name: str, value: Value) -> Reading:
@@ -124,7 +106,12 @@ def reading(name: str, value: Value) -> Reading:
 
 NAMES = tuple(
     sorted(
-        (word for row in COMMANDS.values() if row.access == "RW" and row.name not in STATES for word in row.words()),
+        (
+            word
+            for row in table.COMMANDS.values()
+            if row.access == "RW" and row.name not in STATES
+            for word in row.words()
+        ),
         key=lambda name: (base(name) not in SPEED_LIMITS, base(name) in (*LOOP, "SL")),
     )
 )
@@ -132,7 +119,6 @@ NAMES = tuple(
 
 
 def plan(state: PmxState, present: Readings, wanted: Mapping[str, Value], allowed: Permission) -> Plan:
-    """Order the steps to the wanted values. Raises Diagnostic for a value that the controller refuses."""
     now = present.values
     changed = {name.upper(): value for name, value in wanted.items() if not same(value, now.get(name.upper()))}
     withheld = {name: reason for name in changed if (reason := _risk(name, changed[name], now, allowed))}
@@ -214,7 +200,6 @@ def _read_setting(state: PmxState, name: str) -> Procedure[Reading]:
 
 
 def conflict(plan: Plan, others: Collection[str]) -> str:
-    """Return the reason for which a device name is another controller's; empty: it is none's."""
     numbers = [str(change.after)[-2:] for change in plan if change.name == "DN"]
     return f"another controller of the line has number {numbers[0]}" if numbers and numbers[0] in others else ""
 
@@ -257,12 +242,12 @@ POLARITY = 1 << 10
 
 def parts(state: PmxState, facts: Facts) -> Sequence[Part[PmxState]]:
     found = []
-    for axis in AXES:
+    for axis in table.AXES:
         loop = (f"SLS{axis}", f"DX{axis}") if facts.get(f"SL{axis}") else ()
         found.append(Part(axis, partial(_facts, names=(f"MST{axis}", *loop))))
     found += [Part("points", partial(_facts, names=("DI", "DO", "EO"))), Part("programs", _programs)]
-    found += [Part(f"settings {axis}", partial(_facts, names=(f"SL{axis}",)), slow=True) for axis in AXES]
-    named = [each + axis for axis in ("", *AXES) for each in SPEEDS]
+    found += [Part(f"settings {axis}", partial(_facts, names=(f"SL{axis}",)), slow=True) for axis in table.AXES]
+    named = [each + axis for axis in ("", *table.AXES) for each in SPEEDS]
     return [*found, *(Part(name, partial(_facts, names=(name,)), slow=True) for name in (*named, "EDEC"))]
 
 
@@ -285,7 +270,7 @@ def _programs(state: PmxState) -> Procedure[Facts]:
 def fold(state: PmxState, facts: Facts) -> tuple[Conditions, ...]:
     """The conditions of both axes; points and programs are with the first."""
     whole = {name: value for name, value in facts.items() if isinstance(value, int)}
-    one, other = (_of_axis(axis, whole) for axis in AXES)
+    one, other = (_of_axis(axis, whole) for axis in table.AXES)
     lamps = list(one.lamps)
     for word, output in (("DI", False), ("DO", True)):
         bits = whole.get(word)
@@ -297,7 +282,7 @@ def fold(state: PmxState, facts: Facts) -> tuple[Conditions, ...]:
     one = replace(
         one,
         lamps=tuple(lamps),
-        program=", ".join(f"{n} {program_words(states[n] or 0)}" for n in active),
+        program=", ".join(f"{n} {table.program_words(states[n] or 0)}" for n in active),
         runs=None if None in states else RUNNING in states,  # a paused one moves nothing
         line=", ".join(str(facts.get(f"SPC{n}", "")) for n in active),
         more=(*one.more, *([("program", f"{failed} stopped by an error")] if failed else ())),
@@ -309,15 +294,15 @@ def _of_axis(axis: str, facts: Mapping[str, int]) -> Conditions:
     status, loop, on = facts.get(f"MST{axis}"), facts.get(f"SLS{axis}"), facts.get("EO")
     more = []
     if status is not None:
-        more.append(("status", ", ".join(status_words(status))))
+        more.append(("status", ", ".join(table.status_words(status))))
     if loop is not None:
-        more.append(("StepNLoop", loop_words(loop)))
+        more.append(("StepNLoop", table.loop_words(loop)))
     if f"DX{axis}" in facts:
         more.append(("delta", str(facts[f"DX{axis}"])))
-    code = (status or 0) & LIMIT_ERROR
-    text = trouble_words(code)
-    if loop is not None and loop in LOOP_ERRORS:
-        code, text = loop, f"StepNLoop {loop_words(loop)}"
+    code = (status or 0) & table.LIMIT_ERROR
+    text = table.trouble_words(code)
+    if loop is not None and loop in table.LOOP_ERRORS:
+        code, text = loop, f"StepNLoop {table.loop_words(loop)}"
     return Conditions(
         axis=axis.lower(),
         lamps=tuple(Lamp("", each, None if status is None else bool(status & bit)) for bit, each in ON_AXIS),
@@ -340,7 +325,7 @@ def _pace(axis: str, facts: Mapping[str, int]) -> Pace | None:
 
 
 def check(state: PmxState, word: str) -> str:
-    row = lookup(word)
+    row = table.lookup(word)
     if row is None or "R" not in row.access:
         raise Diagnostic(f"{word} cannot be polled: it reads no value", hint="valid: V0 to V63, DI, SSPD and others")
     return word.upper()
@@ -348,19 +333,15 @@ def check(state: PmxState, word: str) -> str:
 
 def again(state: PmxState, word: str, priority: Priority) -> Procedure[float]:
     reply = yield from answered(state, replace(state.codec.request(state.address, word), priority=priority))
-    try:
-        return printed_number(who(state), word, reply.text)
-    except ValueError as wrong:
-        raise Refused(str(wrong)) from None
+    return printed_number(who(state), word, reply.text)
 
 
 def take(state: PmxState, progress: Progress) -> Procedure[Snapshot]:
-    """Read a controller. Raises NoAnswer."""
     readings = yield from read_settings(state, progress)
     identity = yield from answered(state, state.codec.request(state.address, "ID"))
     remarks = []
-    for axis in AXES:
-        if (yield from number(state, f"MST{axis}")) & MOVING:
+    for axis in table.AXES:
+        if (yield from number(state, f"MST{axis}")) & table.MOVING:
             remarks.append(f"{axis} moved while it was read: its position is one of that moment")
     for program in PROGRAMS:
         if (yield from number(state, f"SASTAT{program}")) == RUNNING:
@@ -393,17 +374,7 @@ def take(state: PmxState, progress: Progress) -> Procedure[Snapshot]:
 
 
 def controls(state: DriveState, axis: str) -> Controls:
-    name = axis.upper()
-    number = AXES.index(name) + 1
-    return {
-        BY: Control(("ABS", name + "{to}"), "numbers are positions from then on"),
-        TO: Control(("ABS", name + "{to}"), "numbers are positions from then on"),
-        HOME_MINUS: Control((f"H{name}-",), "on the home input, at high speed"),
-        HOME_PLUS: Control((f"H{name}+",), "on the home input, at high speed"),
-        STOP: Control((f"STOP{name}",), "slows down; a program goes on"),
-        ENABLE: Control((f"EO{number}=1",), "current in the motor"),
-        DISABLE: Control((f"EO{number}=0",), "no current: nothing holds the load"),
-    }
+    return controls_of(__file__, axis.upper(), table.AXES.index(axis.upper()) + 1)
 
 
 SEARCHES: Mapping[str, str] = {"home": "H", "home slow": "HL", "limit": "L", "index": "Z", "home index": "ZH"}

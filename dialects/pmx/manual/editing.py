@@ -12,20 +12,7 @@ from dataclasses import replace
 from multidrop.dialects.errors import Diagnostic
 from multidrop.dialects.files import split_lines
 from multidrop.dialects.pmx.manual import script_parser
-from multidrop.dialects.pmx.manual.script_parser import (
-    AXES,
-    HANDLER,
-    KEPT_VARIABLES,
-    MOVE,
-    SUBROUTINES,
-    TARGET,
-    VARIABLE_NAMES,
-    VARIABLES,
-    Register,
-    Statement,
-    Value,
-    parse,
-)
+from multidrop.dialects.pmx.manual.script_parser import Statement, Value, parse
 from multidrop.dialects.program_files import Block, Offer, Span, UserName, Word, replaced
 
 _NUMBERED = re.compile(r"\s*(PRG|SUB|GOSUB)\s*(\d{1,4})\s*", re.ASCII)
@@ -64,23 +51,24 @@ def _found(code: str) -> Iterator[tuple[str, str, int, int]]:
         yield f"{head} {int(numbered[2])}", kind, *numbered.span(2)
         return
     indent = len(code) - len(code.lstrip())
-    if MOVE.fullmatch(code.strip()):
-        found = [(each[2], indent + each.start(2)) for each in TARGET.finditer(code.strip())]
+    if script_parser.MOVE.fullmatch(code.strip()):
+        found = [(each[2], indent + each.start(2)) for each in script_parser.TARGET.finditer(code.strip())]
     else:
         found = [(word.text, word.start) for word in script_parser.words(code)]
-    yield from ((text, "variable", start, start + len(text)) for text, start in found if text in VARIABLE_NAMES)
+    yield from (
+        (text, "variable", start, start + len(text)) for text, start in found if text in script_parser.VARIABLE_NAMES
+    )
 
 
 def fixed(name: UserName) -> str:
-    """Return why a name cannot be another one; empty if it can."""
     if name.kind == "program":
         return f"the host starts {name.word} by its number (SR{name.word[4:]}=1)"
-    if name.word == f"SUB {HANDLER}":
+    if name.word == f"SUB {script_parser.HANDLER}":
         return f"{name.word} is the subroutine that runs after an error, by its number"
     return ""
 
 
-def renamed(text: str, name: UserName, new: str, product: str) -> str:  # noqa: ARG001
+def renamed(text: str, name: UserName, new: str, product: str) -> str:
     """Return the variable, or the number of the subroutine. Raises Diagnostic where that is none, or is in use."""
     if reason := fixed(name):
         raise Diagnostic(reason)
@@ -107,23 +95,25 @@ def _renamed(statement: Statement, old: str, new: str) -> Statement:
 
 def _variable(name: UserName, new: str) -> str:
     word = new.strip()
-    if word not in VARIABLE_NAMES:
-        raise Diagnostic(f"{new!r} is not a variable", "", f"variables are V0 to V{VARIABLES - 1}")
-    old_kept, new_kept = (int(each[1:]) in KEPT_VARIABLES for each in (name.word, word))
+    if word not in script_parser.VARIABLE_NAMES:
+        raise Diagnostic(f"{new!r} is not a variable", "", f"variables are V0 to V{script_parser.VARIABLES - 1}")
+    old_kept, new_kept = (int(each[1:]) in script_parser.KEPT_VARIABLES for each in (name.word, word))
     if old_kept != new_kept:
         kept, other = (name.word, word) if old_kept else (word, name.word)
-        first = KEPT_VARIABLES.start
-        hint = f"V0 to V{first - 1} are 0 at each start, V{first} to V{VARIABLES - 1} are kept"
+        first = script_parser.KEPT_VARIABLES.start
+        hint = f"V0 to V{first - 1} are 0 at each start, V{first} to V{script_parser.VARIABLES - 1} are kept"
         raise Diagnostic(f"STORE keeps {kept} and does not keep {other}", "", hint)
     return word
 
 
 def _subroutine(new: str) -> str:
     found = _NUMBER.fullmatch(new.strip())
-    if found is None or int(found[1]) >= SUBROUTINES:
-        raise Diagnostic(f"{new!r} is not a subroutine", "", f"subroutines are 0 to {SUBROUTINES - 1}")
-    if int(found[1]) == HANDLER:
-        raise Diagnostic(f"SUB {HANDLER} is the subroutine that runs after an error", "", "choose another number")
+    if found is None or int(found[1]) >= script_parser.SUBROUTINES:
+        raise Diagnostic(f"{new!r} is not a subroutine", "", f"subroutines are 0 to {script_parser.SUBROUTINES - 1}")
+    if int(found[1]) == script_parser.HANDLER:
+        raise Diagnostic(
+            f"SUB {script_parser.HANDLER} is the subroutine that runs after an error", "", "choose another number"
+        )
     return f"SUB {int(found[1])}"
 
 
@@ -134,21 +124,22 @@ _ENDS = {"END": "PRG", "ENDSUB": "SUB", "ENDIF": "IF", "ENDWHILE": "WHILE"}
 _KINDS = {"PRG": "program", "SUB": "subroutine", "IF": "block", "WHILE": "block"}
 
 
-def words(line: str, names: Container[str]) -> list[Word]:  # noqa: ARG001
+def words(line: str, names: Container[str]) -> list[Word]:
     """Return the words of a line; each axis of a move is one."""
     found = []
     for word in script_parser.words(line):
         if script_parser.MOVE_WORD.fullmatch(word.text):
             found += [
-                Word(word.start + at, word.start + at + 1, axis) for at, axis in enumerate(word.text) if axis in AXES
+                Word(word.start + at, word.start + at + 1, axis)
+                for at, axis in enumerate(word.text)
+                if axis in script_parser.AXES
             ]
         else:
             found.append(word)
     return found
 
 
-def describe(word: str, product: str) -> list[str]:  # noqa: ARG001
-    """Return the help on a word; empty where there is none."""
+def describe(word: str, product: str) -> list[str]:
     return script_parser.describe(word)
 
 
@@ -162,7 +153,7 @@ def typing(before: str) -> str:
     return last[0] if last else ""
 
 
-def offers(before: str, names: Iterable[UserName], product: str) -> list[Offer]:  # noqa: ARG001
+def offers(before: str, names: Iterable[UserName], product: str) -> list[Offer]:
     """Return subroutines after GOSUB, what can be read in values, and all else at the head of a line."""
     if ";" in before or _NEW.match(before):
         return []
@@ -180,7 +171,7 @@ def offers(before: str, names: Iterable[UserName], product: str) -> list[Offer]:
     return [each for each in (*own, *known) if each.text.startswith(word)]
 
 
-def _fits(register: Register | None, first: bool) -> bool:
+def _fits(register: script_parser.Register | None, first: bool) -> bool:
     """Whether a word may begin a line (`first`), or be a value; None: a word of programs alone."""
     if register is None:
         return first

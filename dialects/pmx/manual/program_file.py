@@ -7,28 +7,17 @@ the form that the maker's program copies (manual 8.1.9). A remark begins with a 
 from __future__ import annotations
 
 import re
-from collections.abc import Container, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
 from multidrop.dialects.files import SourceLine, program_text_of, split_lines, wrong_characters
-from multidrop.dialects.pmx.manual import script_checker, script_parser
-from multidrop.dialects.pmx.manual.script_compiler import (
-    COMPARISON,
-    EMPTY,
-    ERASED,
-    LINES,
-    MOVES,
-    OPERATION,
-    compile_,
-    looks_compiled,
-    split,
-)
+from multidrop.dialects.pmx.manual import script_checker, script_compiler, script_parser
+from multidrop.dialects.pmx.manual.script_compiler import EMPTY, ERASED, LINES
 from multidrop.dialects.pmx.manual.script_parser import AXES, WORDS, parse
-from multidrop.dialects.program_files import Problem, errors, in_order, refuse, respelled
+from multidrop.dialects.program_files import Problem, ProgramLine, errors, in_order, numbered, refuse, respelled
 
-_OPERATIONS = {code: op for op, code in OPERATION.items()}
-_COMPARISONS = {code: op for op, code in COMPARISON.items()}
+_OPERATIONS = {code: op for op, code in script_compiler.OPERATION.items()}
+_COMPARISONS = {code: op for op, code in script_compiler.COMPARISON.items()}
 
 
 class Undecodable(Exception):
@@ -49,7 +38,7 @@ def decompile(lines: Sequence[str]) -> list[str]:
         end -= 1
     text = _Reader(lines[:end]).program()
     if text:
-        code = compile_(parse("\n".join(text))[0])
+        code = script_compiler.compile_(parse("\n".join(text))[0])
         for at, token in enumerate(lines[:end]):
             if at >= len(code.lines) or token != code.lines[at]:
                 raise Undecodable(at, token)
@@ -81,7 +70,7 @@ class _Reader:
 
     def one(self, at: int) -> int:
         """Decompile the line `at`; return the next one."""
-        found = split(self.lines[at])
+        found = script_compiler.split(self.lines[at])
         if found is None:
             raise Undecodable(at, self.lines[at])
         word, argument = found
@@ -125,7 +114,7 @@ class _Reader:
         return values
 
     def register(self, at: int, name: str) -> None:
-        if name in MOVES:
+        if name in script_compiler.MOVES:
             self.say("".join(axis + value for axis, value in zip(name, self.take(at, len(name)), strict=True)))
         elif WORDS[name].command:
             self.take(at, 0)
@@ -149,7 +138,7 @@ class _Reader:
             raise Undecodable(at, self.lines[at])
 
     def jump(self, at: int, word: str) -> int:
-        found = split(self.lines[at]) if at < len(self.lines) else None
+        found = script_compiler.split(self.lines[at]) if at < len(self.lines) else None
         if found is None or found[0] != word or not at < at + int(found[1]) < len(self.lines):
             raise Undecodable(at, self.lines[at] if at < len(self.lines) else "")
         return at + int(found[1])
@@ -157,7 +146,7 @@ class _Reader:
     def end_of_if(self, at: int) -> int:
         """Find the EI0 of the IF whose JR is line `at`, by that JR or by the JO before its target."""
         target = self.jump(at, "JR")
-        before = split(self.lines[target - 1])
+        before = script_compiler.split(self.lines[target - 1])
         if target - 1 > at and before is not None and before[0] == "JO":
             target = self.jump(target - 1, "JO")
         return target
@@ -203,13 +192,13 @@ class _Reader:
 _STORED = re.compile(r"SA\d+=", re.ASCII)
 
 
-def canonical(text: str, names: Container[str] = ()) -> str:  # noqa: ARG001
+def canonical(text: str) -> str:
     """Return a line in canonical spelling, without its remark. The language has no names of the user's.
 
     A compiled line and a line with an error stay as they are.
     """
     bare = text.partition(";")[0].strip(" \t")
-    if _STORED.match(bare) or looks_compiled(bare):
+    if _STORED.match(bare) or script_compiler.looks_compiled(bare):
         return bare
     statements, problems = parse(text)
     if problems or len(statements) != 1:
@@ -224,21 +213,11 @@ parts = script_parser.parts
 entries = script_parser.entries
 
 
-@dataclass(frozen=True)
-class ProgramLine:
-    """A line of a file, without its remark: its number from 1, and its text."""
-
-    number: int
-    text: str
-
-
 def load(path: str | Path) -> list[ProgramLine]:
-    """Read the lines of a correct file. Raises Diagnostic with the first error and its place."""
     return read(program_text_of(path), str(path))
 
 
 def read(text: str, name: str) -> list[ProgramLine]:
-    """Read the lines of a program; `name` is the file's name in a Diagnostic."""
     refuse(check(text), name)
     return _lines(text)
 
@@ -253,7 +232,7 @@ def formatted(text: str) -> str:
     return respelled(text, lambda line: len(line.partition(";")[0]), canonical)
 
 
-def check(text: str, product: str = "") -> list[Problem]:  # noqa: ARG001
+def check(text: str, product: str = "") -> list[Problem]:
     """Report every error of a program, by line; there is one product."""
     unreadable = [Problem(*place, "lines end at LF or CR LF") for place in wrong_characters(split_lines(text))]
     lines = _lines(text)
@@ -264,7 +243,7 @@ def check(text: str, product: str = "") -> list[Problem]:  # noqa: ARG001
 
 def is_raw(lines: Sequence[SourceLine]) -> bool:
     """Whether these are compiled lines, with their places or without (then most lines, known or not)."""
-    return _placed(lines) or 2 * sum(looks_compiled(line.text) for line in lines) > len(lines)
+    return _placed(lines) or 2 * sum(script_compiler.looks_compiled(line.text) for line in lines) > len(lines)
 
 
 def _placed(lines: Sequence[SourceLine]) -> bool:
@@ -302,8 +281,7 @@ def _held(stored: Mapping[int, str]) -> list[str]:
 
 
 def _lines(text: str) -> list[ProgramLine]:
-    bare = [line.partition(";")[0].strip() for line in split_lines(text)]
-    return [ProgramLine(number, line) for number, line in enumerate(bare, 1) if line]
+    return numbered([line.partition(";")[0].strip() for line in split_lines(text)])
 
 
 def _stored(lines: Sequence[SourceLine]) -> list[tuple[int, int, str]]:
@@ -318,7 +296,11 @@ def _check_raw(lines: Sequence[SourceLine]) -> list[Problem]:
     if _placed(lines):
         problems = _check_places(lines)
     else:
-        problems = [_stray(line, "a compiled line must be alone") for line in lines if not looks_compiled(line.text)]
+        problems = [
+            _stray(line, "a compiled line must be alone")
+            for line in lines
+            if not script_compiler.looks_compiled(line.text)
+        ]
         if len(lines) > LINES:
             what = f"there are {len(lines)} compiled lines, and the controller holds {LINES}"
             problems.append(Problem(lines[LINES].number, 1, what, "the memory ends at this line"))
@@ -329,7 +311,9 @@ def _check_raw(lines: Sequence[SourceLine]) -> list[Problem]:
         if len(token) > LONGEST or not token.isascii() or not token.isprintable():
             what = f"a compiled line has {LONGEST} printable characters at most, and SA{at} has {len(token)}"
             problems.append(Problem(number, 1, what))
-    unknown = [(number, token) for number, _, token in stored if token not in EMPTY and split(token) is None]
+    unknown = [
+        (number, token) for number, _, token in stored if token not in EMPTY and script_compiler.split(token) is None
+    ]
     if unknown and not problems:
         number, token = unknown[0]
         more = f", and at {len(unknown) - 1} more" if len(unknown) > 1 else ""

@@ -6,7 +6,7 @@ VR1 VR10 OX3` is V10=V1*10). `JIk$2` and `JWk$2` compare (left, right) and skip 
 `SE` and `XX` mark PRG, SUB, ENDSUB and END. These tokens are publicly known from the maker's compiler for a sibling of
 this controller. The codes of registers and commands are numbers, unknown for this one. Where a unit has `&84$250000`,
 these lines have a name in place of the number, `&HSPD=$250000`: only the simulator reads it. docs/pmx-lines.md has the
-meaning of each; `script_decompiler` makes a program of them again.
+meaning of each; `program_file.decompile` makes a program of them again.
 """
 
 from __future__ import annotations

@@ -13,11 +13,15 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from multidrop.dialects.files import split_lines
+from multidrop.dialects.files import rows, split_lines
 from multidrop.dialects.pmx.manual.table import grouped, lookup
 from multidrop.dialects.program_files import Entry, Part, Problem, Word
 
 # The words (manual 10.1; the joystick's are in 7.15): access, ASCII command, help, their places in a line.
+#
+# `script_words.csv` has the registers and commands with the constants that each accepts, and the ASCII command where
+# that has another name; `V0-63` is a row for each number. A constant of 0 for an axis: the global value applies to it.
+# `script_keywords.csv` has the words of programs alone.
 #
 # A-SCRIPT and the ASCII commands are two languages: `HOMEX-` is `HX-` there, `ECLEARX` is `CLRX`. The axes are X and
 # Y. Z, U, EO3 and programs 2 and 3, which the manual mentions in places, belong to a bigger controller.
@@ -36,6 +40,7 @@ INT32 = (-(2**31), 2**31 - 1)
 OPERATORS = ("+", "-", "*", "/", "%", ">>", "<<", "&", "|")
 """Operations between two values; `~` precedes one."""
 COMPARISONS = (">", "<", "=", ">=", "<=", "!=")
+_NUMBERS = re.compile(r"([A-Z]+)(\d+)-(\d+)")
 BLOCKS = ("PRG", "END", "SUB", "ENDSUB", "IF", "ELSEIF", "ELSE", "ENDIF", "WHILE", "ENDWHILE", "GOSUB", "DELAY")
 
 
@@ -57,62 +62,18 @@ class Register:
 
 def _words() -> dict[str, Register]:
     found: dict[str, Register] = {}
-    for name in ("HSPD", "LSPD", "ACC", "DEC"):
-        found[name] = Register(name, True, True, 1)
-        for axis in AXES:  # 0: the global value applies to this axis
-            found[name + axis] = Register(name + axis, True, True, 0)
-    for axis in AXES:
-        for name in ("E", "P"):
-            found[name + axis] = Register(name + axis, True, True)
-        for name in ("PS", "MST", "SLS"):
-            found[name + axis] = Register(name + axis, True)
-        found["SCV" + axis] = Register("SCV" + axis, True, True, 0, 1)
-        found["SL" + axis] = Register("SL" + axis, False, True, 0, 1)
-        found["SSPDM" + axis] = Register("SSPDM" + axis, False, True, 0, 9)
-        found["SSPD" + axis] = Register("SSPD" + axis, False, True, 0)
-    found |= {"DI": Register("DI", True), "TOC": Register("TOC", False, True, 0)}
-    found |= {f"DI{n}": Register(f"DI{n}", True) for n in range(1, 9)}
-    found |= {f"AI{n}": Register(f"AI{n}", True) for n in (1, 2)}
-    for name, bits in (("DO", 8), ("EO", len(AXES))):
-        found[name] = Register(name, True, True, 0, 2**bits - 1)
-        found |= {f"{name}{n}": Register(f"{name}{n}", True, True, 0, 1) for n in range(1, bits + 1)}
-    found |= {f"SR{n}": Register(f"SR{n}", False, True, 0, 3) for n in range(PROGRAMS)}
-    found |= {f"V{n}": Register(f"V{n}", True, True) for n in range(VARIABLES)}
-    found["JOYENA"] = Register("JOYENA", False, True, 0, 3)
-    for index, axis in enumerate(AXES):
-        for number, name in ((1, "JOYHS"), (3, "JOYDEL"), (5, "JOYTOL")):
-            found[name + axis] = Register(f"JV{number + index}", False, True, 0, 5000 if name == "JOYTOL" else INT32[1])
-        for number, name in enumerate(("JOYNO", "JOYNI", "JOYPI", "JOYPO"), 1):
-            found[name + axis] = Register(f"JL{number + 4 * index}", False, True)
-    found |= {name: Register(name) for name in ("ABORT", "ABS", "INC", "STOP", "STORE")}
-    for axis in AXES:
-        found |= {f"ABORT{axis}": Register(f"ABORT{axis}"), f"STOP{axis}": Register(f"STOP{axis}")}
-        found[f"ECLEAR{axis}"] = Register(f"CLR{axis}")
-        homing = {"HOME": "H", "HLHOME": "HL", "LHOME": "L", "ZHOME": "ZH", "ZOME": "Z", "JOG": "J"}
-        for name, short in homing.items():
-            found |= {f"{name}{axis}{way}": Register(f"{short}{axis}{way}") for way in "+-"}
+    for row in rows(__file__, "script_words.csv"):
+        names, access = [row["word"]], row["access"]
+        if numbered := _NUMBERS.fullmatch(row["word"]):
+            names = [f"{numbered[1]}{number}" for number in range(int(numbered[2]), int(numbered[3]) + 1)]
+        low, high = int(row["low"] or INT32[0]), int(row["high"] or INT32[1])
+        found |= {name: Register(row["command"] or name, "R" in access, "W" in access, low, high) for name in names}
     return found
 
 
 WORDS: Mapping[str, Register] = _words()
-
-
 KEYWORDS: Mapping[str, tuple[str, str]] = {
-    "PRG": (f"PRG 0 to PRG {PROGRAMS - 1}", "begins a program; END ends it"),
-    "END": ("END", "ends a program"),
-    "SUB": (f"SUB 0 to SUB {SUBROUTINES - 1}", "begins a subroutine; SUB 31 runs after an error of a program"),
-    "ENDSUB": ("ENDSUB", "ends a subroutine: the program goes on after its GOSUB"),
-    "GOSUB": ("GOSUB n", "calls the subroutine SUB n"),
-    "IF": ("IF V1<10", "executes the lines up to ELSEIF, ELSE or ENDIF if two values compare so"),
-    "ELSEIF": ("ELSEIF V1=5", "another condition of an IF, tried where those before it do not hold"),
-    "ELSE": ("ELSE", "begins the lines of an IF for which no condition holds"),
-    "ENDIF": ("ENDIF", "ends an IF"),
-    "WHILE": ("WHILE DI1=0", "repeats the lines up to ENDWHILE as long as two values compare so"),
-    "ENDWHILE": ("ENDWHILE", "ends a WHILE: its condition is tried again"),
-    "DELAY": ("DELAY=250, DELAY=V1", "waits a number of milliseconds"),
-    "X": ("X1000, XV1, X1000Y2000", "moves X, or both axes in a straight line; WAITX waits for its end"),
-    "Y": ("Y1000, YV1", "moves Y; WAITY waits for its end"),
-    **{f"WAIT{axis}": (f"WAIT{axis}", f"waits for the end of the motion of {axis}") for axis in AXES},
+    row["word"]: (row["syntax"], row["meaning"]) for row in rows(__file__, "script_keywords.csv")
 }
 """The words of programs alone: syntax and meaning."""
 
@@ -164,7 +125,6 @@ _WITH_NUMBER = ("PRG", "SUB", "GOSUB")
 
 
 def parts(line: str) -> list[Part]:
-    """Return the parts of a line that differ from plain text. Never fails."""
     code, semicolon, _ = line.partition(";")
     found = [
         Part(word.start, word.stop, kind)

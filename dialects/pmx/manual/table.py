@@ -101,7 +101,6 @@ def head(text: str) -> str:
 
 
 def reads(text: str) -> bool:
-    """Whether a command reads a value."""
     row = lookup(text)
     return row is not None and "R" in row.access and "=" not in text
 

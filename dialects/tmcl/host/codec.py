@@ -216,10 +216,8 @@ class Tmcl(Codec):
 
     def starts_motion(self, text: str) -> bool:
         """Look the line up in the table of commands; an invalid line may start anything."""
-        try:
-            return commands.parse(text).moves
-        except commands.LineError:
-            return True
+        call = commands.parsed(text)
+        return call is None or call.moves
 
     def answers(self, request: Request, line: str) -> bool:
         """Whether the line is a reply of this module to a command that only reads."""

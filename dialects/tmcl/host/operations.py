@@ -277,9 +277,7 @@ def motion(state: TmclState, priority: Priority) -> Procedure[tuple[Motion, ...]
 
 
 def referencing(state: TmclState, text: str) -> Referencing | None:
-    try:
-        call = commands.parse(text)
-    except commands.LineError:
+    if (call := commands.parsed(text)) is None:
         return None
     searches = call.command == Command.RFS and call.type == Search.START
     if searches or (call.command == Command.SAP and call.type == Axis.ACTUAL_POSITION):

@@ -14,11 +14,11 @@ from contextlib import suppress
 from typing import Any
 
 from multidrop.dialects.codec import Procedure
-from multidrop.dialects.debugging import Debugging, Look, Neighbours, Row, Stepped
+from multidrop.dialects.debugging import Debugging, Look, Neighbours, Row, Stepped, lacking
 from multidrop.dialects.errors import Diagnostic, DriveError, Inexpressible, Refused, Stopped
 from multidrop.dialects.family import Programs, Progress
 from multidrop.dialects.files import SourceLine, lines_of_text
-from multidrop.dialects.program_files import Difference, Held, Stored, first_difference
+from multidrop.dialects.program_files import Difference, Held, Stored, first_difference, numbered
 from multidrop.dialects.text import counted, whole
 from multidrop.dialects.tmcl.host.codec import TmclState, call_of, line_in, parse_reply
 from multidrop.dialects.tmcl.host.operations import LACKS, answered, busy, moving, perform, read, store, who
@@ -70,7 +70,7 @@ def held_of(memory: Mapping[int, Call]) -> Held:
 
 def calls_of(held: Held) -> dict[int, Call]:
     """The lines of the memory that `held_of` wrote."""
-    made = program_file.assembled([program_file.ProgramLine(n, line.text) for n, line in enumerate(held.lines, 1)])
+    made = program_file.assembled(numbered([line.text for line in held.lines]))
     return {line.at: placed.call for line, placed in zip(held.lines, made.lines, strict=True)}
 
 
@@ -145,7 +145,9 @@ def download(
         if state.programming:
             yield from _leave(state)
     progress(len(stored), len(stored))
-    _say_what_stays(state, held, len(stored))
+    if rest := [line.at for line in held.lines if line.at > len(stored)] if held is not None else []:
+        count = counted(len(rest), "line")
+        state.remark(f"{who(state)}: {count} from address {rest[0]} on stay as they were: the file does not reach them")
     return lines
 
 
@@ -167,13 +169,6 @@ def _incomplete(state: TmclState, done: int, total: int) -> str:
     return f"{done} of {total} lines are stored: the program in {who(state)} is incomplete"
 
 
-def _say_what_stays(state: TmclState, held: Held | None, end: int) -> None:
-    rest = [line.at for line in held.lines if line.at > end] if held is not None else []
-    if rest:
-        count = counted(len(rest), "line")
-        state.remark(f"{who(state)}: {count} from address {rest[0]} on stay as they were: the file does not reach them")
-
-
 def end(state: TmclState) -> Procedure[bool]:
     """End the program, and stop the motors that it has started; whether it ran.
 
@@ -193,10 +188,7 @@ def end(state: TmclState) -> Procedure[bool]:
 
 
 def differences(
-    state: TmclState,  # noqa: ARG001
-    lines: Sequence[SourceLine],
-    held: Held,
-    before: Held | None = None,  # noqa: ARG001
+    state: TmclState, lines: Sequence[SourceLine], held: Held, before: Held | None = None
 ) -> tuple[Difference, ...]:
     """Compare the lines of a file with the stored ones, and see that an empty line follows them."""
     stored, there = program_file.compiled(lines), {line.at: line.text for line in held.lines}
@@ -216,7 +208,6 @@ def to_send(state: TmclState, lines: Sequence[SourceLine], held: Held) -> Proced
 
 
 def start(lines: Sequence[SourceLine], label: str) -> str:
-    """The line that runs a program from a label, or an address of the file. Raises Diagnostic."""
     made = program_file.assembled(lines)
     address = made.labels.get(label.upper(), whole(label, 0, max(len(made.lines) - 1, 0)))
     if address is None or address >= len(made.lines):
@@ -229,7 +220,7 @@ def start(lines: Sequence[SourceLine], label: str) -> str:
 def annotated(text: str, held: Held) -> tuple[str, ...]:
     """The lines of a file, each with its address where it gives a line of the memory."""
     lines = lines_of_text(text)
-    made = program_file.assembled([program_file.ProgramLine(number, line) for number, line in enumerate(lines, 1)])
+    made = program_file.assembled(numbered(lines))
     places = {each.source: each.at for each in made.lines}
     width = len(str(len(made.lines)))
     return tuple(f"{places.get(number, ''):>{width}}  {line}".rstrip() for number, line in enumerate(lines, 1))
@@ -256,6 +247,7 @@ PROGRAM_FILES: Programs[TmclState] = Programs(
 
 
 NO_PLACE = "does not report the address of its next line (global parameter 130)"
+no_break = lacking(who, "TMCL has no break points: /break now halts a program; program test --break has them")
 
 
 def stored_rows(state: TmclState) -> Procedure[tuple[Row, ...]]:
@@ -288,12 +280,12 @@ def trace(state: TmclState, place: str) -> Procedure[None]:
     yield from perform(state, program_file.run_at(address_of(place)))
 
 
-def begin(state: TmclState, place: str) -> Procedure[None]:  # noqa: ARG001
+def begin(state: TmclState, place: str) -> Procedure[None]:
     yield from perform(state, "131 0, 0, 0")
     state.program_halted(True)
 
 
-def look(state: TmclState, place: str) -> Procedure[Look]:  # noqa: ARG001
+def look(state: TmclState, place: str) -> Procedure[Look]:
     runs = yield from busy(state)
     state.program_halted(state.halted and not runs)
     if not runs and not state.halted:
@@ -311,7 +303,7 @@ def counter(state: TmclState) -> Procedure[int | None]:
         raise
 
 
-def waits(state: TmclState, place: str, last: Row | None) -> Procedure[None]:  # noqa: ARG001
+def waits(state: TmclState, place: str, last: Row | None) -> Procedure[None]:
     if not state.halted or (yield from busy(state)):
         raise Refused(f"{who(state)}: its program is not known to be halted; nothing was sent")
 
@@ -327,25 +319,19 @@ def step(state: TmclState, listed: Sequence[Row]) -> Procedure[Stepped]:
     return Stepped(row)
 
 
-def go_on(state: TmclState, place: str) -> Procedure[None]:  # noqa: ARG001
+def go_on(state: TmclState, place: str) -> Procedure[None]:
     state.program_halted(False)
     yield from perform(state, "129 0, 0, 0")
 
 
-def break_now(state: TmclState, place: str) -> Procedure[None]:  # noqa: ARG001
+def break_now(state: TmclState, place: str) -> Procedure[None]:
     if not (yield from busy(state)):
         raise Refused(f"{who(state)}: its program does not run; nothing was sent")
     yield from perform(state, "128 0, 0, 0")
     state.program_halted(True)
 
 
-def no_break(state: TmclState, *_: object) -> Procedure[None]:
-    what = "TMCL has no break points: /break now halts a program; program test --break has them"
-    raise Inexpressible(f"{who(state)}: {what}; nothing was sent")
-    yield  # a procedure
-
-
-def check_names(state: TmclState, names: Sequence[str]) -> None:  # noqa: ARG001
+def check_names(state: TmclState, names: Sequence[str]) -> None:
     for name in names:
         watched_call(name)
 

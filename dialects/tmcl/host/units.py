@@ -57,21 +57,14 @@ def fields(state: TmclState, text: str) -> Sequence[Field]:
     return (Field(_axis(state, int(found[6])), takes, *found.span(7), moves),) if takes is not None else ()
 
 
-def _call(text: str) -> Call | None:
-    try:
-        return commands.parse(text)
-    except commands.LineError:
-        return None
-
-
 def reads(state: TmclState, text: str) -> tuple[str, Takes] | None:
-    call = _call(text)
+    call = commands.parsed(text)
     known = call is not None and call.command == Command.GAP and call.type in PARAMETERS
     return (_axis(state, call.motor), PARAMETERS[Axis(call.type)]) if call is not None and known else None
 
 
 def disturbs(state: TmclState, text: str) -> Collection[str]:
-    call = _call(text)
+    call = commands.parsed(text)
     if call is None:
         return ()
     if call.command == Command.FACTORY:

@@ -29,16 +29,9 @@ from multidrop.dialects.tmcl.manual.modules import BAUDS, MODULES, RELATIVE_FROM
 from multidrop.dialects.values import (
     BY,
     COMMUNICATION,
-    DISABLE,
-    ENABLE,
-    HOME_MINUS,
-    HOME_PLUS,
-    STOP,
-    TO,
     Actions,
     Change,
     Conditions,
-    Control,
     Controls,
     Facts,
     Lamp,
@@ -53,6 +46,7 @@ from multidrop.dialects.values import (
     Snapshot,
     Value,
     Values,
+    controls_of,
     read_each,
     reference_lost,
     same,
@@ -99,7 +93,6 @@ def reading(name: str, value: int, module: Module) -> Reading:
 
 
 def plan(state: TmclState, present: Readings, wanted: Mapping[str, Value], allowed: Permission) -> Plan:
-    """Order the steps to the wanted values. Raises Diagnostic for a value that the module refuses."""
     module = module_of(state.product)
     now, names = present.values, setting_names(module, state.motors or 1)
     changed = {
@@ -280,7 +273,6 @@ def again(state: TmclState, word: str, priority: Priority) -> Procedure[float]:
 
 
 def take(state: TmclState, progress: Progress) -> Procedure[Snapshot]:
-    """Read a module. Raises NoAnswer."""
     readings = yield from read_settings(state, progress)
     remarks = []
     if active := (yield from moving(state)):
@@ -315,22 +307,10 @@ def take(state: TmclState, progress: Progress) -> Procedure[Snapshot]:
     )
 
 
-NO_ENABLE = "direct mode has no command for it"
-ONE_WAY = "axis parameter 193 chooses the direction of a reference search"
-
-
 def controls(state: TmclState, axis: str) -> Controls:
-    motor = axis or "0"
-    counted = RELATIVE_FROM.get(state.relative.get(int(motor), -1), "from where it counts is not known")
-    return {
-        BY: Control((f"MVP REL, {motor}, {{by}}",), counted),
-        TO: Control((f"MVP ABS, {motor}, {{to}}",)),
-        HOME_MINUS: Control((f"RFS START, {motor}",), "reference search, in the mode of axis parameter 193"),
-        HOME_PLUS: Control(absent=ONE_WAY),
-        STOP: Control((f"MST {motor}",), "slows down"),
-        ENABLE: Control(absent=NO_ENABLE),
-        DISABLE: Control(absent=NO_ENABLE),
-    }
+    found = controls_of(__file__, axis or "0")
+    counted = RELATIVE_FROM.get(state.relative.get(int(axis or 0), -1), "from where it counts is not known")
+    return {**found, BY: replace(found[BY], about=counted)}
 
 
 def _word(word: str, axis: str) -> str:

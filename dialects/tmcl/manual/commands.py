@@ -220,6 +220,12 @@ def parse(text: str) -> Call:
     return found
 
 
+def parsed(text: str) -> Call | None:
+    """The command in a line; None for an invalid line."""
+    found = text.read_by(_read) if isinstance(text, TypedCommand) else _read(text)
+    return None if isinstance(found, LineError) else found
+
+
 def _read(text: str) -> Call | LineError:
     try:
         return _parsed(text)
@@ -279,17 +285,7 @@ def accepted(status: int) -> bool:
 
 
 REFUSALS: Mapping[int, tuple[str, str]] = {
-    Status.WRONG_CHECKSUM: ("wrong checksum", "the line is disturbed: check wiring and baud"),
-    Status.INVALID_COMMAND: ("invalid command", "this module has no such command"),
-    Status.WRONG_TYPE: ("wrong type", "this module has no such parameter, type or motor"),
-    Status.INVALID_VALUE: ("invalid value", "check the range of the value, and the motor's number"),
-    Status.EEPROM_LOCKED: ("the EEPROM is locked", "unlock it with the vendor's tool"),
-    Status.NOT_AVAILABLE: ("command not available", "this module has it not in this state or equipment"),
-    Status.MAXIMUM_EXCEEDED: ("maximum exceeded", "too many of them; check the value"),
-    Status.STORED: (
-        "stored as a program line, not executed",
-        "the module is in download mode; 133 0, 0, 0 or a stop ends that",
-    ),
+    int(row["status"]): (row["meaning"], row["remedy"]) for row in rows(__file__, "refusals.csv")
 }
 """Meaning of a refusing status and what to do, for a person."""
 
@@ -379,7 +375,6 @@ def asked(name: str) -> str | None:
 
 
 def assigned(name: str, value: str) -> str | None:
-    """The line that sets a parameter."""
     call = parameter(name)
     word = "SGP" if call is not None and call.command == Command.GGP else "SAP"
     return f"{word} {call.type}, {call.motor}, {value}" if call is not None else None

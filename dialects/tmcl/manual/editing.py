@@ -55,13 +55,12 @@ def _span(line: int, piece: Piece) -> Span:
     return Span(line, piece.column - 1, piece.column - 1 + len(piece.text))
 
 
-def fixed(name: UserName) -> str:  # noqa: ARG001
+def fixed(name: UserName) -> str:
     """Return why a name cannot be another one: each can."""
     return ""
 
 
-def renamed(text: str, name: UserName, new: str, product: str) -> str:  # noqa: ARG001
-    """Return the new name. Raises Diagnostic where it is none, or is in use."""
+def renamed(text: str, name: UserName, new: str, product: str) -> str:
     word = new.strip()
     if not NAME.fullmatch(word):
         raise Diagnostic(f"{new!r} is not a name", "", "letters, digits and _, and no digit first")
@@ -77,7 +76,7 @@ def renamed(text: str, name: UserName, new: str, product: str) -> str:  # noqa: 
     return word
 
 
-def words(line: str, names: Container[str]) -> list[Word]:  # noqa: ARG001
+def words(line: str, names: Container[str]) -> list[Word]:
     """Return the words of a line that may have help: its command."""
     found = divided(line)
     if found is None or found.word is None:
@@ -87,7 +86,6 @@ def words(line: str, names: Container[str]) -> list[Word]:  # noqa: ARG001
 
 
 def describe(word: str, product: str) -> list[str]:
-    """Return the help on a word; empty where there is none."""
     row = instructions.WORDS.get(word.upper())
     if row is None:
         return []
@@ -98,12 +96,11 @@ def describe(word: str, product: str) -> list[str]:
 
 
 def typing(before: str) -> str:
-    """Return the word at the end of a begun line that may be completed."""
     last = _LAST.search(before)
     return last[0] if last and remark_at(before) == len(before) else ""
 
 
-def offers(before: str, names: Iterable[UserName], product: str) -> list[Offer]:  # noqa: ARG001
+def offers(before: str, names: Iterable[UserName], product: str) -> list[Offer]:
     """Return commands at the head of a line; in a field its words, labels where it is an address, constants else."""
     if remark_at(before) < len(before):
         return []

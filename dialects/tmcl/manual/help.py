@@ -21,7 +21,6 @@ def knows(word: str) -> bool:
 
 
 def describe(word: str, product: str = "") -> list[str]:
-    """Help on a word, line by line. Raises Diagnostic."""
     row = WORDS.get(word.strip().upper())
     if row is None:
         raise Diagnostic(f"no command {word.strip()!r}", "", f"valid: {', '.join(WORDS)}")

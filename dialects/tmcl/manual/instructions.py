@@ -205,7 +205,6 @@ _STARTS = frozenset({Word.MVPA, Word.ROLA, Word.RORA, Word.AAP})
 
 
 def _direct(row: commands.Row) -> Row:
-    """The row of a word of the direct mode."""
     fields = (
         Field(name, MOTOR if name == commands.BANK else name, commands.RANGES[name], row.types if name == TYPE else {})
         for name in row.fields

@@ -34,7 +34,6 @@ class Parameter:
 
     @property
     def writable(self) -> bool:
-        """Whether it can be set."""
         return len(self.limits) > 0
 
     @property

@@ -22,7 +22,8 @@ from pathlib import Path
 from typing import NamedTuple
 
 from multidrop.dialects.files import SourceLine, program_text_of, split_lines, wrong_characters
-from multidrop.dialects.program_files import Entry, Part, Problem, in_order, refuse, respelled
+from multidrop.dialects.program_files import Entry, Part, Problem, in_order, numbered, refuse, respelled, walk
+from multidrop.dialects.program_files import ProgramLine as ProgramLine
 from multidrop.dialects.text import counted
 from multidrop.dialects.tmcl.manual import instructions
 from multidrop.dialects.tmcl.manual.commands import Call, Command
@@ -91,14 +92,6 @@ class Assembled:
 
     def wrong(self, line: int, place: Piece, what: str, hint: str = "") -> None:
         self.problems.append(Problem(line, place.column, what, hint))
-
-
-@dataclass(frozen=True)
-class ProgramLine:
-    """A line of a file, without its remark: its number from 1, and its text."""
-
-    number: int
-    text: str
 
 
 def remark_at(line: str) -> int:
@@ -190,15 +183,12 @@ def _command(made: Assembled, line: Divided, word: Piece) -> Call | None:
     number, fields = row
     if len(line.fields) != len(fields):
         what = f"{word.text} takes {'no field' if not fields else counted(len(fields), 'field')}"
-        made.wrong(line.number, word, what, _syntax(word.text, fields))
+        syntax = f"write {word.text.upper()} {', '.join(each.title for each in fields)}".strip()
+        made.wrong(line.number, word, what, syntax)
         return None
     values = [_value(made, line, piece, each) for piece, each in zip(line.fields, fields, strict=True)]
     known = tuple(value for value in values if value is not None)
     return call_with(number, fields, known) if len(known) == len(fields) else None
-
-
-def _syntax(word: str, fields: Sequence[Field]) -> str:
-    return f"write {word.upper()} {', '.join(each.title for each in fields)}".strip()
 
 
 def _value(made: Assembled, line: Divided, given: Piece, wanted: Field) -> int | None:
@@ -211,12 +201,8 @@ def _value(made: Assembled, line: Divided, given: Piece, wanted: Field) -> int |
         number = made.labels.get(name)
     if number is not None:
         return number
-    if not any(each.line == line.number for each in made.problems):
-        _refuse(made, line, given, wanted)
-    return None
-
-
-def _refuse(made: Assembled, line: Divided, given: Piece, wanted: Field) -> None:
+    if any(each.line == line.number for each in made.problems):
+        return None
     if not given.text:
         made.wrong(line.number, given, f"{wanted.name} is missing", wanted.hint)
     elif wanted.label and NAME.fullmatch(given.text) and given.text.upper() not in made.constants:
@@ -225,6 +211,7 @@ def _refuse(made: Assembled, line: Divided, given: Piece, wanted: Field) -> None
         made.wrong(line.number, given, f"no label {given.text}", hint)
     else:
         made.wrong(line.number, given, f"{wanted.name} cannot be {given.text!r}", wanted.hint)
+    return None
 
 
 # The file language
@@ -240,8 +227,7 @@ def read(text: str, name: str) -> list[ProgramLine]:
 
 
 def _lines(text: str) -> list[ProgramLine]:
-    bare = [line[: remark_at(line)].strip() for line in split_lines(text)]
-    return [ProgramLine(number, line) for number, line in enumerate(bare, 1) if line]
+    return numbered([line[: remark_at(line)].strip() for line in split_lines(text)])
 
 
 def compiled(lines: Sequence[SourceLine]) -> list[Placed]:
@@ -251,11 +237,11 @@ def compiled(lines: Sequence[SourceLine]) -> list[Placed]:
     return made.lines
 
 
-def check(text: str, product: str = "") -> list[Problem]:  # noqa: ARG001
+def check(text: str, product: str = "") -> list[Problem]:
     """Report every error of a program, and warn of what runs otherwise than it reads."""
     lines = split_lines(text)
     unreadable = [Problem(*place, "lines end at LF or CR LF") for place in wrong_characters(lines)]
-    made = assembled([ProgramLine(number, line) for number, line in enumerate(lines, 1)])
+    made = assembled(numbered(lines))
     problems = [*unreadable, *(each for each in made.problems if each.line not in {each.line for each in unreadable})]
     return in_order([*problems, *_warnings(made, {each.line for each in problems})])
 
@@ -297,19 +283,15 @@ def _too_deep(made: Assembled) -> list[Problem]:
 
 def _calls_from(made: Assembled, start: int, calls: Mapping[int, int]) -> set[int]:
     """The addresses of the calls that are reached from a line before its subroutine returns."""
-    seen: set[int] = set()
-    todo = [start]
-    while todo:
-        at = todo.pop()
-        if at in seen or not 0 <= at < len(made.lines):
-            continue
-        seen.add(at)
+
+    def ways(at: int) -> list[int]:
+        if not 0 <= at < len(made.lines):
+            return []
         call = made.lines[at].call
-        if call.command not in ENDS:
-            todo.append(at + 1)
-        if call.command in (Word.JA, Word.JC, Word.DJNZ):
-            todo.append(call.value)
-    return seen & calls.keys()
+        following = [at + 1] if call.command not in ENDS else []
+        return [*following, call.value] if call.command in (Word.JA, Word.JC, Word.DJNZ) else following
+
+    return walk([start], ways).keys() & calls.keys()
 
 
 def measure(text: str) -> str:
@@ -321,7 +303,7 @@ def formatted(text: str) -> str:
     return respelled(text, remark_at, canonical)
 
 
-def canonical(text: str, names: Container[str] = ()) -> str:  # noqa: ARG001
+def canonical(text: str) -> str:
     """A line in canonical spelling, without its remark: words in capitals, `, ` between fields, `Label: `."""
     found = divided(text)
     if found is None:
@@ -362,7 +344,7 @@ def _kind(line: Divided) -> str:
 
 def entries(text: str) -> list[Entry]:
     """Its first line, and its labels: a host may run each of them by its address."""
-    made = assembled([ProgramLine(number, line) for number, line in enumerate(split_lines(text), 1)])
+    made = assembled(numbered(split_lines(text)))
     found = [Entry("0", made.lines[0].source, run_at(0))] if made.lines else []
     for line in _lines(text):
         label = each.label if (each := divided(line.text)) is not None else None
