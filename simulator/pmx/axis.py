@@ -289,8 +289,7 @@ class Loop:
             return inf
         here, delta = self._pulses.profile.position(after), self.delta(after)
         edge = self._axis["SLE"] + _HALF + _NEAR
-        times = (self._pulses.profile.crossing(here + (side - delta) / slope, after) for side in (edge, -edge))
-        return min((at for at in times if at is not None), default=inf)
+        return min(self._pulses.profile.crossing(here + (side - delta) / slope, after) for side in (edge, -edge))
 
     def watch(self, t: float) -> None:
         """Check the delta: stop on an error, correct the rest when the motor is at rest."""

@@ -143,9 +143,6 @@ class PmxDevice:
         reply = answer_program(self.programs, text, now)
         return self.controller.ask(text, now) if reply is None else reply
 
-    def world_changed(self) -> None:
-        """Nothing to do: `advance` looks at the whole world anyway."""
-
     def power(self, on: bool, now: float) -> None:
         self.advance(now)
         if on == self.powered:

@@ -148,8 +148,7 @@ class Stick:
             return inf
         direction = path.direction(after)
         place = self.edge(direction) - self._axis.pulses.counter(after) + path.position(after)
-        found = path.crossing(place, after, direction)
-        return inf if found is None else found
+        return path.crossing(place, after, direction)
 
     def edge(self, direction: float) -> float:
         """The outer soft limit in a direction, as a count of the counter."""

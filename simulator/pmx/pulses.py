@@ -142,8 +142,7 @@ class Rotor(Shaft):
             return inf
         turns = (self.position(after) - self._index) / TURN
         mark = self._index + TURN * (floor(turns + TOUCH) + 1 if direction > 0 else ceil(turns - TOUCH) - 1)
-        found = self.path.crossing(mark - self.offset, after)
-        return inf if found is None else found
+        return self.path.crossing(mark - self.offset, after)
 
 
 def planned(t: float, here: float, place: float, pace: Pace) -> Profile:

@@ -154,12 +154,9 @@ class UsbipClient(asyncio.Protocol):
     def _import(self) -> bytes:
         name, rest = self._buffer[OPERATION.size :][:BUS_ID], self._buffer[OPERATION.size + BUS_ID :]
         plugged = self._server.devices.get(name.partition(b"\0")[0].decode("ascii", "replace"))
-        if plugged is None or not self._server.present(plugged):
-            self._send(operation(REP_IMPORT, ABSENT))
-            self.end()
-            return b""
-        if plugged.client is not None:
-            self._send(operation(REP_IMPORT, BUSY))
+        there = plugged is not None and self._server.present(plugged)
+        if plugged is None or not there or plugged.client is not None:
+            self._send(operation(REP_IMPORT, BUSY if there else ABSENT))
             self.end()
             return b""
         plugged.client, self._plugged = self, plugged

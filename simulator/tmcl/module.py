@@ -187,9 +187,6 @@ class TmclModule:
     def supply(self, on: bool, now: float) -> None:
         """Do nothing: the module has one supply."""
 
-    def world_changed(self) -> None:
-        """Do nothing: `advance` looks at all of the world."""
-
     def carry_out(self, call: Call, now: float) -> tuple[int, int]:
         """Carry out a command of the direct mode as a line of the program; its status and value."""
         try:
@@ -406,7 +403,7 @@ class TmclModule:
     def _next_event(self, after: float) -> float:
         events = [at for motor in self.motors for at in motor.events(after)]
         if self.program.running:  # an input may be an interrupt
-            events += [at for world in self.worlds if (at := world.next_change(after)) is not None]
+            events += [world.next_change(after) for world in self.worlds]
         return min((at for at in (*events, self.program.due, self._silent_at) if at > after), default=inf)
 
     @property

@@ -13,7 +13,7 @@ from math import floor, inf
 from typing import Protocol, TypedDict
 
 from multidrop.dialects.mcode.manual.errors import ErrorNumber as E
-from multidrop.simulator.kinematics import LINEAR, Profile, Shape, halt, move, slew
+from multidrop.simulator.kinematics import LINE, LINEAR, Profile, Shape, halt, move, slew
 from multidrop.simulator.lexium.motion.counters import Counters
 from multidrop.simulator.lexium.motion.rotor import CATCHING, Rotor
 from multidrop.simulator.lexium.state.errors import Fault
@@ -53,7 +53,6 @@ class Bridges:
 
 STEEPEST = 1.1e9
 """The highest acceleration that a drive makes, steps/s2; an S-curve's peak may not be above it."""
-STRAIGHT = Shape()
 
 
 class Ramps(TypedDict):
@@ -135,7 +134,7 @@ class Axis:
     """One motor. `kind` is what moves or moved it: MA, MR, SL, or one of the kinds above.
 
     `announce`: the drive's name is sent when the motion is over. `arriving`: the motion will end by itself. `mark` is
-    when a motion that runs on passes its target, `back` the steps that follow the motion (BM=1).
+    when a motion that runs on passes its target (infinite: never), `back` the steps that follow the motion (BM=1).
     """
 
     def __init__(self, memory: Memory, rotor: Rotor, counters: Counters, supervisor: Supervisor) -> None:
@@ -147,7 +146,7 @@ class Axis:
         self.kind = ""
         self.announce = False
         self.arriving = False
-        self.mark: float | None = None
+        self.mark = inf
         self.back = 0.0
         self.aligned = 0.0
         self._top = 0.0
@@ -247,12 +246,12 @@ class Axis:
         here = self.profile.position(t)
         place = floor(here) + 1 if direction > 0 else -floor(-here) - 1 if direction < 0 else floor(here + 0.5)
         self._take(halt(t, place), t)
-        self.kind, self.mark, self.back = "", None, 0.0
+        self.kind, self.mark, self.back = "", inf, 0.0
         self.announce = self.arriving = self._stopping = False
 
     def begin(self, kind: str, profile: Profile, t: float) -> None:
         """Let a motion take the place of the one before."""
-        self.kind, self.mark = kind, None
+        self.kind, self.mark = kind, inf
         self.arriving = profile.end < inf
         self._stopping = False
         self._supervisor.motion_began()
@@ -281,15 +280,15 @@ class Axis:
 
     def pass_mark(self) -> bool:
         """Take note that a motion that runs on passes its target. Return whether the name is sent."""
-        announce, self.announce, self.mark, self.kind = self.announce, False, None, SLEW
+        announce, self.announce, self.mark, self.kind = self.announce, False, inf, SLEW
         return announce
 
     def pause(self, t: float) -> Callable[[float], None]:
         """Slow down and stop; what is given goes on with the motion, and with the name that is to be sent."""
         (goal_kind, goal), kind, announce, back = self._goal(), self.kind, self.announce, self.back
-        place = None if self.mark is None else self.profile.position(self.mark)
+        place = None if self.mark == inf else self.profile.position(self.mark)
         self.slow_to(0, t)
-        if place is not None and (mark := self.profile.crossing(place, t)) is not None:
+        if place is not None and (mark := self.profile.crossing(place, t)) < inf:
             self.mark, self.announce = mark, announce
             kind, announce, place = SLEW, False, None
         else:
@@ -360,14 +359,14 @@ class Axis:
     def _ramps(self) -> Ramps:
         """The ramps in steps: straight where a curve would be too steep, as a stop is never refused."""
         values, scale = self._memory.values, self._memory.scale
-        up, down = self._shape("AT", "A") or STRAIGHT, self._shape("DT", "D") or STRAIGHT
+        up, down = self._shape("AT", "A") or LINE, self._shape("DT", "D") or LINE
         return {"vi": values["VI"] * scale, "a": values["A"] * scale, "d": values["D"] * scale, "up": up, "down": down}
 
     def _shape(self, kind: str, rate: str) -> Shape | None:
         """Make a shape of AT and AJ, or DT and DJ; None where the middle of the ramp would be too steep."""
         values = self._memory.values
         if (number := values.get(kind, LINEAR)) == LINEAR:
-            return STRAIGHT
+            return LINE
         shape = Shape(int(number), int(values.get(f"{rate}J", 0)))
         return shape if values[rate] * self._memory.scale * shape.peak <= STEEPEST else None
 

@@ -15,13 +15,13 @@ from collections.abc import Callable
 from math import inf
 
 from multidrop.dialects.mcode.manual.errors import ErrorNumber as E
-from multidrop.simulator.kinematics import Shape, slew
+from multidrop.simulator.kinematics import slew
 from multidrop.simulator.lexium.motion.axis import HOMING, TORQUE, Axis
 from multidrop.simulator.lexium.motion.counters import DIRECTIONS, ERRORS, Limits
 from multidrop.simulator.lexium.motion.inputs import HOME, Inputs
-from multidrop.simulator.lexium.motion.rotor import TOUCH
 from multidrop.simulator.lexium.state.errors import Event, Fault
 from multidrop.simulator.lexium.state.interpreter import Core
+from multidrop.simulator.world import TOUCH
 
 SEEK, BRAKE, TURN, APPROACH = "seek", "brake", "turn", "approach"
 TYPES = {1: (-1, 1), 2: (-1, -1), 3: (1, -1), 4: (1, 1)}
@@ -172,9 +172,7 @@ class Homing:
     def _approach(self, t: float) -> None:
         self.phase = APPROACH
         here, direction, vi = self._axis.position(t), self._directions[1], self._values["VI"] * self._memory.scale
-        still = Shape()
-        profile = slew(t, here, 0.0, direction * vi, vi=vi, a=1.0, d=1.0, up=still, down=still)
-        self._axis.begin(HOMING, profile, t)
+        self._axis.begin(HOMING, slew(t, here, 0.0, direction * vi, vi=vi, a=1.0, d=1.0), t)
         self._set_mark(direction, t)
 
     def _set_mark(self, direction: int, t: float) -> None:
@@ -201,8 +199,7 @@ class Homing:
         if beyond > 0:
             self._see_mark(rotor.position(t))
         profile, shift = rotor.path
-        found = profile.crossing(self._mark - shift, t, self._toward)
-        return inf if found is None else found
+        return profile.crossing(self._mark - shift, t, self._toward)
 
     def _finish(self, t: float) -> None:
         """Stop: a switch is left by a whole step, a mark is hit."""

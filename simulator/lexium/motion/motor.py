@@ -169,7 +169,7 @@ class Motor:
             self.hmt.next(t),
             (axis.profile.end if axis.arriving else inf, self._arrive),
             (self.homing.mark_at(t), self.homing.pass_mark),
-            (inf if axis.mark is None else axis.mark, self._pass_mark),
+            (axis.mark, self._pass_mark),
             self.encoder.next(t),
             self.heat.next(t),
             key=when,

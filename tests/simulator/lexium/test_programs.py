@@ -195,7 +195,7 @@ def test_traced_and_stepped_programs_show_their_lines():
     device.execute("EX G1,1", 0.0)
     assert output(device, 1.0) == "6  IC R1|9  PR R1|1|12  E|"
     device.execute("EX G1,2", 1.0)
-    assert output(device, 2.0) == "" and device.stepping
+    assert output(device, 2.0) == "" and device.thread.stepping
     device.step(" ", 2.0)
     assert output(device, 3.0) == "6  IC R1|"
     device.step("\r", 3.0)
@@ -302,7 +302,7 @@ def test_a_paused_program_stops_its_move_and_takes_it_up_again():
     device.execute("EX 1", 0.0)
     device.advance(0.5)
     assert say(device, "PS") == []
-    assert output(device, 20.0) == "" and not device.moving(20.0) and 0 < device.position(20.0) < 512000
+    assert output(device, 20.0) == "" and not device.motor.status.reported(20.0) and 0 < device.position(20.0) < 512000
     assert say(device, "RS") == []
     assert output(device, 40.0) == "512000|"
 
@@ -314,7 +314,7 @@ def test_escape_stops_motor_and_program_at_once():
     device.escape(0.3)
     at = device.position(0.3)
     device.advance(9.0)
-    assert not device.running and device.velocity(0.3) == 0 and device.position(9.0) == at > 0
+    assert not device.running and device.motor.status.speed(0.3) == 0 and device.position(9.0) == at > 0
     assert device.deadline is None
 
 
