@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from math import inf
 from typing import Any, NamedTuple, Protocol
 
 from multidrop.dialects import Diagnostic
@@ -150,9 +151,25 @@ class Programs(NamedTuple):
     refusals: Callable[[str, str, str, Sequence[Problem]], list[Problem]] | None = None
 
 
-def next_look(due: float | None, now: float, limit: float) -> float:
-    """Return the time up to which a run advances at once: `SLICE` beyond the next event of the drive."""
-    return limit if due is None else min(max(due, now) + SLICE, limit)
+class Running(Protocol):
+    """A program that runs on a simulated drive: how many lines it has carried out."""
+
+    executed: int
+
+    @property
+    def running(self) -> bool: ...  # noqa: D102
+
+
+def looks(program: Running, deadline: Callable[[], float | None], until: float | None) -> Iterator[tuple[float, bool]]:
+    """Yield the times up to which a run advances at once, while its program runs: `SLICE` beyond the next event.
+
+    The second value: nothing would ever happen any more.
+    """
+    now, limit, most = 0.0, LONGEST if until is None else until, MOST_LINES if until is None else inf
+    while program.running and now < limit and program.executed < most:
+        due = deadline()
+        now = limit if due is None else min(max(due, now) + SLICE, limit)
+        yield now, due is None
 
 
 # The trace of a program file's run: a family names the next line of the file and its variables; `Recorder` makes events

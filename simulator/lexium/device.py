@@ -103,7 +103,7 @@ class MCodeDevice(EventLoop):
 
     def motion(self, now: float) -> Motion:
         """P and V, likewise."""
-        return Motion(self.position(now), self.motor.status.speed(now))
+        return Motion(self.position(now), self.velocity(now))
 
     @property
     def effort(self) -> Effort:
@@ -112,6 +112,14 @@ class MCodeDevice(EventLoop):
         closed, counting = values.get("AS") in (FIXED, VARIABLE), memory.counting
         current, lag = float(values["RC"]) / 100, "LL" if closed else ""
         return Effort(self.motor.axis.profile, memory.steps_per_turn, memory.scale, current, counting, lag)
+
+    def velocity(self, now: float) -> int:
+        """V, likewise."""
+        return self.motor.status.speed(now)
+
+    def moving(self, now: float) -> bool:
+        """MV, likewise."""
+        return self.motor.status.reported(now)
 
     def outputs(self, now: float) -> dict[int, bool]:
         """Which outputs are active, by number, likewise."""

@@ -22,8 +22,6 @@ from multidrop.dialects.text import counted, whole
 from multidrop.simulator.cell.spec import DriveSpec
 from multidrop.simulator.pmx.device import PmxDevice
 from multidrop.simulator.program_run import (
-    LONGEST,
-    MOST_LINES,
     NO_DEBUGGING,
     BreakPoint,
     Debugging,
@@ -37,7 +35,7 @@ from multidrop.simulator.program_run import (
     Value,
     Values,
     break_point,
-    next_look,
+    looks,
 )
 
 # What a person follows in the run of A-SCRIPT: which statement comes next, what variables and registers hold.
@@ -210,7 +208,7 @@ class ProgramRun:
         self._outputs: list[Output] = []
         self._later: list[Event] = []
         self._errors: list[str] = []
-        self.now = 0.0
+        self.now, self._stuck = 0.0, False
 
     def run(
         self, program: str = "", until: float | None = None, debugging: Debugging = NO_DEBUGGING
@@ -221,13 +219,8 @@ class ProgramRun:
             self._programs.watch(self._watcher.before, self._watcher.executed)
         for each in self._chosen(program):
             self._programs.control(each, 1, 0.0)
-        limit = LONGEST if until is None else until
-        most = MOST_LINES if until is None else inf
-        stuck = False
-        while self._programs.running and self.now < limit and self._programs.executed < most:
-            due = self._programs.deadline
-            stuck = due is None
-            self.now = next_look(due, self.now, limit)
+        programs = self._programs
+        for self.now, self._stuck in looks(programs, lambda: programs.deadline, until):
             self._device.advance(self.now)
             if self._broken:
                 self.now = self._programs.ended_at
@@ -235,7 +228,7 @@ class ProgramRun:
                 self._programs.watch(None, None)
             yield from self._news()
         yield from self._news(last=True)
-        yield self._summary(until, stuck)
+        yield self._summary(until)
 
     def _chosen(self, program: str) -> list[int]:
         there = [each for each in range(PROGRAMS) if self._programs.memory.start_of(each) is not None]
@@ -276,7 +269,7 @@ class ProgramRun:
     def _line(self, at: int) -> int:
         return self._source.get(at, 0)
 
-    def _summary(self, until: float | None, stuck: bool) -> Summary:
+    def _summary(self, until: float | None) -> Summary:
         running = self._programs.running
         standing = [self._programs.counter(n) for n in range(PROGRAMS) if self._programs.status(n) in (1, 2)]
         x, y = (int(self._device.execute(f"P{axis}", self.now)) for axis in "XY")
@@ -297,7 +290,7 @@ class ProgramRun:
             lines_at=tuple(self._line(at) for at in standing),
             moving=moving,
             given_up=running and until is None,
-            stuck=running and stuck,
+            stuck=running and self._stuck,
             counts=f"X {x}, Y {y}, {counted(self._moves, 'motion')}, {counted(lines, 'compiled line')}, {failed}",
             turning="a motor still turns; WAITX or WAITY before END waits for it" if moving and ended == "END" else "",
         )

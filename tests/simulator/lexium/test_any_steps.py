@@ -57,9 +57,7 @@ def history(personality: str, seed: int, parts: int) -> list[tuple[object, ...]]
         rotor, error = device.motor.axis.rotor, device.memory.values["ER"]
         assert not mdrive or error in TEXTS["MDI"], line
         where = round(rotor.position(t), 3)
-        told.append(
-            (line, refused, error, device.position(t), device.motor.status.reported(t), where, device.outputs(t))
-        )
+        told.append((line, refused, error, device.position(t), device.moving(t), where, device.outputs(t)))
     return told
 
 

@@ -81,7 +81,7 @@ def test_a_pause_does_not_end_in_a_motion_that_may_not_begin(move, meanwhile, co
     say(device, "PS")
     device.advance(1.0)
     assert say(device, *meanwhile, "RS", "PR BY") == [f"?{code}", "1"]
-    assert device.motor.axis.kind != move[:2] or not device.motor.status.reported(1.0)
+    assert device.motor.axis.kind != move[:2] or not device.moving(1.0)
 
 
 def test_a_pause_may_end_before_the_motor_stands():
@@ -177,9 +177,9 @@ def test_a_pause_that_ends_on_the_home_switch_goes_on_by_creeping_off_it():
 def test_a_pause_of_a_homing_that_a_limit_has_turned_round_keeps_its_way():
     device = drive("IS=2,3,0", *HOMES, limit_minus=-100000, home=250000)
     device.advance(1.4)
-    assert device.motor.status.speed(1.4) > 0
+    assert device.velocity(1.4) > 0
     assert say(device, "PS", 2.0, "RS", 0.5) == []
-    assert device.motor.status.speed(device.now) > 0
+    assert device.velocity(device.now) > 0
 
 
 def test_esc_stops_without_a_ramp_and_ends_the_program():

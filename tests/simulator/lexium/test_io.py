@@ -44,13 +44,13 @@ def test_go_without_a_program_is_an_error():
 def test_a_soft_stop_slows_down_and_ends_the_program(lines, code):
     device = drive("IS=1,5,0", "VA Q1", *lines, program=LOOP, inputs=((0.5, 1, 0),))
     device.advance(0.499)
-    fast = device.motor.status.speed(0.499)
+    fast = device.velocity(0.499)
     device.advance(0.5001)
-    assert 0 <= device.motor.status.speed(0.5001) <= fast
+    assert 0 <= device.velocity(0.5001) <= fast
     if fast:
-        assert device.motor.status.speed(0.5001) > 0
+        assert device.velocity(0.5001) > 0
     device.advance(3.0)
-    assert not device.running and not device.motor.status.reported(3.0)
+    assert not device.running and not device.moving(3.0)
     assert say(device, "PR ER") == [code]
 
 
@@ -64,23 +64,23 @@ def test_pause_lasts_as_long_as_its_input_is_active_and_the_move_is_taken_up():
     program = "PG 1\nMA 512000\nH\nPR P\nE\nPG"
     device = drive("IS=3,6,0", "EX 1", program=program, inputs=((0.3, 3, 0), (5.0, 3, 1)))
     device.advance(4.9)
-    assert not device.motor.status.reported(4.9) and 0 < device.position(4.9) < 512000 and device.running
+    assert not device.moving(4.9) and 0 < device.position(4.9) < 512000 and device.running
     assert printed(device, 9.0) == "512000|"
 
 
 def test_jog_turns_at_vm_while_its_input_is_active_and_je_is_set():
     device = drive("IS=1,7,0", "IS=2,8,0", "VM=100000", inputs=((0.5, 1, 0), (2.0, 1, 1), (3.0, 2, 0), (4.0, 1, 0)))
     device.advance(1.0)
-    assert device.motor.status.speed(1.0) == 0
+    assert device.velocity(1.0) == 0
     assert say(device, "JE=1") == []
     device.advance(1.9)
-    assert device.motor.status.speed(1.9) == 100000
+    assert device.velocity(1.9) == 100000
     device.advance(2.9)
-    assert device.motor.status.speed(2.9) == 0
+    assert device.velocity(2.9) == 0
     device.advance(3.9)
-    assert device.motor.status.speed(3.9) == -100000
+    assert device.velocity(3.9) == -100000
     device.advance(4.9)
-    assert device.motor.status.speed(4.9) == 0  # both at once are neither
+    assert device.velocity(4.9) == 0  # both at once are neither
 
 
 def test_jog_leaves_a_move_alone():
@@ -95,13 +95,13 @@ def test_letting_go_of_a_jog_input_leaves_alone_what_was_begun_after_a_stop():
     device.escape(0.5)
     assert say(device, "PR V", "SL 20000") == ["0"]
     device.advance(3.0)
-    assert device.motor.status.speed(3.0) == 20000
+    assert device.velocity(3.0) == 20000
 
 
 def test_a_reset_input_is_ctrl_c():
     device = drive("IS=1,11,0", "VM=500000", "SL 100000", inputs=((0.5, 1, 0),))
     assert "Copyright" in printed(device, 1.0)
-    assert device.motor.status.speed(1.0) == 0 and say(device, "PR VM", "PR IS")[:2] == ["768000", "IS = 1, 0, 0"]
+    assert device.velocity(1.0) == 0 and say(device, "PR VM", "PR IS")[:2] == ["768000", "IS = 1, 0, 0"]
 
 
 def test_a_reset_input_that_is_set_up_active_resets_at_once():
@@ -280,7 +280,7 @@ def test_the_moving_output_waits_for_the_delays_after_any_motion():
     say(device, "SL 1000")
     device.advance(0.5)
     say(device, "SL 0")
-    assert [device.motor.status.reported(0.51), device.outputs(0.51)[1], device.outputs(0.79)[1]] == [False, True, True]
+    assert [device.moving(0.51), device.outputs(0.51)[1], device.outputs(0.79)[1]] == [False, True, True]
     assert device.outputs(0.81)[1] is False
 
 

@@ -36,11 +36,11 @@ def test_ten_turns_out_and_back_while_an_input_is_active():
     device = switched_on(ON_INPUT, world=WorldSpec(inputs=((1.0, 1, 0), (1.5, 1, 1))))
     say(device, "EX Ga")
     device.advance(1.0)
-    assert device.position(1.0) == 0 and not device.motor.status.reported(1.0)
+    assert device.position(1.0) == 0 and not device.moving(1.0)
     moves = set()
     while device.now < 10.0:
         device.advance(device.deadline)
-        if device.motor.status.reported(device.now):
+        if device.moving(device.now):
             moves.add(device.motor.axis.profile)
     out, back = sorted(moves, key=lambda profile: profile.start)
     for profile in (out, back):
@@ -150,9 +150,7 @@ def test_a_move_may_run_on():
     say(device, "MR -51200,1,1")
     device.advance(10.0)
     at = device.prints()[-1][0]
-    assert device.motor.status.speed(10.0) == -768000 and device.motor.axis.profile.position(at) == pytest.approx(
-        -51200
-    )
+    assert device.velocity(10.0) == -768000 and device.motor.axis.profile.position(at) == pytest.approx(-51200)
 
 
 def test_a_slew_changes_on_the_fly_and_ends_with_zero():
@@ -222,7 +220,7 @@ def test_a_limit_switch_ends_the_motion_as_lm_says(mode, beyond, runs):
     )
     say(device, "EX G1", "SL 300000")
     device.advance(5.0)
-    assert device.motor.status.speed(5.0) == 0 and device.running is runs
+    assert device.velocity(5.0) == 0 and device.running is runs
     assert (device.position(5.0) > 101000) is beyond
     assert say(device, "PR ER", "SL 100", "PR I2") == ["83", "?83", "1"]
     assert say(device, "SL -100000") == []

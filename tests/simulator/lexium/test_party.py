@@ -110,7 +110,7 @@ def test_the_escape_modes_stop_whom_they_mean(mode, key, stops):
     wire = line(a, b)
     talk(wire, b"\n*SL 1000\n", 0.0, 0.5)
     talk(wire, key, 0.5, 0.6)
-    assert "".join(each.memory.name for each in (a, b) if not each.motor.status.reported(0.6)) == stops
+    assert "".join(each.memory.name for each in (a, b) if not each.moving(0.6)) == stops
 
 
 @pytest.mark.parametrize(
@@ -142,7 +142,7 @@ def test_an_ethernet_drive_is_silent_while_it_boots():
     drive.prints()
     port.receive(b"SL 1000\r\x03PR P\r", 1.0)
     port.advance(1.0)
-    assert drive.deadline == 1.0 + ETHERNET_BOOT and not drive.motor.status.reported(2.0)
+    assert drive.deadline == 1.0 + ETHERNET_BOOT and not drive.moving(2.0)
     port.receive(b"PR P\r", 1.0 + ETHERNET_BOOT - 0.1)
     assert port.advance(1.0 + ETHERNET_BOOT - 0.1) == b""
     assert b"USA\r\nup\r\n" in port.advance(30.0)

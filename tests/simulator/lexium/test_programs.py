@@ -302,7 +302,7 @@ def test_a_paused_program_stops_its_move_and_takes_it_up_again():
     device.execute("EX 1", 0.0)
     device.advance(0.5)
     assert say(device, "PS") == []
-    assert output(device, 20.0) == "" and not device.motor.status.reported(20.0) and 0 < device.position(20.0) < 512000
+    assert output(device, 20.0) == "" and not device.moving(20.0) and 0 < device.position(20.0) < 512000
     assert say(device, "RS") == []
     assert output(device, 40.0) == "512000|"
 
@@ -314,7 +314,7 @@ def test_escape_stops_motor_and_program_at_once():
     device.escape(0.3)
     at = device.position(0.3)
     device.advance(9.0)
-    assert not device.running and device.motor.status.speed(0.3) == 0 and device.position(9.0) == at > 0
+    assert not device.running and device.velocity(0.3) == 0 and device.position(9.0) == at > 0
     assert device.deadline is None
 
 

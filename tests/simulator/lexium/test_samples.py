@@ -36,7 +36,7 @@ def test_a_move_on_an_input_goes_there_and_back_while_it_is_active():
     device = load(ON_INPUT, inputs=((0.5, 1, 0), (1.5, 1, 1)))
     say(device, "EX Ga")
     device.advance(0.49)
-    assert not device.motor.status.reported(0.49)
+    assert not device.moving(0.49)
     device.advance(0.6)
     there = device.motor.axis.profile
     assert there.target == 512000
@@ -94,7 +94,7 @@ def test_a_velocity_is_changed_during_a_move_ten_times_alike():
     device = load(ON_THE_FLY.format(rate=800000000))
     say(device, "EX Ga")
     device.advance(0.8)
-    assert device.motor.status.speed(0.8) > 101200
+    assert device.velocity(0.8) > 101200
     (line,) = printed(device, 60.0)
     assert abs(int(say(device, "PR P")[0]) - 102315) <= 10
     assert line.startswith("On average it ends at ") and abs(int(line.split()[-1]) - 10231) <= 2

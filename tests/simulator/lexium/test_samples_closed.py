@@ -57,7 +57,7 @@ def test_homing_finds_the_switch_and_then_it_moves_step_by_step():
     device.advance(63.0)
     device.prints()
     assert say(device, "PR ER") == ["0"]
-    assert printed(device, 90.0) == [] and not device.motor.status.reported(90.0)
+    assert printed(device, 90.0) == [] and not device.moving(90.0)
 
 
 # 9.7: an input trip runs a short profile four times.
@@ -96,7 +96,7 @@ def test_an_input_trip_runs_its_profile_four_times_and_again():
     starts = set()
     for tick in range(226, 1900):
         device.advance(tick / 100)
-        if device.motor.status.reported(tick / 100):
+        if device.moving(tick / 100):
             starts.add(device.motor.axis.profile.start)
     assert len(starts) == 8
     assert say(device, "PR P", "PR TE", "PR BY") == ["0", "1", "1"]
@@ -207,7 +207,7 @@ def test_the_analog_input_sets_a_velocity_either_way_with_a_dead_zone():
     found = []
     for at in (2.9, 5.9, 8.9, 12.0):
         device.advance(at)
-        found.append(device.motor.status.speed(at))
+        found.append(device.velocity(at))
     assert found == [2063 * 625, 0, -80 * 625, -2032 * 625]
     assert not device.memory.error_flag
 
@@ -247,7 +247,7 @@ def test_a_stall_ends_the_slew_by_its_error_handler():
     begin(device)
     lines = printed(device, 5.0)
     assert "50000" in lines and lines[-2:] == ["Code 86", "It stands"]
-    assert not device.running and not device.motor.status.reported(5.0)
+    assert not device.running and not device.moving(5.0)
     assert say(device, "PR ST", "PR EF") == ["1", "0"]
 
 
