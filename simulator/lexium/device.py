@@ -96,7 +96,6 @@ class MCodeDevice(EventLoop):
         return counters.shown(counters.source, now)
 
     def align(self, _: str, position: int, now: float) -> None:
-        """Stand at a position."""
         self.advance(now)
         self.motor.stop(now)
         self.execute(f"P={position}", now, immediate=True)

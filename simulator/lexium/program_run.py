@@ -327,7 +327,6 @@ class ProgramRun:
 
 
 def read(text: str, file: str) -> Load:
-    """Read the text of a file. Raises Diagnostic."""
     lines, source = program_file.read(text, file), split_lines(text)
     return lambda spec: ProgramRun(spec, lines, file, source)
 

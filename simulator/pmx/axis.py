@@ -162,7 +162,6 @@ class Axis:
             self.start(Doing.STOPPING, pulses.to_speed(0.0, t, pulses.pace), t, pulses.pace)
 
     def halt(self, t: float) -> None:
-        """Stop at once, whatever is at work."""
         self.homing = None
         self.pulses.rest(t)
 
@@ -174,7 +173,6 @@ class Axis:
             self.loop.stay(t)
 
     def next_event(self, after: float) -> float:
-        """The time of its next event; infinite: none."""
         times = [*self.rotor.events(after)]
         if self.pulses.profile.moving(after):
             times += [self.pulses.profile.end, self.loop.alarm(after)]
@@ -183,11 +181,11 @@ class Axis:
         return min((at for at in times if at > after), default=inf)
 
     def live(self, t: float) -> None:
-        """See what has happened by `t`, and what follows from it at once."""
         for _ in range(8):
             before = self.pulses.profile
             self.rotor.settle(t)
-            self._meet_limits(t)
+            if before.moving(t):
+                self._meet_limits(before.direction(t), t)
             done = self.pulses.doing
             if done is not Doing.NOTHING and self.homing is None and self.pulses.profile.end <= t + LATE:
                 self.pulses.rest(t)  # the target is what the motion was for, or where it was stopped
@@ -202,14 +200,10 @@ class Axis:
             if self.pulses.profile is before:
                 return
 
-    def _meet_limits(self, t: float) -> None:
-        if not self.pulses.profile.moving(t):
-            return
+    def _meet_limits(self, direction: float, t: float) -> None:
         _, plus, minus = self.switches(t)
-        direction = self.pulses.profile.direction(t)
-        if not (plus and direction > 0 or minus and direction < 0):
-            return
-        if self.homing and self.homing.awaited is Until.LIMIT and direction == self.homing.direction:
+        sought = self.homing and self.homing.awaited is Until.LIMIT and direction == self.homing.direction
+        if sought or not (plus and direction > 0 or minus and direction < 0):
             return
         self.halt(t)
         if not self.settings["IERR"]:

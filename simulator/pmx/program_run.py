@@ -77,7 +77,6 @@ class Watcher(Recorder):
         super().__init__(debugging, text, points, values)
 
     def before(self, t: float, program: int, line: int) -> bool:
-        """Begin a line; return whether the run ends before it."""
         self._now = t
         number = self._lines.get(line, 0)
         if line and self._lines.get(line - 1) == number and program in self._open:
@@ -301,7 +300,6 @@ class ProgramRun:
 
 
 def read(text: str, file: str) -> Load:
-    """Read the text of a file. Raises Diagnostic."""
     lines, source = program_file.read(text, file), split_lines(text)
     return lambda spec: ProgramRun(spec, lines, file, source)
 

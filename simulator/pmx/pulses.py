@@ -213,7 +213,6 @@ class Pulses:
         return slew(t, here, now, velocity, vi=pace.low, a=pace.up, d=pace.down, up=pace.shape, down=pace.shape)
 
     def begin(self, doing: Doing, profile: Profile, t: float, pace: Pace) -> None:
-        """Begin a motion in place of any other."""
         self.on_change(t)
         self.doing, self.pace = doing, pace
         self._follow(profile, t)

@@ -110,7 +110,6 @@ class TcpServer(Listener):
         self.port = self._server.sockets[0].getsockname()[1]
 
     async def close(self) -> None:
-        """End the service."""
         self._closed = True
         self._detach()
         if self._opening is not None:
@@ -166,7 +165,6 @@ class TcpClient(asyncio.BufferedProtocol, Client):
             self.unplugged()
 
     def get_buffer(self, sizehint: int) -> memoryview:
-        """Offer as much as there is room for."""
         return memoryview(self._buffer)[: max(1, self._queue.room)]
 
     def buffer_updated(self, nbytes: int) -> None:

@@ -196,7 +196,6 @@ class RunningFloor:
         return named[0].unit.shadow if named else None
 
     def close(self) -> None:
-        """Stop the time."""
         self._closed = True
         if self._wake is not None:
             self._wake.cancel()

@@ -71,7 +71,6 @@ class UsbipServer(Listener):
         return int(self._server.sockets[0].getsockname()[1])
 
     async def close(self) -> None:
-        """End the service."""
         self._detach()
         if self._server is not None:
             self._server.close()
@@ -116,7 +115,6 @@ class UsbipClient(asyncio.Protocol):
             self._plugged.waiting.clear()
 
     def end(self) -> None:
-        """Disconnect it."""
         if self._transport is not None:
             self._transport.close()
 

@@ -152,7 +152,6 @@ class Motor:
                     yield each.start + (self._stall_speed * each.direction - each.velocity) / each.acceleration
 
     def seek(self, t: float) -> None:
-        """Begin a reference search."""
         self.search = ReferenceSearch(self, self.parameters[Axis.SEARCH_MODE], t)
 
     def end_search(self) -> None:

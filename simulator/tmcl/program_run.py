@@ -217,7 +217,6 @@ def _begins_motion(call: Call) -> bool:
 
 
 def read(text: str, file: str) -> Load:
-    """Read the text of a file. Raises Diagnostic."""
     made, source = program_file.assembled(program_file.read(text, file)), split_lines(text)
     return lambda spec: ProgramRun(spec, made, file, source)
 

@@ -156,7 +156,6 @@ class Setups:
         self._wired(values[0], was)
 
     def _wired(self, n: int, was: tuple[int, ...]) -> None:
-        """Act on an input's new set-up."""
         self._motor.limit_stop.wired(n, was[0], self._timeline.now)
         self._timeline.replan()
         if n in self._inputs.numbers:
@@ -212,7 +211,6 @@ class Setups:
         self._keep("PF", values)
 
     def _keep(self, word: str, values: list[int]) -> None:
-        """Keep numbers as they are."""
         self._memory.texts[word] = ",".join(map(str, values))
 
     def _device_name(self, statement: Statement) -> Action:

@@ -250,7 +250,6 @@ class Axis:
         self.announce = self.arriving = self._stopping = False
 
     def begin(self, kind: str, profile: Profile, t: float) -> None:
-        """Let a motion take the place of the one before."""
         self.kind, self.mark = kind, inf
         self.arriving = profile.end < inf
         self._stopping = False

@@ -387,7 +387,6 @@ class Hmt:
         self._active = rotor.state != FOLLOWING and (active or self._active)
 
     def _note_held(self, held: bool, t: float) -> None:
-        """Note since when the rotor is held."""
         self._held_since = min(self._held_since, t) if held else inf
 
     def _report(self, code: int, bit: int, holds: bool, t: float) -> None:

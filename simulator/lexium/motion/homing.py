@@ -105,7 +105,6 @@ class Homing:
         self.phase = ""
 
     def home(self, active: bool, t: float) -> None:
-        """Act on the home switch, which has closed or opened."""
         if self._word != "HM":
             return
         if self.phase == SEEK and active:
@@ -114,7 +113,6 @@ class Homing:
             self._finish(t)
 
     def pass_mark(self, t: float) -> None:
-        """Act on the mark, at which the rotor is."""
         if self.phase == SEEK:
             self._brake(BRAKE, t)
         elif self.phase == APPROACH:

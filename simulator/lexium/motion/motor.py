@@ -349,5 +349,4 @@ class Motor:
             self._announce()
 
     def _announce(self) -> None:
-        """Send the drive's name: a motion that asks for that has ended."""
         self._core.printer.emit(self._memory.name + CRLF)
