@@ -238,16 +238,12 @@ class ProgramRun:
 
     def _before(self, line: int) -> bool:
         found, recorder = self._executed.get(line), self._recorder
-        if found is None or recorder is None or not recorder.reaches(found.number):
-            return False
-        recorder.breaks(self._device.now, found.number, self._source[found.number - 1].strip())
-        return True
+        return found is not None and recorder is not None and recorder.reaches(self._device.now, found.number)
 
     def _after(self, line: int) -> None:
         found, recorder = self._executed.get(line), self._recorder
-        if found is not None and recorder is not None and not recorder.full:
-            text = self._source[found.number - 1].strip()
-            recorder.after(self._device.now, found.number, text, recorder.changed())
+        if found is not None and recorder is not None:
+            recorder.after(self._device.now, found.number)
 
     def _outputs(self, line: int) -> None:
         device = self._device

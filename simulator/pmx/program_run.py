@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import partial
 from math import inf
@@ -64,7 +65,7 @@ class Watcher(Recorder):
     def __init__(
         self, device: PmxDevice, debugging: Debugging, source: Mapping[int, int], text: Sequence[str], file: str
     ) -> None:
-        self._device, self._lines, self._text, self._file = device, source, text, file
+        self._device, self._lines, self._file = device, source, file
         self._now = 0.0
         self._open: dict[int, Statement] = {}
         names = [name.upper() for name in debugging.watch]
@@ -72,9 +73,8 @@ class Watcher(Recorder):
             self._check(name)
         valid = "LINE, or LINE,PASSES"
         points = {self._line_of(point := break_point(each, file, valid)): point for each in debugging.breaks}
-        everything = debugging.trace and not names
-        values = self._variables if everything else partial(self._read, names)
-        super().__init__(debugging, text, points, values)
+        watched = names or ([*_NAMES] if debugging.trace else [])
+        super().__init__(debugging, text, points, partial(self._read, watched))
 
     def before(self, t: float, program: int, line: int) -> bool:
         self._now = t
@@ -83,9 +83,8 @@ class Watcher(Recorder):
             return False  # within a statement
         self._close(program)
         self._open[program] = Statement(t, number)
-        if not self.reaches(number):
+        if not self.reaches(t, number):
             return False
-        self.breaks(t, number, self._shown(number))
         del self._open[program]
         return True
 
@@ -106,13 +105,7 @@ class Watcher(Recorder):
     def _close(self, program: int) -> None:
         done = self._open.pop(program, None)
         if done is not None:
-            self.after(done.t, done.line, self._shown(done.line), done.changed, program)
-
-    def _shown(self, number: int) -> str:
-        return self._text[number - 1].strip() if 0 < number <= len(self._text) else ""
-
-    def _variables(self) -> Values:
-        return dict(zip(_NAMES, self._device.programs.variables, strict=True))
+            self.after(done.t, done.line, done.changed, program)
 
     def _read(self, names: Sequence[str]) -> Values:
         variables = self._device.programs.variables
@@ -124,17 +117,14 @@ class Watcher(Recorder):
     def _check(self, name: str) -> None:
         """Refuse a name that reads no number: another command could move an axis."""
         row = lookup(name)
-        if name in _NAMES or (row is not None and "R" in row.access and self._reads(name)):
+        if name in _NAMES:
             return
+        if row is not None and "R" in row.access:
+            with suppress(ValueError):
+                self._register(name)
+                return
         hint = "valid: V0 to V63, or a command that reads one number, such as PX"
         raise Diagnostic(f"no variable {name} to watch", self._file, hint)
-
-    def _reads(self, name: str) -> bool:
-        try:
-            self._register(name)
-        except ValueError:
-            return False
-        return True
 
     def _line_of(self, point: BreakPoint) -> int:
         number = whole(point.place, 0, LAST_LINE)
@@ -256,7 +246,7 @@ class ProgramRun:
             news += self._watcher.take()
             begun = self._watcher.open_since
         for each in self._programs.failures:
-            news.append(Failed(each.t, each.program, self._line(each.line), each.why, each.handled))
+            news.append(Failed(each.t, each.program, self._source.get(each.line, 0), each.why, each.handled))
             if not each.handled:
                 self._errors.append(each.why)
         self._outputs.clear()
@@ -264,9 +254,6 @@ class ProgramRun:
         news.sort(key=lambda each: (each.t, not isinstance(each, Traced)))
         self._later = [each for each in news if each.t >= begun]
         yield from (each for each in news if each.t < begun)
-
-    def _line(self, at: int) -> int:
-        return self._source.get(at, 0)
 
     def _summary(self, until: float | None) -> Summary:
         running = self._programs.running
@@ -286,7 +273,7 @@ class ProgramRun:
             moves=self._moves,
             instructions=lines,
             errors=errors,
-            lines_at=tuple(self._line(at) for at in standing),
+            lines_at=tuple(self._source.get(at, 0) for at in standing),
             moving=moving,
             given_up=running and until is None,
             stuck=running and self._stuck,

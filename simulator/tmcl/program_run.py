@@ -118,7 +118,8 @@ class ProgramRun:
             point = break_point(each, self._name, "LINE, LABEL, or either with ,PASSES")
             points[self._line_of(point.place)] = point
         names = {name.upper(): self._reader(name.upper()) for name in debugging.watch}
-        return Recorder(debugging, self._text, points, partial(self._values, names or {"A": "A", "X": "X"}))
+        values = partial(self._values, names or {"A": "A", "X": "X"})
+        return Recorder(debugging, self._text, points, values, _shown)
 
     def _line_of(self, place: str) -> int:
         at = self._made.labels.get(place.upper())
@@ -150,11 +151,7 @@ class ProgramRun:
 
     def _before(self, t: float, at: int) -> bool:
         self._begun = t, self._source.get(at, 0)
-        recorder = self._recorder
-        if recorder is None or not recorder.reaches(self._begun[1]):
-            return False
-        recorder.breaks(t, self._begun[1], self._shown(self._begun[1]))
-        return True
+        return self._recorder is not None and self._recorder.reaches(*self._begun)
 
     def _after(self, t: float, call: Call) -> None:
         self._ended_at = t
@@ -162,13 +159,8 @@ class ProgramRun:
         failed = bool(self._program.failures) and self._program.failures[-1].t == t
         if call.command == Word.SIO and call.motor == USERS and not failed:
             self._events.append(Output(t, call.type, call.value))
-        if self._recorder is not None and not self._recorder.full:
-            _, line = self._begun
-            self._recorder.after(t, line, self._shown(line), self._recorder.changed())
-
-    def _shown(self, number: int) -> str:
-        line = self._text[number - 1] if 0 < number <= len(self._text) else ""
-        return line[: program_file.remark_at(line)].strip()
+        if self._recorder is not None:
+            self._recorder.after(t, self._begun[1])
 
     def _news(self) -> Iterator[Event]:
         """Yield what was executed, set and not carried out since the last look, in the order of time."""
@@ -177,7 +169,7 @@ class ProgramRun:
             news += self._recorder.take()
         for each in self._program.failures:
             line = self._source.get(each.at, 0)
-            news.append(Failed(each.t, line, self._shown(line), each.why))
+            news.append(Failed(each.t, line, _shown(self._text[line - 1]) if line else "", each.why))
             self._errors.append(each.why)
         self._program.failures.clear()
         yield from sorted(news, key=lambda each: each.t)
@@ -208,6 +200,10 @@ class ProgramRun:
             counts=f"position {position}, {counted(self._moves, 'motion')}, {counted(lines, 'line')}, {failed}",
             turning="the motor still turns; WAIT POS before STOP waits for it" if moving and ended == "END" else "",
         )
+
+
+def _shown(line: str) -> str:
+    return line[: program_file.remark_at(line)].strip()
 
 
 def _begins_motion(call: Call) -> bool:
