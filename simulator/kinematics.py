@@ -141,6 +141,19 @@ def ramp(segment: Segment, shape: Shape) -> list[Segment]:
 
 
 LINE = Shape()
+
+
+class Pace(NamedTuple):
+    """How a motion changes its speed: initial and highest speed, the rates up and down, the shapes of both ramps."""
+
+    vi: float
+    vm: float
+    a: float
+    d: float
+    up: Shape = LINE
+    down: Shape = LINE
+
+
 _TOUCH = 1e-6
 """Steps; less than this is rounding, and causes neither overshoot nor return."""
 
@@ -282,27 +295,16 @@ def halt(at: float, position: float) -> Profile:
     return Profile(at, at, position, position)
 
 
-def move(
-    at: float,
-    p0: float,
-    v0: float,
-    target: float,
-    *,
-    vi: float,
-    vm: float,
-    a: float,
-    d: float,
-    up: Shape = LINE,
-    down: Shape = LINE,
-) -> Profile:
+def move(at: float, p0: float, v0: float, target: float, pace: Pace) -> Profile:
     """Move to a target from any position and velocity: a trapezoid, or a triangle if it is too near for `vm`.
 
     A motor that moves away from the target, or is too fast to stop there, decelerates, stops and comes back; from a
     speed above `vm` it decelerates to `vm`. `vi` is at least 0, the others are above it. A `vm` below `vi` replaces
     both.
     """
-    vi = min(vi, vm)
-    path = _Path(at, p0, up, down)
+    vm, a, d = pace.vm, pace.a, pace.d
+    vi = min(pace.vi, vm)
+    path = _Path(at, p0, pace.up, pace.down)
     speed = abs(v0)
     if speed:
         direction = copysign(1.0, v0)
@@ -330,24 +332,14 @@ def move(
     return path.stop()
 
 
-def slew(
-    at: float,
-    p0: float,
-    v0: float,
-    velocity: float,
-    *,
-    vi: float,
-    a: float,
-    d: float,
-    up: Shape = LINE,
-    down: Shape = LINE,
-) -> Profile:
+def slew(at: float, p0: float, v0: float, velocity: float, pace: Pace) -> Profile:
     """Change to a signed velocity, up with `a` and down with `d`, and keep it; 0: decelerate to `vi` and stop.
 
     A velocity below `vi` is reached at once, after decelerating to `vi` if the motor was faster. A reversal leads
     through a stop.
     """
-    path = _Path(at, p0, up, down)
+    vi, a, d = pace.vi, pace.a, pace.d
+    path = _Path(at, p0, pace.up, pace.down)
     speed = abs(v0)
     direction = copysign(1.0, v0)
     if v0 * velocity <= 0:

@@ -30,14 +30,13 @@ class World:
     torque: from 1 on the rotor does not turn. `pushed` is the sum of all pushes.
     """
 
-    def __init__(self, spec: WorldSpec, *, index: float = 0.0) -> None:
+    def __init__(self, spec: WorldSpec) -> None:
         self.home = (-inf, spec.home) if isinstance(spec.home, float | int) else spec.home
         self.limit_plus = spec.limit_plus
         self.limit_minus = spec.limit_minus
         self.stall_at = spec.stall_at
         self.load = spec.load
         self.torque = Torque(spec)
-        self.index = index
         self.pushed = 0.0
         self._locks = spec.locked
         self._edges = self._find_edges()

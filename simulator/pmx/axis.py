@@ -20,7 +20,7 @@ from enum import Enum
 from math import inf
 
 from multidrop.simulator.cell.spec import WorldSpec
-from multidrop.simulator.kinematics import Profile
+from multidrop.simulator.kinematics import Pace, Profile
 from multidrop.simulator.pmx.pulses import (
     HOME,
     INDEX,
@@ -31,7 +31,6 @@ from multidrop.simulator.pmx.pulses import (
     STATES,
     Doing,
     LoopStatus,
-    Pace,
     Pulses,
     Rotor,
     paced,
@@ -371,7 +370,7 @@ class Homing:
 
     def slow(self, on: bool = False) -> None:
         """Decelerate to low speed, and stop there or go on."""
-        self._start(self._pulses.to_speed(self.direction * self.pace.low if on else 0.0, self._now, self.pace))
+        self._start(self._pulses.to_speed(self.direction * self.pace.vi if on else 0.0, self._now, self.pace))
 
     def go(self, place: float) -> None:
         self._start(self._pulses.to_place(place, self._now, self.pace))
@@ -425,7 +424,7 @@ class Homing:
 
 def home_input(homing: Homing) -> Steps:
     """`H`: move at high speed to the home input; 0 is there, the motor stops a ramp beyond it (7.10.1)."""
-    homing.run(homing.direction, homing.pace.high)
+    homing.run(homing.direction, homing.pace.vm)
     yield Until.HOME
     homing.zero()
     homing.slow()
@@ -435,7 +434,7 @@ def home_input(homing: Homing) -> Steps:
 
 def limit(homing: Homing) -> Steps:
     """`L`: move at high speed to the limit, and back by LCA; 0 is there (7.10.2)."""
-    homing.run(homing.direction, homing.pace.high)
+    homing.run(homing.direction, homing.pace.vm)
     yield Until.LIMIT
     homing.stop()
     homing.go(homing.here + homing.correction("LCA"))
@@ -446,7 +445,7 @@ def limit(homing: Homing) -> Steps:
 
 def home_and_index(homing: Homing) -> Steps:
     """`ZH`: move to the home input, and on at low speed to the next index mark, which is 0 (7.10.3)."""
-    homing.run(homing.direction, homing.pace.high)
+    homing.run(homing.direction, homing.pace.vm)
     yield Until.HOME
     homing.slow(on=True)
     yield Until.SLOW
@@ -457,7 +456,7 @@ def home_and_index(homing: Homing) -> Steps:
 
 def index(homing: Homing) -> Steps:
     """`Z`: move at low speed to the next index mark, which is 0 (7.10.4)."""
-    homing.run(homing.direction, homing.pace.low)
+    homing.run(homing.direction, homing.pace.vi)
     yield Until.INDEX
     homing.stop()
     homing.zero()
@@ -465,18 +464,18 @@ def index(homing: Homing) -> Steps:
 
 def home_twice(homing: Homing) -> Steps:
     """`HL`: move to the home input, back past it by HCA, and at low speed to it again, which is 0 (7.10.5)."""
-    homing.run(homing.direction, homing.pace.high)
+    homing.run(homing.direction, homing.pace.vm)
     yield Until.HOME
     homing.zero()
     homing.slow()
     yield Until.END
     homing.stop()
-    homing.run(-homing.direction, homing.pace.high)
+    homing.run(-homing.direction, homing.pace.vm)
     yield Until.AWAY
     homing.go(homing.here + homing.correction("HCA"))
     yield Until.END
     homing.stop()
-    homing.run(homing.direction, homing.pace.low)
+    homing.run(homing.direction, homing.pace.vi)
     yield Until.HOME
     homing.zero()
     homing.stop()

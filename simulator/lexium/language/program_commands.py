@@ -14,7 +14,7 @@ from multidrop.dialects.mcode.manual.table import lookup
 from multidrop.simulator.lexium.event_loop import EventLoop
 from multidrop.simulator.lexium.language.variables import Compile, Variables, bare, is_place, only, pair
 from multidrop.simulator.lexium.state.errors import CRLF, Fault
-from multidrop.simulator.lexium.state.expressions import compile_condition, whole
+from multidrop.simulator.lexium.state.expressions import whole
 from multidrop.simulator.lexium.state.memory import within
 from multidrop.simulator.lexium.state.program_memory import FIRST, SPACE, Action
 
@@ -72,9 +72,7 @@ class ProgramCommands:
         if target is None or not is_place(target) or isinstance(condition, Text):
             raise Fault(E.ILLEGAL_DATA)
 
-        holds = None
-        if condition is not None:
-            holds = compile_condition(condition, self._variables.reader, self._memory.model.floating)
+        holds = None if condition is None else self._variables.compiler.condition(condition)
         printer, thread, linked = self._printer, self._thread, self._interpreter.linked
         calls, places, place = statement.word == "CL", linked.places, -1
 

@@ -16,7 +16,7 @@ from multidrop.dialects.mcode.manual.grammar import Argument, Compare, Name, Num
 from multidrop.simulator.lexium.event_loop import EventLoop
 from multidrop.simulator.lexium.motion.counters import BITS
 from multidrop.simulator.lexium.state.errors import Fault
-from multidrop.simulator.lexium.state.expressions import PI, Read, Value, compile_value, compile_whole, whole
+from multidrop.simulator.lexium.state.expressions import PI, Compiler, Read, Value, whole
 from multidrop.simulator.lexium.state.memory import BANKED, slot, within
 from multidrop.simulator.lexium.state.program_memory import Action
 
@@ -85,6 +85,7 @@ class Variables:
         self._memory, self._values, self._program = core.memory, core.values, core.program
         self._timeline, self._motor = core.timeline, motor
         self._inputs, self._outputs = motor.inputs, drive.output_lines
+        self.compiler = Compiler(self.reader, core.model.floating)
         self._readers: dict[str, Read] = {
             "LS": _unreadable,
             "PI": lambda: PI,
@@ -241,9 +242,7 @@ class Variables:
             raise Fault(E.OUT_OF_RANGE)
         if argument is None or isinstance(argument, Compare):
             raise Fault(E.ILLEGAL_DATA)
-        if not self._memory.model.floating:
-            return compile_whole(argument, self.reader)
-        return compile_value(argument, self.reader, floating)
+        return self.compiler.expression(argument, floating)
 
     def numbers(self, act: Callable[[list[int]], None], least: int, most: int) -> Compile:
         """An instruction with whole numbers: so many at least and at most. Raises Fault (24, 34, 38)."""

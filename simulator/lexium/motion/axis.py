@@ -10,10 +10,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from math import floor, inf
-from typing import Protocol, TypedDict
+from typing import Protocol
 
 from multidrop.dialects.mcode.manual.errors import ErrorNumber as E
-from multidrop.simulator.kinematics import LINE, LINEAR, Profile, Shape, halt, move, slew
+from multidrop.simulator.kinematics import LINE, LINEAR, Pace, Profile, Shape, halt, move, slew
 from multidrop.simulator.lexium.motion.counters import Counters
 from multidrop.simulator.lexium.motion.rotor import CATCHING, Rotor
 from multidrop.simulator.lexium.state.errors import Fault
@@ -53,16 +53,6 @@ class Bridges:
 
 STEEPEST = 1.1e9
 """The highest acceleration that a drive makes, steps/s2; an S-curve's peak may not be above it."""
-
-
-class Ramps(TypedDict):
-    """How the velocity changes (manual 5.1.7, 5.1.9, 5.1.27, 5.1.30): steps/s, steps/s2, the shapes of both ramps."""
-
-    vi: float
-    a: float
-    d: float
-    up: Shape
-    down: Shape
 
 
 class Backlash:
@@ -180,7 +170,7 @@ class Axis:
 
     def go(self, kind: str, value: int, t: float, announce: bool = False, run_on: bool = False) -> None:
         """Carry out MA or MR. `announce`: send the name when it is over; `run_on`: do not stop there. Raises Fault."""
-        counters, scale = self.counters, self._memory.scale
+        counters = self.counters
         if not -0x80000000 <= value <= 0x7FFFFFFF:
             raise Fault(E.OUT_OF_RANGE)
         distance = value - counters.position(t) if kind == "MA" else value
@@ -188,7 +178,7 @@ class Axis:
         self._ready(t, distance)
         if self.kind == CORRECTION and self.commanded(t):
             raise Fault(E.STILL_CORRECTING)
-        velocity, ramps = self.profile.velocity(t), self._ramps()
+        velocity, pace = self.profile.velocity(t), self._pace()
         if self.kind in (SLEW, HOMING, TORQUE):
             self.backlash.flank = int(self.direction(t))
         first, after = self.backlash.plan(distance, absolute=kind == "MA")
@@ -196,14 +186,14 @@ class Axis:
             first, after = first + after, 0
         place = counters.place_of_raw(raw + first) + counters.stator_shift(t)
         self.back = counters.place_of_raw(raw + first + after) - counters.place_of_raw(raw + first) if after else 0.0
-        top = self._top = self._memory.values["VM"] * scale
+        self._top = pace.vm
         begin = t if self.profile.moving(t) else t + self._memory.model.compute
         if run_on and (distance or velocity):
-            signed = top if (distance or velocity) > 0 else -top
-            self.begin(kind, slew(begin, here, velocity, signed, **ramps), t)
+            signed = pace.vm if (distance or velocity) > 0 else -pace.vm
+            self.begin(kind, slew(begin, here, velocity, signed, pace), t)
             self.mark = self.profile.crossing(place, t)
         else:
-            self.begin(kind, move(begin, here, velocity, place, vm=top, **ramps), t)
+            self.begin(kind, move(begin, here, velocity, place, pace), t)
         self.announce = announce
 
     def slew(self, value: int, t: float) -> None:
@@ -226,13 +216,13 @@ class Axis:
         here, now = self.profile.position(t), self.profile.velocity(t)
         default = SLEW if velocity or self.kind not in MOVES else self.kind
         self.back = 0.0
-        self.begin(kind or default, slew(t, here, now, velocity, **self._ramps()), t)
+        self.begin(kind or default, slew(t, here, now, velocity, self._pace()), t)
         self._stopping, self.announce = stopping, False
 
     def correct(self, distance: float, t: float) -> None:
         """Go back to where the last motion should have ended: at VI, without ramps (PM)."""
         here, vi = self.profile.position(t), self._memory.values["VI"] * self._memory.scale
-        self.begin(CORRECTION, move(t, here, 0.0, here + distance, vi=vi, vm=vi, a=1.0, d=1.0), t)
+        self.begin(CORRECTION, move(t, here, 0.0, here + distance, Pace(vi, vi, 1.0, 1.0)), t)
 
     def step(self, steps: int, t: float) -> None:
         """Make a few steps at once, as a clock on the inputs asks for them (FL)."""
@@ -266,8 +256,8 @@ class Axis:
         self.arriving = self._stopping = False
         if self.back:
             place, self.back = self.profile.position(t) + self.back, 0.0
-            announce, ramps = self.announce, self._ramps()
-            self.begin(self.kind, move(t, self.profile.position(t), 0.0, place, vm=self._top, **ramps), t)
+            announce, pace = self.announce, self._pace()._replace(vm=self._top)
+            self.begin(self.kind, move(t, self.profile.position(t), 0.0, place, pace), t)
             self.announce = announce
             return False
         announce, self.announce = self.announce, False
@@ -318,8 +308,7 @@ class Axis:
         elif kind == CORRECTION:
             self.correct(value - here, t)
         else:
-            top = self._memory.values["VM"] * self._memory.scale
-            self.begin(kind, move(t, here, now, value, vm=top, **self._ramps()), t)
+            self.begin(kind, move(t, here, now, value, self._pace()), t)
 
     def _take(self, profile: Profile, t: float) -> None:
         self._direction = self.direction(t)
@@ -355,11 +344,15 @@ class Axis:
             if self._shape(shape, rate) is None:
                 raise Fault(code)
 
-    def _ramps(self) -> Ramps:
-        """The ramps in steps: straight where a curve would be too steep, as a stop is never refused."""
+    def _pace(self) -> Pace:
+        """VI, VM, A and D in steps (manual 5.1.7, 5.1.9, 5.1.27, 5.1.30) with both ramps.
+
+        They are straight where a curve would be too steep, as a stop is never refused.
+        """
         values, scale = self._memory.values, self._memory.scale
         up, down = self._shape("AT", "A") or LINE, self._shape("DT", "D") or LINE
-        return {"vi": values["VI"] * scale, "a": values["A"] * scale, "d": values["D"] * scale, "up": up, "down": down}
+        vi, vm, a, d = (values[word] * scale for word in ("VI", "VM", "A", "D"))
+        return Pace(vi, vm, a, d, up, down)
 
     def _shape(self, kind: str, rate: str) -> Shape | None:
         """Make a shape of AT and AJ, or DT and DJ; None where the middle of the ramp would be too steep."""

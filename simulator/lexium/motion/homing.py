@@ -15,7 +15,7 @@ from collections.abc import Callable
 from math import inf
 
 from multidrop.dialects.mcode.manual.errors import ErrorNumber as E
-from multidrop.simulator.kinematics import slew
+from multidrop.simulator.kinematics import Pace, slew
 from multidrop.simulator.lexium.motion.axis import HOMING, TORQUE, Axis
 from multidrop.simulator.lexium.motion.counters import DIRECTIONS, ERRORS, Limits
 from multidrop.simulator.lexium.motion.inputs import HOME, Inputs
@@ -170,7 +170,7 @@ class Homing:
     def _approach(self, t: float) -> None:
         self.phase = APPROACH
         here, direction, vi = self._axis.position(t), self._directions[1], self._values["VI"] * self._memory.scale
-        self._axis.begin(HOMING, slew(t, here, 0.0, direction * vi, vi=vi, a=1.0, d=1.0), t)
+        self._axis.begin(HOMING, slew(t, here, 0.0, direction * vi, Pace(vi, vi, 1.0, 1.0)), t)
         self._set_mark(direction, t)
 
     def _set_mark(self, direction: int, t: float) -> None:

@@ -21,7 +21,7 @@ from math import exp, inf, log
 
 from multidrop.dialects.mcode.manual.errors import JOG_IN_CLOCK_MODE
 from multidrop.dialects.mcode.manual.errors import ErrorNumber as E
-from multidrop.simulator.kinematics import move
+from multidrop.simulator.kinematics import Pace, move
 from multidrop.simulator.lexium.motion.axis import HOMING, SLEW, Axis
 from multidrop.simulator.lexium.motion.counters import DIRECTIONS, Counters, Limits, Trips
 from multidrop.simulator.lexium.motion.feedback import VARIABLE, Encoder, Hmt, Torque
@@ -262,7 +262,7 @@ class Motor:
         self._tested_from = self.rotor.position(t)
         top, rate = values["VM"] * memory.scale, values["A"] * memory.scale
         target = here + memory.steps_per_turn / 2
-        axis.begin(TEST, move(t, here, 0.0, target, vi=vi, vm=top, a=rate, d=rate), t)
+        axis.begin(TEST, move(t, here, 0.0, target, Pace(vi, top, rate, rate)), t)
         self._timeline.replan()
 
     def update_jog(self) -> None:

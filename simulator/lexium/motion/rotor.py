@@ -16,7 +16,7 @@ from __future__ import annotations
 
 from math import copysign, floor, inf
 
-from multidrop.simulator.kinematics import Profile, halt, meeting, move, slew
+from multidrop.simulator.kinematics import Pace, Profile, halt, meeting, move, slew
 from multidrop.simulator.lexium.state.errors import Event, nothing, when
 from multidrop.simulator.lexium.state.interpreter import Core
 from multidrop.simulator.world import AFTER, REVOLUTION, TOUCH, World
@@ -63,7 +63,7 @@ class WorldFrame:
 
     def index_ahead(self, here: float, direction: float, offset: float = 0.0) -> float:
         """The next place beyond `here` that is `offset` (steps of 1/51200 turn) from an index mark."""
-        zero = (self._world.index - self._origin) / self._rate + offset * self.turn / REVOLUTION
+        zero = (0.0 - self._origin) / self._rate + offset * self.turn / REVOLUTION
         turns = (here - zero) / self.turn
         return zero + self.turn * (floor(turns + TOUCH) + 1 if direction > 0 else -floor(-turns + TOUCH) - 1)
 
@@ -298,14 +298,13 @@ class Rotor:
         command = self.command
         if command.end < inf and command.velocity(t) * (command.target - command.position(t)) >= 0:
             top = self._make_up_speed(float(self.values["VM"]) if command.end > t else 0.0)
-            self._own = move(
-                t, here, velocity, command.target - self.slip, vi=MAKE_UP_VI, vm=top, a=MAKE_UP_RATE, d=MAKE_UP_RATE
-            )
+            pace = Pace(MAKE_UP_VI, top, MAKE_UP_RATE, MAKE_UP_RATE)
+            self._own = move(t, here, velocity, command.target - self.slip, pace)
         else:
             speed = float(self.values["VM"]) if command.end < inf else abs(command.segments[-1].velocity)
             direction = copysign(1.0, command.position(t) - self.slip - here)
-            top = self._make_up_speed(speed)
-            self._own = slew(t, here, velocity, direction * top, vi=MAKE_UP_VI, a=MAKE_UP_RATE, d=MAKE_UP_RATE)
+            pace = Pace(MAKE_UP_VI, self._make_up_speed(speed), MAKE_UP_RATE, MAKE_UP_RATE)
+            self._own = slew(t, here, velocity, direction * pace.vm, pace)
         self.state, self._cause = CATCHING, ""
         met = meeting(self._own, command, -self.slip, t)
         self._meets = self._own.end if met == inf else met
