@@ -149,7 +149,6 @@ class EventLoop:
         inputs, motor, now = self._inputs, self.motor, self._timeline.now
         risen, fallen = inputs.refresh(now)
         motor.look(now)
-        motor.look_at_limits()
         if not (risen or fallen):
             return False
         for n, active in (*((n, True) for n in risen), *((n, False) for n in fallen)):

@@ -274,7 +274,12 @@ class Axis:
 
     def pause(self, t: float) -> Callable[[float], None]:
         """Slow down and stop; what is given goes on with the motion, and with the name that is to be sent."""
-        (goal_kind, goal), kind, announce, back = self._goal(), self.kind, self.announce, self.back
+        goal_kind, goal = self.kind, self.profile.target
+        if self.profile.end == inf:
+            goal_kind, goal = SLEW, self.profile.segments[-1].velocity
+        elif self.kind == SLEW:
+            goal = 0.0
+        kind, announce, back = self.kind, self.announce, self.back
         place = None if self.mark == inf else self.profile.position(self.mark)
         self.slow_to(0, t)
         if place is not None and (mark := self.profile.crossing(place, t)) < inf:
@@ -284,31 +289,21 @@ class Axis:
             self.announce = False
 
         def go_on(t: float) -> None:
-            distance = goal if goal_kind == SLEW else goal - self.profile.position(t)
-            if distance:
+            here, now = self.profile.position(t), self.profile.velocity(t)
+            if distance := goal if goal_kind == SLEW else goal - here:
                 self._ready(t, distance)
-            self._take_up(goal_kind, goal, t)
+            if goal_kind == SLEW:
+                self.slow_to(goal, t)
+            elif goal_kind == CORRECTION:
+                self.correct(distance, t)
+            else:
+                self.begin(goal_kind, move(t, here, now, goal, self._pace()), t)
             self.back = back
             if place is not None:
                 self.kind, self.mark = kind, self.profile.crossing(place, t)
             self.announce = announce
 
         return go_on
-
-    def _goal(self) -> tuple[str, float]:
-        """The kind of motion, and its target or its velocity in steps."""
-        if self.profile.end == inf:
-            return SLEW, self.profile.segments[-1].velocity
-        return (SLEW, 0.0) if self.kind == SLEW else (self.kind, self.profile.target)
-
-    def _take_up(self, kind: str, value: float, t: float) -> None:
-        here, now = self.profile.position(t), self.profile.velocity(t)
-        if kind == SLEW:
-            self.slow_to(value, t)
-        elif kind == CORRECTION:
-            self.correct(value - here, t)
-        else:
-            self.begin(kind, move(t, here, now, value, self._pace()), t)
 
     def _take(self, profile: Profile, t: float) -> None:
         self._direction = self.direction(t)

@@ -55,24 +55,25 @@ class Homing:
             raise Fault(E.HOMING_OR_MOVING)
         seek, approach = TYPES[kind]
         begun = word == "HM" and self._at_switch()
-        met = set() if begun else self._blocked(seek, t)
-        direction = -seek if met else seek
-        self._axis.allow(t, approach if begun else direction)
-        self._axis.check_ramps()
-        self._word, self._directions, self._met = word, (seek, approach), met
-        self._timeline.replan()
+        self._set_out(word, (seek, approach), set(), 0 if begun else seek, t)
         if begun:
             self._approach(t)
-        else:
-            self._seek(direction, t)
+
+    def _set_out(self, word: str, directions: tuple[int, int], met: set[int], direction: int, t: float) -> None:
+        """Seek in a direction, 0 where it has found already, or turn round at once. Raises Fault (82 to 85, 94, 96)."""
+        blocked = direction and self._values["LM"] in TURNS_ROUND and self._limits.refuse(t, direction)
+        if blocked and met:
+            raise Fault(E.NO_HOME_SWITCH)
+        there = -direction if blocked else direction
+        self._axis.allow(t, there or directions[1])
+        self._axis.check_ramps()
+        self._word, self._directions, self._met = word, directions, {*met, direction} if blocked else set(met)
+        self._timeline.replan()
+        if there:
+            self._seek(there, t)
 
     def _at_switch(self) -> bool:
         return bool(self._inputs.wants(HOME))
-
-    def _blocked(self, direction: int, t: float) -> set[int]:
-        """The limit that would turn it round, if that is active to begin with."""
-        blocked = self._values["LM"] in TURNS_ROUND and self._limits.refuse(t, direction)
-        return {direction} if blocked else set()
 
     def again(self) -> Callable[[float], None] | None:
         """Return a closure that goes on with the homing that is under way (PS, RS); None if there is none."""
@@ -84,20 +85,11 @@ class Homing:
 
         def go_on(t: float) -> None:
             found = approaches or (word == "HM" and self._at_switch())
-            hit = set() if found else self._blocked(direction, t)
-            if hit and met:
-                raise Fault(E.NO_HOME_SWITCH)
-            there = -direction if hit else direction
-            self._axis.allow(t, directions[1] if found else there)
-            self._axis.check_ramps()
-            self._word, self._directions, self._met = word, directions, met | hit
-            self._timeline.replan()
+            self._set_out(word, directions, met, 0 if found else direction, t)
             if braked:
                 self._leave(t)
             elif found:
                 self._approach(t)
-            else:
-                self._seek(there, t)
 
         return go_on
 

@@ -194,9 +194,7 @@ class Motor:
             self._timeline.replan()
             self.trips.displaced(before, self.counters.place(t), t)
             self.encoder.look(t)
-
-    def look_at_limits(self) -> None:
-        """See which limit switches are active; a clock knows no limits (MDrivePlus 5-13)."""
+        # See which limit switches are active; a clock knows no limits (MDrivePlus 5-13).
         switches = self.limits.switches
         switches.clear()
         if not self._memory.values.get("CM"):
@@ -224,7 +222,15 @@ class Motor:
         thread, t = self._core.thread, self._timeline.now
         if not thread.running:
             raise Fault(E.NO_PROGRAM_RUNNING)
-        thread.pause(self._pause(t) if not thread.paused and self.status.moving(t) else None)
+        again: Callable[[float], None] | None = None
+        if not thread.paused and self.status.moving(t):
+            if self.torque.halt():
+                again = self.torque.go_on
+            elif (again := self.homing.again()) is None:
+                again = self.axis.pause(t)
+            else:
+                self.axis.slow_to(0, t)
+        thread.pause(again)
 
     def resume_program(self) -> None:
         """Carry out RS. Raises Fault (40, 41, and the motion's own where it may not begin again)."""
@@ -234,16 +240,6 @@ class Motor:
         again = thread.go_on(t)
         if again is not None:
             again(t)
-
-    def _pause(self, t: float) -> Callable[[float], None]:
-        """Slow down and stop; return what takes up the same motion again."""
-        if self.torque.halt():
-            return self.torque.go_on
-        homing = self.homing.again()
-        if homing is None:
-            return self.axis.pause(t)
-        self.axis.slow_to(0, t)
-        return homing
 
     def slew(self, velocity: int, t: float) -> None:
         """Carry out SL; 0 stops torque mode too."""

@@ -112,21 +112,17 @@ def compose(mode: Mode, text: bytes, outcome: Outcome, prompt: str) -> bytes:
     data = bytes(out) + outcome.tail.encode("latin-1", "replace")
     if mode.echo == 2:
         return data
-    answer = _head(mode, outcome) + data
-    if mode.echo == 3:
-        return text + answer
-    return answer + prompt.encode() if mode.echo == 0 else answer
-
-
-def _head(mode: Mode, outcome: Outcome) -> bytes:
-    """Choose CR LF, ACK or NAK; nothing where a running program leaves it out."""
     if not mode.checksum:
         # With a program running a print is not preceded by CR LF; a command keeps its only sign of acceptance.
         absent = mode.echo == 1 and outcome.busy and bool(outcome.lines or outcome.tail)
-        return b"" if absent else CRLF
-    if outcome.damaged or outcome.flagged or not outcome.good:
-        return NAK
-    return b"" if mode.checksum == 2 and outcome.busy else ACK
+        answer = data if absent else CRLF + data
+    elif outcome.damaged or outcome.flagged or not outcome.good:
+        answer = NAK + data
+    else:
+        answer = data if mode.checksum == 2 and outcome.busy else ACK + data
+    if mode.echo == 3:
+        return text + answer
+    return answer + prompt.encode() if mode.echo == 0 else answer
 
 
 class Replier:
