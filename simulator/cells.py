@@ -6,7 +6,7 @@ Every error in a file is a `Diagnostic` of one line that names the key and its p
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import fields
+from dataclasses import fields, replace
 from importlib import resources
 from importlib.resources.abc import Traversable
 from pathlib import Path
@@ -85,7 +85,7 @@ class Reader:
     def _bus(self, table: Table, where: str, folder: Folder, text: str) -> BusSpec:
         name = table.values.get("name")
         if isinstance(name, str) and name:
-            table = table.placed(f"{where}: [[bus]] {quoted(name)}")
+            table = replace(table, where=f"{where}: [[bus]] {quoted(name)}")
         table.only("name", "serve", "baud", "gather", "drive", "faults")
         name = table.text("name")
         if not name or not name.isprintable() or set(name) & set("#@:/ "):

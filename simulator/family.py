@@ -19,14 +19,13 @@ from multidrop.simulator.world import Shaft, World
 
 
 class Device(Protocol):
-    """The operations that `/sim` needs on any simulated drive."""
+    """The operations that `/sim` needs on any simulated drive; `advance` sees what has changed around it."""
 
     @property
     def powered(self) -> bool: ...  # noqa: D102
     def advance(self, now: float) -> None: ...  # noqa: D102
     def power(self, on: bool, now: float) -> None: ...  # noqa: D102
     def supply(self, on: bool, now: float) -> None: ...  # noqa: D102
-    def world_changed(self) -> None: ...  # noqa: D102
 
 
 class Connection(Protocol):

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from random import Random
 
 from multidrop.dialects import Diagnostic
@@ -20,6 +21,8 @@ from multidrop.simulator.wire import Wire
 from multidrop.simulator.world import World
 
 LEVELS: dict[str, int | None] = {"0": 0, "1": 1, "open": None}
+MOST_PUSH = 999_999_999
+"""Motor steps."""
 
 
 @dataclass(frozen=True)
@@ -62,11 +65,7 @@ class Floor:
     @property
     def deadline(self) -> float | None:
         """When something next happens anywhere, s."""
-        first = None
-        for wire in self.wires.values():
-            if (at := wire.deadline) is not None and (first is None or at < first):
-                first = at
-        return first
+        return min((at for wire in self.wires.values() if (at := wire.deadline) is not None), default=None)
 
     def advance(self, now: float) -> dict[str, bytes]:
         """What the endpoints of each bus hear by `now`; buses on which nothing is heard are left out."""
@@ -85,19 +84,67 @@ class Floor:
         words = text.split()
         if words[:1] == ["/sim"]:
             words = words[1:]
-        usages = ", ".join(verb.usage for verb in VERBS.values())
+        usages = ", ".join(USAGES.values())
         if not words:
             raise Diagnostic("no command", "/sim", f"valid: {usages}")
-        verb = VERBS.get(words[0])
-        if verb is None:
+        usage = USAGES.get(words[0])
+        if usage is None:
             raise Diagnostic(f'no command "{words[0]}"', "/sim", f"valid: {usages}")
-        if len(words) != len(verb.usage.split()):
-            raise Diagnostic("wrong number of words", f"/sim {words[0]}", f"usage: /sim {verb.usage}")
+        if len(words) != len(usage.split()):
+            raise Diagnostic("wrong number of words", f"/sim {words[0]}", f"usage: /sim {usage}")
         try:
-            return verb.run(self, words[1:], now)
+            self._carry_out(words[0], words[1:], f"/sim {words[0]}", now)
         finally:
             for wire in self.wires.values():
                 wire.look_again()
+        return None
+
+    def _carry_out(self, verb: str, words: list[str], where: str, now: float) -> None:
+        """Carry out a command of the right length. Raises Diagnostic and changes nothing."""
+        name = words[0]
+        if verb in ("plug", "unplug"):
+            if name not in self.wires:
+                raise Diagnostic(f'no bus "{name}"', where, f"valid: {', '.join(self.wires)}")
+            wire = self.wires[name]
+            return wire.plug() if verb == "plug" else wire.unplug()
+        placed, world = self.place(name, where)
+        unit, device = placed.unit, placed.device
+        if verb == "power":
+            on = _on(words[1], where)
+            device.advance(now)
+            device.power(on, now)
+            return self._retune(placed.bus)
+        if verb == "supply":
+            if unit.single_supply:
+                hint = f"/sim power {name} {words[1]} switches it"
+                raise Diagnostic(f'"{name}" has one supply only', where, hint)
+            return device.supply(_on(words[1], where), now)
+        change = self._change_of_world(verb, words, where, unit, world)
+        device.advance(now)
+        change(now)
+        device.advance(now)
+
+    def _change_of_world(
+        self, verb: str, words: list[str], where: str, unit: Unit, world: World
+    ) -> Callable[[float], None]:
+        """Check the words of a command that changes the surroundings of an axis. Raises Diagnostic."""
+        match verb:
+            case "input":
+                if not unit.inputs:
+                    raise Diagnostic(f'"{words[0]}" has no inputs', where)
+                number = _number(words[1], sorted(unit.inputs), "input", where)
+                if words[2] not in LEVELS:
+                    raise Diagnostic(f'no level "{words[2]}"', where, "valid: 0 (ground), 1 (+V), open (neither)")
+                return partial(world.set_input, number, LEVELS[words[2]])
+            case "analog":
+                return partial(world.set_input, 0, _number(words[1], range(unit.counts + 1), "analog value", where))
+            case "push":
+                steps = whole(words[1], -MOST_PUSH, MOST_PUSH)
+                if steps is None:
+                    raise Diagnostic(f'no push "{words[1]}"', where, "valid: motor steps, such as 100 or -100")
+                return partial(world.push, steps)
+        held = _on(words[1], where)
+        return lambda now: world.hold(held)
 
     def modbus(self, bus: str) -> Connection:
         """Connect over Modbus/TCP to the Ethernet drive of a bus. Raises Diagnostic if there is none.
@@ -152,20 +199,12 @@ class Floor:
         self.drives += placed
         return Wire([each.unit.port for each in placed], bus.baud, bus.faults, Random(f"{seed} {bus.name}"))
 
-    def retune(self, bus: str) -> None:
+    def _retune(self, bus: str) -> None:
         """Let a wire follow its drives if all of them have taken the same other baud rate at power-up."""
         wire = self.wires[bus]
         bauds = {each.unit.port.baud for each in self.drives if each.bus == bus}
         if 0 not in bauds and len(bauds) == 1 and bauds != {wire.baud}:
             wire.retune(bauds.pop())
-
-
-@dataclass(frozen=True)
-class Verb:
-    """One word of `/sim`."""
-
-    usage: str
-    run: Callable[[Floor, list[str], float], str | None]
 
 
 def _number(text: str, allowed: Sequence[int], what: str, where: str) -> int:
@@ -181,87 +220,3 @@ def _on(text: str, where: str) -> bool:
     if text not in ("on", "off"):
         raise Diagnostic(f'no state "{text}"', where, "valid: on, off")
     return text == "on"
-
-
-def _input(floor: Floor, words: list[str], now: float) -> None:
-    placed, world = floor.place(words[0], "/sim input")
-    if not placed.unit.inputs:
-        raise Diagnostic(f'"{words[0]}" has no inputs', "/sim input")
-    number = _number(words[1], sorted(placed.unit.inputs), "input", "/sim input")
-    if words[2] not in LEVELS:
-        raise Diagnostic(f'no level "{words[2]}"', "/sim input", "valid: 0 (ground), 1 (+V), open (neither)")
-    placed.device.advance(now)
-    world.set_input(number, LEVELS[words[2]], now)
-    placed.device.advance(now)
-
-
-def _analog(floor: Floor, words: list[str], now: float) -> None:
-    placed, world = floor.place(words[0], "/sim analog")
-    counts = _number(words[1], range(placed.unit.counts + 1), "analog value", "/sim analog")
-    placed.device.advance(now)
-    world.set_input(0, counts, now)
-    placed.device.advance(now)
-
-
-def _push(floor: Floor, words: list[str], now: float) -> None:
-    placed, world = floor.place(words[0], "/sim push")
-    steps = whole(words[1], -MOST_PUSH, MOST_PUSH)
-    if steps is None:
-        raise Diagnostic(f'no push "{words[1]}"', "/sim push", "valid: motor steps, such as 100 or -100")
-    placed.device.advance(now)
-    world.push(steps, now)
-    placed.device.advance(now)
-
-
-def _power(floor: Floor, words: list[str], now: float) -> None:
-    placed = floor.place(words[0], "/sim power")[0]
-    on = _on(words[1], "/sim power")
-    placed.device.advance(now)
-    placed.device.power(on, now)
-    floor.retune(placed.bus)
-
-
-def _supply(floor: Floor, words: list[str], now: float) -> None:
-    placed = floor.place(words[0], "/sim supply")[0]
-    if placed.unit.single_supply:
-        what = f'"{words[0]}" has one supply only'
-        raise Diagnostic(what, "/sim supply", f"/sim power {words[0]} {words[1]} switches it")
-    placed.device.supply(_on(words[1], "/sim supply"), now)
-
-
-def _lock(floor: Floor, words: list[str], now: float) -> None:
-    placed, world = floor.place(words[0], "/sim lock")
-    on = _on(words[1], "/sim lock")
-    placed.device.advance(now)
-    world.hold(on)
-    placed.device.world_changed()
-    placed.device.advance(now)
-
-
-def _bus(floor: Floor, name: str, where: str) -> Wire:
-    if name not in floor.wires:
-        raise Diagnostic(f'no bus "{name}"', where, f"valid: {', '.join(floor.wires)}")
-    return floor.wires[name]
-
-
-def _unplug(floor: Floor, words: list[str], now: float) -> None:
-    _bus(floor, words[0], "/sim unplug").unplug()
-
-
-def _plug(floor: Floor, words: list[str], now: float) -> None:
-    _bus(floor, words[0], "/sim plug").plug()
-
-
-MOST_PUSH = 999_999_999
-"""Motor steps."""
-_HANDS = {
-    "input": _input,
-    "analog": _analog,
-    "push": _push,
-    "power": _power,
-    "supply": _supply,
-    "lock": _lock,
-    "unplug": _unplug,
-    "plug": _plug,
-}
-VERBS = {word: Verb(usage, _HANDS[word]) for word, usage in USAGES.items()}

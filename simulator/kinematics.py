@@ -116,11 +116,7 @@ class Segment(NamedTuple):
         direction = self.direction
         ahead = (place - self.position) * direction
         if self.gain:
-            low, high = begin, until
-            for _ in range(_HALVINGS):
-                middle = (low + high) / 2
-                low, high = (middle, high) if (place - self.position_at(middle)) * direction > 0 else (low, middle)
-            return high
+            return _bisect(lambda t: place - self.position_at(t), direction, begin, until)
         root = self.velocity**2 + 2 * self.acceleration * direction * ahead
         pace = abs(self.velocity) + sqrt(max(root, 0.0))
         t = min(max(begin, self.start + (2 * ahead / pace if pace else 0.0)), until)
@@ -145,6 +141,19 @@ def ramp(segment: Segment, shape: Shape) -> list[Segment]:
 
 
 LINE = Shape()
+
+
+class Pace(NamedTuple):
+    """How a motion changes its speed: initial and highest speed, the rates up and down, the shapes of both ramps."""
+
+    vi: float
+    vm: float
+    a: float
+    d: float
+    up: Shape = LINE
+    down: Shape = LINE
+
+
 _TOUCH = 1e-6
 """Steps; less than this is rounding, and causes neither overshoot nor return."""
 
@@ -194,27 +203,28 @@ class Profile(NamedTuple):
         """The direction of the motion at a time, or of the last motion before: 1 or -1; 0 if it has not moved yet."""
         return next((segment.direction for segment in reversed(self.segments) if t >= segment.start), 0.0)
 
-    def turning(self, direction: float, after: float) -> float | None:
-        """Find the first time from `after` on at which it moves in a direction; None: never."""
+    def turning(self, direction: float, after: float) -> float:
+        """Find the first time from `after` on at which it moves in a direction; infinite: never."""
         for segment in self.ahead(after):
             if segment.direction * direction > 0:
                 return max(after, segment.start)
-        return None
+        return inf
 
-    def crossing(self, position: float, after: float, direction: float = 0.0) -> float | None:
-        """Find the first time from `after` on at which it is at a position or passes it; None: never.
+    def crossing(self, position: float, after: float, direction: float = 0.0) -> float:
+        """Find the first time from `after` on at which it is at a position or passes it; infinite: never.
 
         With a `direction` other than 0, only passing in that direction counts.
 
         At that time it is there, or past it by less than rounding, and never short of it. A motion that is at the
-        position at `after`, even as it leaves, gives `after`; a motor at rest there gives None.
+        position at `after`, even as it leaves, gives `after`; a motor at rest there never is.
         """
         for segment in self.ahead(after):
-            if not direction or segment.direction * direction >= 0:
-                found = self._crossing_in(segment, position, after)
-                if found is not None:
-                    return found
-        return None
+            way, begin, end = segment.direction, max(after, segment.start), segment.end
+            if (direction and way * direction < 0) or (position - segment.position_at(begin)) * way < 0:
+                continue
+            if end == inf or (position - self.position(end)) * way <= 0:
+                return segment.when_at(position, begin, end)
+        return inf
 
     def ahead(self, after: float) -> Sequence[Segment]:
         """Return the segments that are not over; where two meet only the later one."""
@@ -233,16 +243,6 @@ class Profile(NamedTuple):
             if t >= segment.start:
                 return segment
         return None
-
-    def _crossing_in(self, segment: Segment, position: float, after: float) -> float | None:
-        """Find the crossing within one segment, in which the velocity does not change its sign."""
-        direction, end = segment.direction, segment.end
-        begin = max(after, segment.start)
-        if (position - segment.position_at(begin)) * direction < 0:
-            return None
-        if end < inf and (position - self.position(end)) * direction > 0:
-            return None
-        return segment.when_at(position, begin, end)
 
 
 class _Path:
@@ -286,11 +286,7 @@ class _Path:
     def _add(self, duration: float, velocity: float, acceleration: float, distance: float) -> None:
         if duration > 0:
             shape = self.up if acceleration * velocity > 0 or not velocity else self.down
-            segment = Segment(self.t, duration, self.position, velocity, acceleration)
-            if shape.kind == LINEAR:
-                self.segments.append(segment)
-            else:
-                self.segments += ramp(segment, shape)
+            self.segments += ramp(Segment(self.t, duration, self.position, velocity, acceleration), shape)
             self.t += duration
         self.position += distance
 
@@ -299,58 +295,51 @@ def halt(at: float, position: float) -> Profile:
     return Profile(at, at, position, position)
 
 
-def move(
-    at: float,
-    p0: float,
-    v0: float,
-    target: float,
-    *,
-    vi: float,
-    vm: float,
-    a: float,
-    d: float,
-    up: Shape = LINE,
-    down: Shape = LINE,
-) -> Profile:
+def move(at: float, p0: float, v0: float, target: float, pace: Pace) -> Profile:
     """Move to a target from any position and velocity: a trapezoid, or a triangle if it is too near for `vm`.
 
     A motor that moves away from the target, or is too fast to stop there, decelerates, stops and comes back; from a
     speed above `vm` it decelerates to `vm`. `vi` is at least 0, the others are above it. A `vm` below `vi` replaces
     both.
     """
-    vi = min(vi, vm)
-    path = _Path(at, p0, up, down)
+    vm, a, d = pace.vm, pace.a, pace.d
+    vi = min(pace.vi, vm)
+    path = _Path(at, p0, pace.up, pace.down)
     speed = abs(v0)
     if speed:
         direction = copysign(1.0, v0)
         ahead = (target - p0) * direction
-        if ahead < 0 or _stop_length(speed, vi, d) > ahead + _TOUCH:
+        if ahead < 0 or _ramp_length(max(speed, vi), vi, d) > ahead + _TOUCH:
             if speed > vi:
                 path.ramp(direction, speed, vi, d)
             speed = 0.0
-    if path.position != target:
-        _run(path, target, max(speed, vi), vi=vi, vm=vm, a=a, d=d)
+    left, speed = target - path.position, max(speed, vi)
+    direction, distance = copysign(1.0, left), abs(left)
+    if not left:
+        return path.stop()
+    if speed > vm:
+        peak = vm
+        rest = distance - _ramp_length(speed, vm, d)
+        path.ramp(direction, speed, vm, d)
+    else:
+        summit = sqrt((2 * a * d * distance + d * speed * speed + a * vi * vi) / (a + d))
+        peak = max(min(summit, vm), speed)
+        rest = distance - _ramp_length(speed, peak, a)
+        path.ramp(direction, speed, peak, a)
+    if peak == vm:
+        path.cruise(direction, peak, rest - _ramp_length(peak, vi, d))
+    path.ramp_until(target, peak, vi)
     return path.stop()
 
 
-def slew(
-    at: float,
-    p0: float,
-    v0: float,
-    velocity: float,
-    *,
-    vi: float,
-    a: float,
-    d: float,
-    up: Shape = LINE,
-    down: Shape = LINE,
-) -> Profile:
+def slew(at: float, p0: float, v0: float, velocity: float, pace: Pace) -> Profile:
     """Change to a signed velocity, up with `a` and down with `d`, and keep it; 0: decelerate to `vi` and stop.
 
     A velocity below `vi` is reached at once, after decelerating to `vi` if the motor was faster. A reversal leads
     through a stop.
     """
-    path = _Path(at, p0, up, down)
+    vi, a, d = pace.vi, pace.a, pace.d
+    path = _Path(at, p0, pace.up, pace.down)
     speed = abs(v0)
     direction = copysign(1.0, v0)
     if v0 * velocity <= 0:
@@ -369,36 +358,13 @@ def slew(
     return path.go_on(velocity)
 
 
-def _run(path: _Path, target: float, speed: float, *, vi: float, vm: float, a: float, d: float) -> None:
-    """Move to the target ahead, from a speed that is not below `vi` and not too high to stop in time."""
-    left = target - path.position
-    direction, distance = copysign(1.0, left), abs(left)
-    if speed > vm:
-        peak = vm
-        rest = distance - _ramp_length(speed, vm, d)
-        path.ramp(direction, speed, vm, d)
-    else:
-        summit = sqrt((2 * a * d * distance + d * speed * speed + a * vi * vi) / (a + d))
-        peak = max(min(summit, vm), speed)
-        rest = distance - _ramp_length(speed, peak, a)
-        path.ramp(direction, speed, peak, a)
-    if peak == vm:
-        path.cruise(direction, peak, rest - _ramp_length(peak, vi, d))
-    path.ramp_until(target, peak, vi)
-
-
 def _ramp_length(speed: float, to: float, rate: float) -> float:
     """Steps of a ramp between two speeds."""
     return abs(to - speed) * (to + speed) / (2 * rate)
 
 
-def _stop_length(speed: float, vi: float, d: float) -> float:
-    """Steps from a speed to rest."""
-    return _ramp_length(speed, vi, d) if speed > vi else 0.0
-
-
-def meeting(one: Profile, other: Profile, shift: float, after: float) -> float | None:
-    """Find the first time from `after` on at which `one` reaches `other` plus `shift`; None: never."""
+def meeting(one: Profile, other: Profile, shift: float, after: float) -> float:
+    """Find the first time from `after` on at which `one` reaches `other` plus `shift`; infinite: never."""
 
     def gap(t: float) -> float:
         return one.position(t) - other.position(t) - shift
@@ -407,7 +373,7 @@ def meeting(one: Profile, other: Profile, shift: float, after: float) -> float |
     for low, high in _monotonous(one, other, after):
         if gap(high) * sign <= 0:
             return _bisect(gap, sign, low, high)
-    return None
+    return inf
 
 
 def _bisect(function: Callable[[float], float], sign: float, low: float, high: float) -> float:

@@ -67,7 +67,6 @@ def _rows(table: Table, folder: Folder, name: str) -> Iterator[tuple[float, ...]
 
 
 def _checked(table: Table, key: str, rows: tuple[tuple[float, ...], ...]) -> tuple[tuple[float, float], ...]:
-    """Check the rows of a curve. Raises Diagnostic."""
     if not 2 <= len(rows) <= MOST_ROWS:
         raise table.wrong(key, f"has {len(rows)} rows", f"valid: 2 to {MOST_ROWS}, each a speed and a torque")
     if rows[0][0] or not rows[0][1]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from math import inf
 from typing import Any, NamedTuple, Protocol
 
 from multidrop.dialects import Diagnostic
@@ -150,9 +151,25 @@ class Programs(NamedTuple):
     refusals: Callable[[str, str, str, Sequence[Problem]], list[Problem]] | None = None
 
 
-def next_look(due: float | None, now: float, limit: float) -> float:
-    """Return the time up to which a run advances at once: `SLICE` beyond the next event of the drive."""
-    return limit if due is None else min(max(due, now) + SLICE, limit)
+class Running(Protocol):
+    """A program that runs on a simulated drive: how many lines it has carried out."""
+
+    executed: int
+
+    @property
+    def running(self) -> bool: ...  # noqa: D102
+
+
+def looks(program: Running, deadline: Callable[[], float | None], until: float | None) -> Iterator[tuple[float, bool]]:
+    """Yield the times up to which a run advances at once, while its program runs: `SLICE` beyond the next event.
+
+    The second value: nothing would ever happen any more.
+    """
+    now, limit, most = 0.0, LONGEST if until is None else until, MOST_LINES if until is None else inf
+    while program.running and now < limit and program.executed < most:
+        due = deadline()
+        now = limit if due is None else min(max(due, now) + SLICE, limit)
+        yield now, due is None
 
 
 # The trace of a program file's run: a family names the next line of the file and its variables; `Recorder` makes events
@@ -243,7 +260,7 @@ def break_point(text: str, file: str, valid: str) -> BreakPoint:
 class Recorder:
     """Makes events of the lines of one run. `values` reads what is watched, `points` are by line of the file.
 
-    `broken`: a break point has ended the run.
+    `shown` makes the text of an event from a line of the file. `broken`: a break point has ended the run.
     """
 
     def __init__(
@@ -252,8 +269,10 @@ class Recorder:
         source: Sequence[str],
         points: Mapping[int, BreakPoint],
         values: Callable[[], Values],
+        shown: Callable[[str], str] = str.strip,
     ) -> None:
         self.broken = False
+        self._shown = shown
         self._debugging, self._source, self._points, self._values = debugging, source, points, values
         self._last = dict(values())
         self._traced = 0
@@ -269,27 +288,31 @@ class Recorder:
         """Whether nothing is recorded any more, and no break point can end the run."""
         return self.full and not self._points
 
-    def reaches(self, line: int) -> bool:
-        """Count a pass of the break point at a line, if there is one; return whether it was the last."""
+    def reaches(self, t: float, line: int) -> bool:
+        """Count a pass of the break point at a line, if there is one; the last one ends the run before that line."""
         point = self._points.get(line)
         if point is None:
             return False
         point.passes -= 1
-        return point.passes <= 0
-
-    def breaks(self, t: float, line: int, text: str) -> None:
-        """Record the end of the run before a line."""
-        point = self._points[line]
+        if point.passes > 0:
+            return False
         self.broken = True
         values = self._values() if self._debugging.watch else {}
-        self._events.append(Broken(t, point.place, line, text, dict(values), self._source))
+        self._events.append(Broken(t, point.place, line, self._text(line), dict(values), self._source))
+        return True
 
-    def after(self, t: float, line: int, text: str, changed: Values, program: int | None = None) -> None:
-        """Record an executed line that began at `t`, if it is wanted."""
-        if self.full or not (self._debugging.trace or changed):
+    def after(self, t: float, line: int, changed: Values | None = None, program: int | None = None) -> None:
+        """Record an executed line that began at `t`, if it is wanted. `changed` None: see what it has changed."""
+        if self.full:
             return
-        self._traced += 1
-        self._events.append(TraceFull(t) if self.full else Traced(t, line, text, changed, program))
+        changed = self.changed() if changed is None else changed
+        if self._debugging.trace or changed:
+            self._traced += 1
+            traced = Traced(t, line, self._text(line), changed, program)
+            self._events.append(TraceFull(t) if self.full else traced)
+
+    def _text(self, line: int) -> str:
+        return self._shown(self._source[line - 1]) if 0 < line <= len(self._source) else ""
 
     def changed(self) -> dict[str, Value]:
         """Return the values that have changed since the last time."""

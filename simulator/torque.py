@@ -67,9 +67,15 @@ class Torque:
         if not self.limited or profile.end <= after:
             return inf
         for segment in profile.ahead(after):
-            found = self._fails_in(segment, max(after, segment.start), share, turn)
-            if found < inf:
-                return found
+            rows = self._balance(segment, max(after, segment.start), share, turn)
+            found = [t for t, there, needed in rows[:1] if abs(needed) > there * (1 + LATE)]
+            for (low, first, was), (high, last, needed) in pairwise(rows):
+                for sign in (1, -1):  # driving and braking
+                    before, behind = first - sign * was, last - sign * needed
+                    if behind < -LATE * last:
+                        found.append(low if before <= 0 else low + (high - low) * before / (before - behind))
+            if found:
+                return min(found)
         return inf
 
     def used(self, profile: Profile, t: float, share: float, turn: float) -> float:
@@ -89,16 +95,6 @@ class Torque:
     def lag(self, profile: Profile, t: float, share: float, turn: float) -> float:
         """The steps by which the rotor lags its field."""
         return asin(self.used(profile, t, share, turn)) * 2 / pi * turn / FULL_STEPS
-
-    def _fails_in(self, segment: Segment, begin: float, share: float, turn: float) -> float:
-        rows = self._balance(segment, begin, share, turn)
-        found = [t for t, there, needed in rows[:1] if abs(needed) > there * (1 + LATE)]
-        for (low, first, was), (high, last, needed) in pairwise(rows):
-            for sign in (1, -1):  # driving and braking
-                before, behind = first - sign * was, last - sign * needed
-                if behind < -LATE * last:
-                    found.append(low if before <= 0 else low + (high - low) * before / (before - behind))
-        return min(found, default=inf)
 
     def _balance(self, segment: Segment, begin: float, share: float, turn: float) -> list[tuple[float, float, float]]:
         """The available and the needed torque at times between which both are straight lines."""

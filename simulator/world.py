@@ -8,7 +8,7 @@ inputs. Times are those of the caller; the schedule begins at `powered_up`.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from math import ceil, copysign, floor, inf, nextafter
+from math import copysign, inf, nextafter
 
 from multidrop.simulator.cell.spec import WorldSpec
 from multidrop.simulator.kinematics import Profile, halt
@@ -16,6 +16,10 @@ from multidrop.simulator.torque import LATE, Torque
 
 REVOLUTION = 51200.0
 """Motor steps of a turn: 200 full steps of 256 microsteps."""
+TOUCH = 1e-6
+"""Steps; less than this is rounding."""
+AFTER = (0.0, 1e-12, 1e-9, 1e-6)
+"""Seconds after which a switch that is passed is seen changed, whatever rounding does."""
 
 
 class World:
@@ -26,14 +30,13 @@ class World:
     torque: from 1 on the rotor does not turn. `pushed` is the sum of all pushes.
     """
 
-    def __init__(self, spec: WorldSpec, *, index: float = 0.0) -> None:
+    def __init__(self, spec: WorldSpec) -> None:
         self.home = (-inf, spec.home) if isinstance(spec.home, float | int) else spec.home
         self.limit_plus = spec.limit_plus
         self.limit_minus = spec.limit_minus
         self.stall_at = spec.stall_at
         self.load = spec.load
         self.torque = Torque(spec)
-        self.index = index
         self.pushed = 0.0
         self._locks = spec.locked
         self._edges = self._find_edges()
@@ -66,15 +69,12 @@ class World:
 
     def analog(self, now: float) -> int:
         """Counts on the analog input; 0 until it is set."""
-        self._catch_up(now)
-        return self._levels.get(0, 0)
+        return self.driven(now).get(0, 0)
 
-    def next_change(self, now: float) -> float | None:
-        """Time of the next scheduled change after `now`; None if there is none."""
+    def next_change(self, now: float) -> float:
+        """Time of the next scheduled change after `now`; infinite if there is none."""
         self._catch_up(now)
-        if self._done == len(self._schedule):
-            return None
-        return self._since + self._schedule[self._done][0]
+        return self._since + self._schedule[self._done][0] if self._done < len(self._schedule) else inf
 
     def set_input(self, n: int, level: int | None, now: float) -> None:
         """Set the level of input `n` from now on; None leaves it open. Number 0 is the analog input, in counts."""
@@ -139,33 +139,23 @@ class World:
             minus is not None and position <= minus,
         )
 
-    def next_switch(self, profile: Profile, after: float, offset: float = 0.0) -> float | None:
-        """Find the first time after `after` at which a switch differs from its state at `after`; None: never.
+    def next_switch(self, profile: Profile, after: float, offset: float = 0.0) -> float:
+        """Find the first time after `after` at which a switch differs from its state at `after`; infinite: never.
 
         At that time `switches` shows the change. `offset` makes the profile's positions physical.
         """
-        first: float | None = None
-        for edge in self._edges:
-            passed = profile.crossing(edge - offset, after)
-            if passed is not None:
-                t = self._changed(profile, edge - offset, passed, after, offset)
-                first = t if first is None or (t is not None and t < first) else first
-        return first
+        return min((self._passing(profile, edge - offset, after, offset) for edge in self._edges), default=inf)
 
-    def next_index(self, position: float, direction: float) -> float:
-        """Find the next index mark beyond a position, in a direction."""
-        turns = (position - self.index) / REVOLUTION
-        return self.index + REVOLUTION * (floor(turns) + 1 if direction > 0 else ceil(turns) - 1)
-
-    def _changed(self, profile: Profile, mark: float, t: float | None, after: float, offset: float) -> float | None:
-        """Find when passing one mark, first at `t`, has changed a switch visibly."""
-        before = self.switches(profile.position(after) + offset)
-        while t is not None:
-            for jump in (0.0, 1e-12, 1e-9, 1e-6):
+    def _passing(self, profile: Profile, mark: float, after: float, offset: float) -> float:
+        """Find when passing one mark has changed a switch visibly."""
+        t = profile.crossing(mark, after)
+        before = self.switches(profile.position(after) + offset) if t < inf else None
+        while t < inf:
+            for jump in AFTER:
                 if t + jump > after and self.switches(profile.position(t + jump) + offset) != before:
                     return t + jump
             t = profile.crossing(mark, max(t + 1e-6, nextafter(t, inf)))
-        return None
+        return inf
 
 
 # A shaft that a motor without feedback turns: what the commanded steps move, and what the shaft runs into.
@@ -174,9 +164,6 @@ class World:
 # held fast, or stalled until the command is at rest or turns back. Steps that it misses are lost, as nothing measures
 # it. Each stretch is the command's own profile in another scale, so walls and switches are found by formulas. A new
 # stretch begins where the profile or the scale changes.
-
-TOUCH = 1e-6
-"""Steps; less than this is rounding."""
 
 
 class Shaft:
@@ -222,8 +209,13 @@ class Shaft:
 
     def settle(self, t: float) -> None:
         """Take in what has changed at this time: pushes, walls, locks, current, scale."""
-        place = self._this_side(self.position(t) + self.world.pushed - self._pushed)
-        self._balance(t)
+        place, wall, command = self.position(t) + self.world.pushed - self._pushed, self.world.stall_at, self._command
+        if wall is not None and (wall - place) * self._wall < 0:
+            place = wall
+        if self._stalled and (not command.moving(t) or command.direction(t) != self._stalled):
+            self._stalled = 0.0
+        elif self.factor and not self._stalled and self._fails_at(t) <= t + LATE:
+            self._stalled = command.direction(t)
         factor = self._coupling(place, t)
         if factor != self.factor or self.world.pushed != self._pushed:
             self._pushed = self.world.pushed
@@ -234,23 +226,18 @@ class Shaft:
         yield self.world.next_lock(after)
         if after >= self._command.end:
             return
+        wall = self.world.stall_at
         if self._stalled:
-            turned = self._command.turning(-self._stalled, after)
-            yield self._command.end if turned is None else turned
+            yield min(self._command.turning(-self._stalled, after), self._command.end)
         elif self.factor:
             yield self._fails_at(after)
-        if not self.factor:
-            turning = self._command.turning(-self._wall * self._sense, after)
-            if turning is not None and self.world.stall_at is not None:
-                yield turning
-            return
-        switch = self.world.next_switch(self.path, after, self.offset)
-        if switch is not None:
-            yield switch
-        if self.world.stall_at is not None:
-            stall = self.path.crossing(self.world.stall_at - self.offset, after, self._wall)
-            if stall is not None:
-                yield stall
+        if self.factor:
+            yield self.world.next_switch(self.path, after, self.offset)
+        if wall is not None:
+            if self.factor:
+                yield self.path.crossing(wall - self.offset, after, self._wall)
+            else:
+                yield self._command.turning(-self._wall * self._sense, after)
 
     @property
     def _sense(self) -> float:
@@ -264,14 +251,6 @@ class Shaft:
     def _fails_at(self, after: float) -> float:
         return self.world.torque.fails_at(self.path, after, self.current, self._turn)
 
-    def _balance(self, t: float) -> None:
-        """See whether the motion stalls the shaft, or lets it turn again."""
-        command = self._command
-        if self._stalled and (not command.moving(t) or command.direction(t) != self._stalled):
-            self._stalled = 0.0
-        elif self.factor and not self._stalled and self._fails_at(t) <= t + LATE:
-            self._stalled = command.direction(t)
-
     def _coupling(self, place: float, t: float) -> float:
         """Motor steps that a commanded step turns at a place."""
         if not self.powered or self._stalled or self.world.locked(t):
@@ -280,12 +259,6 @@ class Shaft:
         at_wall = stall_at is not None and (stall_at - place) * self._wall <= TOUCH
         pushing = self._command.moving(t) and self._command.direction(t) * self._sense == self._wall
         return 0.0 if at_wall and pushing else self.scale
-
-    def _this_side(self, place: float) -> float:
-        """The place, or the wall where it is beyond."""
-        stall_at = self.world.stall_at
-        beyond = stall_at is not None and (stall_at - place) * self._wall < 0
-        return stall_at if stall_at is not None and beyond else place
 
     def _begin(self, factor: float, place: float, t: float) -> None:
         self.factor = factor

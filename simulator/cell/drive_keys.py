@@ -47,22 +47,18 @@ ENCODER_KEYS = ("index", "encoder", "slip")
 def common_keys(table: Table, folder: Folder) -> dict[str, Any]:
     """Read the keys of a drive that mean the same in every family, as arguments of DriveSpec. Raises Diagnostic."""
     name = table.text("program", "")
-    text = table.text(PROGRAM_TEXT, "")
-    if name and text:
+    text = held = table.text(PROGRAM_TEXT, "")
+    if name and held:
         raise table.wrong(PROGRAM_TEXT, "is given, and program too", "use one of them")
+    if name:
+        text = program_of(read_file(name, "program", table, folder, LARGEST_PROGRAM), name)[0]
     return {
         "personality": table.text("personality"),
-        "program": text or _program(name, table, folder),
-        "program_name": PROGRAM_TEXT if text else name,
+        "program": text,
+        "program_name": PROGRAM_TEXT if held else name,
         "instruction_us": table.number("instruction_us", 200.0, low=0.0, high=1e6),
         "cse": table.boolean("cse", False),
     }
-
-
-def _program(name: str, table: Table, folder: Folder) -> str:
-    if not name:
-        return ""
-    return program_of(read_file(name, "program", table, folder, LARGEST_PROGRAM), name)[0]
 
 
 def read_file(name: str, key: str, table: Table, folder: Folder, largest: int) -> bytes:
@@ -121,8 +117,9 @@ def _wrong_shape(table: Table, word: str) -> Diagnostic:
     return table.wrong(quoted(word), "must be a number or text", 'several lines: IS = ["1,1,0", "2,2,0"]')
 
 
-def read_identity(table: Table, texts: Collection[str], counters: Mapping[str, int]) -> Identity:
+def read_identity(drive: Table, texts: Collection[str], counters: Mapping[str, int]) -> Identity:
     """Read `identity`. `texts`: the valid ones of part, version and serial; `counters`: their axes, by key."""
+    table = drive.table("identity", "[bus.drive.identity]")
     table.only(*texts, *counters)
     given: dict[str, str] = {}
     for key in texts:
@@ -143,8 +140,9 @@ def _counts(table: Table, key: str, axes: int) -> tuple[int, ...]:
     return tuple(Table({key: each}, table.where).integer(key, 0, -INT32, INT32 - 1) for each in rows)
 
 
-def read_variables(table: Table, valid: Callable[[str], bool], hint: str) -> Mapping[str, int]:
+def read_variables(drive: Table, valid: Callable[[str], bool], hint: str) -> Mapping[str, int]:
     """Read `variables`: whole numbers by name."""
+    table = drive.table("variables", "[bus.drive.variables]")
     found: dict[str, int] = {}
     for word in table.values:
         name = word.upper()
@@ -209,7 +207,7 @@ def _in_steps(table: Table, axis: AxisScale) -> Table:
         if several and given.value < 0 and all(isinstance(each, str) for each in places):
             steps.reverse()
         values[key] = steps if several else steps[0]
-    return table.with_values(values)
+    return replace(table, values=values)
 
 
 def read_world(table: Table, inputs: Sequence[int], counts: int, axis: AxisScale = UNSCALED) -> WorldSpec:

@@ -33,14 +33,9 @@ class Folder:
         return Path(str(self.path)).resolve()
 
     def holds(self, place: Path) -> bool:
-        """Whether a path may be used; its folder is free of symbolic links."""
-        allowed = (self.real, *(way for each in self.allowed for way in (each.resolve(), _link(each))))
-        return any(place.is_relative_to(each) for each in allowed)
-
-
-def _link(path: Path) -> Path:
-    """A path that may be a symbolic link itself, in a folder without any."""
-    return path.parent.resolve() / path.name
+        """Whether a path may be used; its folder is free of symbolic links, and it may be one itself."""
+        links = [each.parent.resolve() / each.name for each in self.allowed]
+        return any(place.is_relative_to(each) for each in (self.real, *map(Path.resolve, self.allowed), *links))
 
 
 class Source(NamedTuple):
@@ -51,34 +46,29 @@ class Source(NamedTuple):
     own_units: tuple[str, ...] = ()
 
 
-NOWHERE = Source()
 Way = tuple[tuple[str, int], ...]
 """The way to a table: names, each with its number in a list of tables; 0: it is no list."""
 
 
+@dataclass(frozen=True)
 class Table:
-    """One table of a TOML file and its place. Every reader raises Diagnostic."""
+    """One table of a TOML file, its name in messages and the way to it. Every reader raises Diagnostic."""
 
-    def __init__(self, values: Mapping[str, Any], where: str, source: Source = NOWHERE, way: Way = ()) -> None:
-        self.values, self.where, self.source, self._way = values, where, source, way
+    values: Mapping[str, Any]
+    where: str
+    source: Source = Source()
+    way: Way = ()
 
     def at_line(self, key: str) -> str:
         """The place of a key with its line, where the text is known."""
-        line = line_of(self.source.text, self._way, key)
+        line = line_of(self.source.text, self.way, key)
         name = self.source.name
         return self.where.replace(name, f"{name}:{line}", 1) if line and name else self.where
-
-    def with_values(self, values: Mapping[str, Any]) -> Table:
-        return Table(values, self.where, self.source, self._way)
-
-    def placed(self, where: str) -> Table:
-        """The table by another name in messages."""
-        return Table(self.values, where, self.source, self._way)
 
     def merged(self, other: Table) -> Table:
         """Both tables as one, at the place of the other one if that has keys."""
         place = other if other.values else self
-        return Table({**self.values, **other.values}, place.where, self.source, place._way)
+        return Table({**self.values, **other.values}, place.where, self.source, place.way)
 
     def only(self, *keys: str) -> None:
         """Refuse any other key."""
@@ -172,7 +162,7 @@ class Table:
         value = self.values.get(key, {})
         if not isinstance(value, dict):
             raise self.wrong(key, f"must be a table, not {shown(value)}")
-        return Table(value, f"{self.where}: {name}", self.source, (*self._way, (key, 0)))
+        return Table(value, f"{self.where}: {name}", self.source, (*self.way, (key, 0)))
 
     def tables(self, key: str, name: str) -> list[Table]:
         """Read a list of tables within."""
@@ -180,7 +170,7 @@ class Table:
         if not isinstance(values, list) or not all(isinstance(each, dict) for each in values):
             raise self.wrong(key, f"must be tables that begin with {name}")
         return [
-            Table(each, f"{self.where}: {name} {number}", self.source, (*self._way, (key, number)))
+            Table(each, f"{self.where}: {name} {number}", self.source, (*self.way, (key, number)))
             for number, each in enumerate(values, 1)
         ]
 

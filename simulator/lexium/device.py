@@ -7,8 +7,7 @@ and counters: lines that are carried out as if they were sent.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from functools import lru_cache, partial
+from functools import lru_cache
 from typing import NamedTuple
 
 from multidrop.dialects import Diagnostic
@@ -33,8 +32,6 @@ WORDS = {"position": "P"}
 """Words by the key of a counter in `identity`; the other keys are words."""
 PASSES = 3
 """Times that `set` is carried out: until nothing is refused any more, and what that has scaled is set again."""
-Execute = Callable[[str], str]
-"""Carries out a line; returns the reason for a refusal, empty for none."""
 SHORTEST_US = 1.0
 """No line takes less, so that a loop always ends at some time."""
 parsed = lru_cache(maxsize=1024)(parse)
@@ -54,7 +51,9 @@ class MCodeDevice(EventLoop):
 
     def __init__(self, spec: DriveSpec, world: World) -> None:
         self.spec, self.world = spec, world
-        self.memory = memory = _memory(spec)
+        self.memory = memory = Memory(spec.personality)
+        own, model = spec.identity, memory.model
+        memory.model = model._replace(part=own.part or model.part, version=own.version or model.version)
         period = max(spec.instruction_us, SHORTEST_US) / 1e6
         core = Core(memory, world, period, lambda line: self.language.compile_stored(line))
         self.program, self.errors, self._mode = core.program, core.errors, core.mode
@@ -63,14 +62,13 @@ class MCodeDevice(EventLoop):
         motor.inputs.put_out = outputs.put_out
         self.nvm = Nvm(core, motor, outputs)
         super().__init__(core, motor, outputs, Power(core, motor, outputs, self.nvm))
-        serial = spec.identity.serial or f"0401{ord(spec.name[:1] or '!'):05d}"
-        self.language = Instructions(serial, self)
+        self.language = Instructions(own.serial or f"0401{ord(spec.name[:1] or '!'):05d}", self)
         _set_up(self, spec)
         self.power_unit.boot()
         # Let the counters begin where a snapshot found them: P first, then what P does not say. Raises Diagnostic.
-        counters = {WORDS.get(key, key): value for key, (value,) in spec.identity.counters.items()}
+        counters = {WORDS.get(key, key): value for key, (value,) in own.counters.items()}
         for word in sorted(counters, key=lambda word: word != "P"):
-            _accepted(f"{word}={counters[word]}", f"drive {spec.name}: identity", partial(_reason, self))
+            _accept(self, f"{word}={counters[word]}", f"drive {spec.name}: identity")
 
     # What is read.
 
@@ -83,17 +81,9 @@ class MCodeDevice(EventLoop):
         return self.bridges.powered
 
     @property
-    def boots(self) -> int:
-        return self.power_unit.boots
-
-    @property
     def running(self) -> bool:
         """BY."""
         return self.thread.running
-
-    @property
-    def stepping(self) -> bool:
-        return self.thread.stepping
 
     @property
     def programming(self) -> int | None:
@@ -106,7 +96,6 @@ class MCodeDevice(EventLoop):
         return counters.shown(counters.source, now)
 
     def align(self, _: str, position: int, now: float) -> None:
-        """Stand at a position."""
         self.advance(now)
         self.motor.stop(now)
         self.execute(f"P={position}", now, immediate=True)
@@ -201,70 +190,47 @@ class MCodeDevice(EventLoop):
         self.advance(now)
         self.power_unit.switch(on)
 
-    def world_changed(self) -> None:
-        """Look at the world again: `/sim` has changed it."""
-        self._timeline.replan()
-
     def supply(self, on: bool, now: float) -> None:
         """Switch +V alone, with the auxiliary supply left on (manual 5.1.127)."""
         self.advance(now)
         self.power_unit.supply(on)
 
 
-def _memory(spec: DriveSpec) -> Memory:
-    memory, own = Memory(spec.personality), spec.identity
-    memory.model = memory.model._replace(
-        part=own.part or memory.model.part, version=own.version or memory.model.version
-    )
-    return memory
+def _set_up(device: MCodeDevice, spec: DriveSpec) -> None:
+    """Put what the spec says into NVM. What the inputs are meanwhile is nothing to react to. Raises Diagnostic.
 
-
-def _assign(spec: DriveSpec, execute: Execute) -> None:
-    """Carry out `set`. One line may need another first, and MS and EE change speeds. Raises Diagnostic.
-
-    A line that was accepted once may be refused later and be in force all the same: MF, when VM is below it.
-
-    AS comes last, as the motor may turn from there on; EE just before it, so that speeds in steps stay in steps.
+    One line of `set` may need another first, and MS and EE change speeds. A line that was accepted once may be refused
+    later and be in force all the same: MF, when VM is below it. AS comes last, as the motor may turn from there on; EE
+    just before it, so that speeds in steps stay in steps.
     """
+    inputs, where = device.motor.inputs, f"drive {spec.name}"
+    inputs.begin(0.0)
+    inputs.watched = False
+    for name, value in spec.variables.items():
+        _accept(device, f"VA {name}={value}", f"{where}: variables")
+    for number, line in enumerate(split_lines(spec.program), 1):
+        _accept(device, line, f"{spec.program_name or 'program'}:{number}")
+    device.core.mode.address = None
+    device.core.thread.finish()
+    device.motor.stop(0.0)
+    device.memory.texts["DN"] = spec.name
     lines = [*spec.assignments(), *([("PY", "1")] if spec.party else [])]
     last = ("EE", "AS") if spec.set.get("AS") else ("AS",)
     late = [each for name in last for each in lines if each[0] == name]
     early = [each for each in lines if each not in late]
     refused = early
     for _ in range(PASSES):
-        again = [each for each in early if execute("=".join(each))]
+        again = [each for each in early if device.execute("=".join(each), 0.0).refused]
         refused = [each for each in refused if each in again]
     for each in (*late, *refused):
-        _accepted("=".join(each), f"drive {spec.name}: set", execute)
-
-
-def _accepted(line: str, where: str, execute: Execute) -> None:
-    if why := execute(line):
-        raise Diagnostic(f"{line.strip()}: {why}", where)
-
-
-def _set_up(device: MCodeDevice, spec: DriveSpec) -> None:
-    """Put what the spec says into NVM. What the inputs are meanwhile is nothing to react to. Raises Diagnostic."""
-    execute, inputs = partial(_reason, device), device.motor.inputs
-    inputs.begin(0.0)
-    inputs.watched = False
-    # Declare the variables, and store the program. Raises Diagnostic.
-    for name, value in spec.variables.items():
-        _accepted(f"VA {name}={value}", f"drive {spec.name}: variables", execute)
-    for number, line in enumerate(split_lines(spec.program), 1):
-        _accepted(line, f"{spec.program_name or 'program'}:{number}", execute)
-    device.core.mode.address = None
-    device.core.thread.finish()
-    device.motor.stop(0.0)
-    device.memory.texts["DN"] = spec.name
-    _assign(spec, execute)
+        _accept(device, "=".join(each), f"{where}: set")
     device.nvm.keep()
     inputs.watched = True
 
 
-def _reason(device: MCodeDevice, line: str) -> str:
-    """Carry out a line at the start; return the reason for its refusal, empty for none."""
-    if not device.execute(line, 0.0).refused:
-        return ""
-    code, product = device.errors.code, device.spec.personality
-    return f"refused by an {product}: error {code}, {error_text(code, product)}"
+def _accept(device: MCodeDevice, line: str, where: str) -> None:
+    """Have a drive carry out a line at the start. Raises Diagnostic with the reason for its refusal."""
+    if device.execute(line, 0.0).refused:
+        code, product = device.errors.code, device.spec.personality
+        why = f"refused by an {product}: error {code}, {error_text(code, product)}"
+        raise Diagnostic(f"{line.strip()}: {why}", where)

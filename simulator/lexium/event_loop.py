@@ -43,9 +43,6 @@ class EventLoop:
         self.calm = False
         self._before: tuple[bool, bool, int] | None = None
         self._next: Event = inf, nothing
-        jogs = dict.fromkeys(JOGS, motor.update_jog)
-        self._risen = {GO: self._go, SOFT_STOP: self._soft_stop, PAUSE: self._pause, RESET: self._reset, **jogs}
-        self._fallen = {PAUSE: self._resume, **jogs}
 
     def proceed(self, now: float) -> float | None:
         """Let time pass up to `now`, or to where there is news; return when that is, None for nothing.
@@ -94,7 +91,6 @@ class EventLoop:
         return thread.running == running and (not thread.live or thread.next_at > now)
 
     def _comes_up(self, now: float) -> bool:
-        """Return whether it has booted by now."""
         boots_at = self.power_unit.boots_at
         if boots_at is None or boots_at > now:
             return False
@@ -153,7 +149,6 @@ class EventLoop:
         inputs, motor, now = self._inputs, self.motor, self._timeline.now
         risen, fallen = inputs.refresh(now)
         motor.look(now)
-        motor.look_at_limits()
         if not (risen or fallen):
             return False
         for n, active in (*((n, True) for n in risen), *((n, False) for n in fallen)):
@@ -168,12 +163,23 @@ class EventLoop:
     # Inputs.
 
     def _changed(self, kind: int, active: bool) -> None:
-        """Act on an input of a type that has become active or inactive."""
-        act = (self._risen if active else self._fallen).get(kind)
-        if act is None:
-            return
+        thread, motor = self.thread, self.motor
         try:
-            act()
+            if kind in JOGS:
+                motor.update_jog()
+            elif kind == PAUSE and active and thread.running and not thread.paused:
+                motor.pause_program()
+            elif kind == PAUSE and not active and thread.paused:
+                motor.resume_program()
+            elif kind == GO and active and not thread.running:
+                self.interpreter.start(GO_ADDRESS, self._timeline.now)
+            elif kind == SOFT_STOP and active:
+                self._soft_stop()
+            elif kind == RESET and active:
+                # SU takes a moment to start, or one that sets up such an input would reset the drive in no time.
+                self.power_unit.restart()
+                if thread.running:
+                    thread.next_at = self._timeline.now + RESET_TIME
         except Fault as fault:
             self.interpreter.raise_error(fault.code)
 
@@ -189,24 +195,6 @@ class EventLoop:
             self._changed(kind, True)
         if self.motor.jog or kind in JOGS:
             self.motor.update_jog()
-
-    def _go(self) -> None:
-        if not self.thread.running:
-            self.interpreter.start(GO_ADDRESS, self._timeline.now)
-
-    def _pause(self) -> None:
-        if self.thread.running and not self.thread.paused:
-            self.motor.pause_program()
-
-    def _resume(self) -> None:
-        if self.thread.paused:
-            self.motor.resume_program()
-
-    def _reset(self) -> None:
-        """Restart. SU takes a moment to start, or one that sets up such an input would reset the drive in no time."""
-        self.power_unit.restart()
-        if self.thread.running:
-            self.thread.next_at = self._timeline.now + RESET_TIME
 
     def _soft_stop(self) -> None:
         t, thread, motor = self._timeline.now, self.thread, self.motor

@@ -46,7 +46,6 @@ KEY_OF = {"DN": "name", "PY": "party"}
 
 
 def read_drive(table: Table, folder: Folder) -> DriveSpec:
-    """Read the table of one drive. Raises Diagnostic."""
     common = common_keys(table, folder)
     personality = common["personality"]
     name = table.text("name", "!")
@@ -54,8 +53,6 @@ def read_drive(table: Table, folder: Folder) -> DriveSpec:
         raise table.wrong("name", f"cannot be {quoted(name)}", "valid: one of a-z, A-Z, 0-9 or !")
     model, known = MODELS[personality], words(personality)
     counters = ["position", *(name for name in ("C1", "C2") if name in known and personality in known[name].products)]
-    variables = table.table("variables", "[bus.drive.variables]")
-    identity = table.table("identity", "[bus.drive.identity]")
     world = table.table("world", "[bus.drive.world]")
     world.only(*WORLD_KEYS)
     settings, scales = read_settings(table.table("set", "set"), _checker(personality)), read_units(table)
@@ -67,8 +64,8 @@ def read_drive(table: Table, folder: Folder) -> DriveSpec:
         **common,
         name=name,
         party=table.boolean("party", False),
-        variables=read_variables(variables, valid, "as in Q1"),
-        identity=read_identity(identity, ("part", "version", "serial"), dict.fromkeys(counters, 1)),
+        variables=read_variables(table, valid, "as in Q1"),
+        identity=read_identity(table, ("part", "version", "serial"), dict.fromkeys(counters, 1)),
         set=settings,
         world=read_world(world, model.points.inputs, model.points.analog, _axis_scale(personality, settings, scales)),
         units=scales,
@@ -85,7 +82,6 @@ def _axis_scale(personality: str, settings: Mapping[str, Value], scales: Mapping
 
 
 def _checker(personality: str) -> Check:
-    """Make the check of a mnemonic of `set`, and of its value."""
 
     def check(table: Table, word: str, value: Value) -> None:
         if (key := KEY_OF.get(word.upper())) is not None:

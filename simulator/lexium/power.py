@@ -78,9 +78,6 @@ class Nvm:
         self._motor.limits.software.update({**FRESH, **store.limits})
         self._motor.trips.restore(store.trips)
 
-    def load_program(self) -> None:
-        self._program.load(self.store.program)
-
     def _moving(self) -> bool:
         return self._motor.status.moving(self._timeline.now)
 
@@ -127,7 +124,6 @@ class Power:
         self.boot()
 
     def supply(self, on: bool) -> None:
-        """Switch +V alone, with the auxiliary supply left on."""
         if self._motor.supply(on, self._timeline.now):
             self._core.interpreter.raise_error(E.MOTOR_VOLTAGE)
             self._motor.trips.power_lost(self._timeline.now)
@@ -140,7 +136,7 @@ class Power:
         memory.defaults()
         self._outputs.defaults()
         self.nvm.load()
-        self.nvm.load_program()
+        core.program.load(self.nvm.store.program)
         core.errors.clear()
         memory.await_input("")
         core.mode.address = None

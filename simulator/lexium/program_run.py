@@ -32,8 +32,6 @@ from multidrop.simulator.lexium.state.expressions import Read
 from multidrop.simulator.lexium.state.models import MODELS
 from multidrop.simulator.lexium.state.program_memory import SPACE
 from multidrop.simulator.program_run import (
-    LONGEST,
-    MOST_LINES,
     NO_DEBUGGING,
     BreakPoint,
     Debugging,
@@ -46,7 +44,7 @@ from multidrop.simulator.program_run import (
     Value,
     Values,
     break_point,
-    next_look,
+    looks,
 )
 from multidrop.simulator.world import World
 
@@ -128,7 +126,7 @@ class ProgramRun:
         self._device.prints()
         self._stored: dict[int, ProgramLine] = {}
         self._executed: dict[int, ProgramLine] = {}
-        self._held = ""
+        self._held, self._stuck = "", False
         self._errors: list[int] = []
         self._active: tuple[int, ...] = ()
         self._switched: list[Event] = []
@@ -240,16 +238,12 @@ class ProgramRun:
 
     def _before(self, line: int) -> bool:
         found, recorder = self._executed.get(line), self._recorder
-        if found is None or recorder is None or not recorder.reaches(found.number):
-            return False
-        recorder.breaks(self._device.now, found.number, self._source[found.number - 1].strip())
-        return True
+        return found is not None and recorder is not None and recorder.reaches(self._device.now, found.number)
 
     def _after(self, line: int) -> None:
         found, recorder = self._executed.get(line), self._recorder
-        if found is not None and recorder is not None and not recorder.full:
-            text = self._source[found.number - 1].strip()
-            recorder.after(self._device.now, found.number, text, recorder.changed())
+        if found is not None and recorder is not None:
+            recorder.after(self._device.now, found.number)
 
     def _outputs(self, line: int) -> None:
         device = self._device
@@ -261,21 +255,16 @@ class ProgramRun:
     # Running.
 
     def _execute(self, until: float | None) -> Iterator[Event]:
-        device, interpreter = self._device, self._interpreter
-        limit = LONGEST if until is None else until
-        most = MOST_LINES if until is None else inf
-        stuck = False
-        while device.running and device.now < limit and interpreter.executed < most:
-            due = device.deadline
-            stuck = due is None
-            device.advance(next_look(due, device.now, limit), program=True)
+        device = self._device
+        for look, self._stuck in looks(device.thread, lambda: device.deadline, until):
+            device.advance(look, program=True)
             yield from self._news()
             if self._recorder is not None and self._recorder.done:
-                interpreter.watch(None, None)
+                self._interpreter.watch(None, None)
         if self._held:
             yield Printed(device.now, self._held)
         if device.running:
-            yield self._summary("until", given_up=until is None, stuck=stuck)
+            yield self._summary("until", given_up=until is None)
         elif self._recorder is not None and self._recorder.broken:
             yield self._summary("break")
         else:
@@ -308,11 +297,11 @@ class ProgramRun:
             index -= 1
         return self._executed.get(index, self._lines[0])
 
-    def _summary(self, ended: str, given_up: bool = False, stuck: bool = False) -> Summary:
+    def _summary(self, ended: str, given_up: bool = False) -> Summary:
         device, errors = self._device, tuple(self._errors)
         end = device.motion(device.now)
         position, moving = end.position, end.velocity
-        moves, instructions = device.language.motions.begun, self._interpreter.executed
+        moves, instructions = device.language.motions.begun, device.thread.executed
         line = self._at(self._interpreter.line()).number if self._executed else 0
         failed = f"errors {', '.join(str(each) for each in errors)}" if errors else "no errors"
         turning = f"the motor still turns, {moving} steps/s; H before E waits for it"
@@ -326,7 +315,7 @@ class ProgramRun:
             lines_at=(line,),
             moving=moving,
             given_up=given_up,
-            stuck=stuck,
+            stuck=self._stuck and ended == "until",
             ran=line > 0,
             counts=f"position {position}, {counted(moves, 'motion')}, {counted(instructions, 'line')}, {failed}",
             turning=turning if moving and ended == "E" else "",
@@ -334,7 +323,6 @@ class ProgramRun:
 
 
 def read(text: str, file: str) -> Load:
-    """Read the text of a file. Raises Diagnostic."""
     lines, source = program_file.read(text, file), split_lines(text)
     return lambda spec: ProgramRun(spec, lines, file, source)
 

@@ -20,7 +20,7 @@ from enum import Enum
 from math import inf
 
 from multidrop.simulator.cell.spec import WorldSpec
-from multidrop.simulator.kinematics import Profile
+from multidrop.simulator.kinematics import Pace, Profile
 from multidrop.simulator.pmx.pulses import (
     HOME,
     INDEX,
@@ -31,7 +31,6 @@ from multidrop.simulator.pmx.pulses import (
     STATES,
     Doing,
     LoopStatus,
-    Pace,
     Pulses,
     Rotor,
     paced,
@@ -162,7 +161,6 @@ class Axis:
             self.start(Doing.STOPPING, pulses.to_speed(0.0, t, pulses.pace), t, pulses.pace)
 
     def halt(self, t: float) -> None:
-        """Stop at once, whatever is at work."""
         self.homing = None
         self.pulses.rest(t)
 
@@ -174,7 +172,6 @@ class Axis:
             self.loop.stay(t)
 
     def next_event(self, after: float) -> float:
-        """The time of its next event; infinite: none."""
         times = [*self.rotor.events(after)]
         if self.pulses.profile.moving(after):
             times += [self.pulses.profile.end, self.loop.alarm(after)]
@@ -183,11 +180,11 @@ class Axis:
         return min((at for at in times if at > after), default=inf)
 
     def live(self, t: float) -> None:
-        """See what has happened by `t`, and what follows from it at once."""
         for _ in range(8):
             before = self.pulses.profile
             self.rotor.settle(t)
-            self._meet_limits(t)
+            if before.moving(t):
+                self._meet_limits(before.direction(t), t)
             done = self.pulses.doing
             if done is not Doing.NOTHING and self.homing is None and self.pulses.profile.end <= t + LATE:
                 self.pulses.rest(t)  # the target is what the motion was for, or where it was stopped
@@ -202,14 +199,10 @@ class Axis:
             if self.pulses.profile is before:
                 return
 
-    def _meet_limits(self, t: float) -> None:
-        if not self.pulses.profile.moving(t):
-            return
+    def _meet_limits(self, direction: float, t: float) -> None:
         _, plus, minus = self.switches(t)
-        direction = self.pulses.profile.direction(t)
-        if not (plus and direction > 0 or minus and direction < 0):
-            return
-        if self.homing and self.homing.awaited is Until.LIMIT and direction == self.homing.direction:
+        sought = self.homing and self.homing.awaited is Until.LIMIT and direction == self.homing.direction
+        if sought or not (plus and direction > 0 or minus and direction < 0):
             return
         self.halt(t)
         if not self.settings["IERR"]:
@@ -289,8 +282,7 @@ class Loop:
             return inf
         here, delta = self._pulses.profile.position(after), self.delta(after)
         edge = self._axis["SLE"] + _HALF + _NEAR
-        times = (self._pulses.profile.crossing(here + (side - delta) / slope, after) for side in (edge, -edge))
-        return min((at for at in times if at is not None), default=inf)
+        return min(self._pulses.profile.crossing(here + (side - delta) / slope, after) for side in (edge, -edge))
 
     def watch(self, t: float) -> None:
         """Check the delta: stop on an error, correct the rest when the motor is at rest."""
@@ -378,7 +370,7 @@ class Homing:
 
     def slow(self, on: bool = False) -> None:
         """Decelerate to low speed, and stop there or go on."""
-        self._start(self._pulses.to_speed(self.direction * self.pace.low if on else 0.0, self._now, self.pace))
+        self._start(self._pulses.to_speed(self.direction * self.pace.vi if on else 0.0, self._now, self.pace))
 
     def go(self, place: float) -> None:
         self._start(self._pulses.to_place(place, self._now, self.pace))
@@ -432,7 +424,7 @@ class Homing:
 
 def home_input(homing: Homing) -> Steps:
     """`H`: move at high speed to the home input; 0 is there, the motor stops a ramp beyond it (7.10.1)."""
-    homing.run(homing.direction, homing.pace.high)
+    homing.run(homing.direction, homing.pace.vm)
     yield Until.HOME
     homing.zero()
     homing.slow()
@@ -442,7 +434,7 @@ def home_input(homing: Homing) -> Steps:
 
 def limit(homing: Homing) -> Steps:
     """`L`: move at high speed to the limit, and back by LCA; 0 is there (7.10.2)."""
-    homing.run(homing.direction, homing.pace.high)
+    homing.run(homing.direction, homing.pace.vm)
     yield Until.LIMIT
     homing.stop()
     homing.go(homing.here + homing.correction("LCA"))
@@ -453,7 +445,7 @@ def limit(homing: Homing) -> Steps:
 
 def home_and_index(homing: Homing) -> Steps:
     """`ZH`: move to the home input, and on at low speed to the next index mark, which is 0 (7.10.3)."""
-    homing.run(homing.direction, homing.pace.high)
+    homing.run(homing.direction, homing.pace.vm)
     yield Until.HOME
     homing.slow(on=True)
     yield Until.SLOW
@@ -464,7 +456,7 @@ def home_and_index(homing: Homing) -> Steps:
 
 def index(homing: Homing) -> Steps:
     """`Z`: move at low speed to the next index mark, which is 0 (7.10.4)."""
-    homing.run(homing.direction, homing.pace.low)
+    homing.run(homing.direction, homing.pace.vi)
     yield Until.INDEX
     homing.stop()
     homing.zero()
@@ -472,18 +464,18 @@ def index(homing: Homing) -> Steps:
 
 def home_twice(homing: Homing) -> Steps:
     """`HL`: move to the home input, back past it by HCA, and at low speed to it again, which is 0 (7.10.5)."""
-    homing.run(homing.direction, homing.pace.high)
+    homing.run(homing.direction, homing.pace.vm)
     yield Until.HOME
     homing.zero()
     homing.slow()
     yield Until.END
     homing.stop()
-    homing.run(-homing.direction, homing.pace.high)
+    homing.run(-homing.direction, homing.pace.vm)
     yield Until.AWAY
     homing.go(homing.here + homing.correction("HCA"))
     yield Until.END
     homing.stop()
-    homing.run(homing.direction, homing.pace.low)
+    homing.run(homing.direction, homing.pace.vi)
     yield Until.HOME
     homing.zero()
     homing.stop()

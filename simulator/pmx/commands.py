@@ -198,52 +198,41 @@ def set_register(pmx: PmxController, name: str, text: str, t: float) -> None:
 # -- forms --------------------------------------------------------------------------------------------------------
 
 
-def _direction(sign: str) -> float:
-    return 1.0 if sign == "+" else -1.0
-
-
-def _home(pmx: PmxController, t: float, word: str, axis: str, sign: str) -> None:
-    motions.home(pmx.axis(axis), word, _direction(sign), t)
-
-
-def _jog(pmx: PmxController, t: float, axis: str, sign: str) -> None:
-    motions.jog(pmx.axis(axis), _direction(sign), t)
-
-
-def _jog_both(pmx: PmxController, t: float, sign: str) -> None:
-    for axis in pmx.axes:
-        motions.check(axis, t)
-        axis.own_pace()
-    for axis in pmx.axes:
-        motions.jog(axis, _direction(sign), t)
-
-
-def _move(pmx: PmxController, t: float, axis: str, target: str) -> None:
-    pmx.go(pmx.axis(axis), number(target), t)
-
-
-def _move_both(pmx: PmxController, t: float, x: str, y: str) -> None:
-    pmx.go_both((number(x), number(y)), t)
-
-
-def _retarget(pmx: PmxController, t: float, axis: str, target: str) -> None:
-    motions.retarget(pmx.axis(axis), number(target), t)
-
-
 _NUMBER = r"([+-]?\d{1,10})"
-_FORMS: tuple[tuple[re.Pattern[str], Callable[..., None]], ...] = tuple(
-    (re.compile(pattern, re.ASCII), run)
-    for pattern, run in (
-        (rf"([XY]){_NUMBER}", _move),
-        (rf"X{_NUMBER}Y{_NUMBER}", _move_both),
-        (rf"I{_NUMBER}: ?{_NUMBER}", _move_both),
-        (rf"T([XY]){_NUMBER}", _retarget),
-        (r"J([+-])", _jog_both),
-        (r"J([XY])([+-])", _jog),
-        (r"(HL|H|L|ZH|Z)([XY])([+-])", _home),
+_FORMS: tuple[tuple[re.Pattern[str], str], ...] = tuple(
+    (re.compile(pattern, re.ASCII), form)
+    for pattern, form in (
+        (rf"([XY]){_NUMBER}", "move"),
+        (rf"X{_NUMBER}Y{_NUMBER}", "line"),
+        (rf"I{_NUMBER}: ?{_NUMBER}", "line"),
+        (rf"T([XY]){_NUMBER}", "retarget"),
+        (r"J()([+-])", "jog"),
+        (r"J([XY])([+-])", "jog"),
+        (r"(HL|H|L|ZH|Z)([XY])([+-])", "home"),
     )
 )
-"""Commands that are no word with a value; a function takes controller, time and the groups. Raises Refusal."""
+"""Commands that are no word with a value."""
+
+
+def _move(pmx: PmxController, form: str, given: tuple[str, ...], t: float) -> None:
+    """Carry out a command of one of the forms, with what is given in it. Raises Refusal."""
+    *_, named, last = given
+    match form:
+        case "move":
+            pmx.go(pmx.axis(named), number(last), t)
+        case "line":
+            pmx.go_both((number(named), number(last)), t)
+        case "retarget":
+            motions.retarget(pmx.axis(named), number(last), t)
+        case "home":
+            motions.home(pmx.axis(named), given[0], 1.0 if last == "+" else -1.0, t)
+        case "jog":
+            axes = (pmx.axis(named),) if named else pmx.axes
+            for axis in axes:
+                motions.check(axis, t)
+                axis.own_pace()
+            for axis in axes:
+                motions.jog(axis, 1.0 if last == "+" else -1.0, t)
 
 
 # -- the path of a command ----------------------------------------------------------------------------------------
@@ -277,9 +266,9 @@ def _answer(pmx: PmxController, text: str, t: float) -> str | None:
     indexed = _INDEXED.fullmatch(head)
     if indexed and indexed[1] in (*BIT_WORDS, "JL", "JV"):
         return _answer_bit(pmx, indexed[1], int(indexed[2]), given, t)
-    for pattern, run in _FORMS:
+    for pattern, form in _FORMS:
         if found := pattern.fullmatch(text):
-            run(pmx, t, *found.groups())
+            _move(pmx, form, found.groups(), t)
             return OK
     return None
 

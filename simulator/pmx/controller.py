@@ -134,7 +134,6 @@ class PmxController:
         self.look(now)
 
     def power_up(self, now: float) -> None:
-        """Begin with what flash holds."""
         self.powered, self.now = True, now
         self.settings.power_up()
         self.incremental = False
@@ -152,7 +151,6 @@ class PmxController:
         self.look(now)
 
     def supply(self, on: bool, now: float) -> None:
-        """Switch the drivers' power; the controller keeps counting."""
         self.supplied = on
         self.look(now)
 

@@ -55,40 +55,29 @@ def answer_program(programs: Programs, text: str, t: float) -> str | None:
     word, index = found[1], int(found[2])
     if index >= COUNTS[word]:
         return f"?{text}" if COUNTS[word] == PROGRAMS else INDEX
+    reply = ""
     try:
-        reply = _set(programs, word, index, value, t) if sign else _get(programs, word, index, t)
+        match word, sign:
+            case "GS", "":
+                reply = OK if programs.call(index, t) else "?Sub not Initialized"
+            case "SA", "":
+                reply = programs.memory.line(index)
+            case "SA", "=":
+                reply = OK if programs.memory.store(index, value) else INVALID
+            case "SASTAT", "":
+                reply = str(programs.status(index))
+            case "SPC", "":
+                reply = str(programs.counter(index))
+            case "SR", "=":
+                reply = OK if programs.control(index, number(value, 0, 3), t) else INVALID
+            case "V", "":
+                reply = str(programs.variables[index])
+            case "V", "=":
+                programs.variables[index] = number(value)
+                reply = OK
     except Refusal as refusal:
         reply = str(refusal)
     return reply or f"?{text}"
-
-
-def _get(programs: Programs, word: str, index: int, t: float) -> str:
-    """The reply to a word without a value; empty: it has no such use."""
-    match word:
-        case "GS":
-            return OK if programs.call(index, t) else "?Sub not Initialized"
-        case "SA":
-            return programs.memory.line(index)
-        case "SASTAT":
-            return str(programs.status(index))
-        case "SPC":
-            return str(programs.counter(index))
-        case "V":
-            return str(programs.variables[index])
-    return ""
-
-
-def _set(programs: Programs, word: str, index: int, text: str, t: float) -> str:
-    """The reply to a word with a value; empty: it has no such use. Raises Refusal."""
-    match word:
-        case "SA":
-            return OK if programs.memory.store(index, text) else INVALID
-        case "SR":
-            return OK if programs.control(index, number(text, 0, 3), t) else INVALID
-        case "V":
-            programs.variables[index] = number(text)
-            return OK
-    return ""
 
 
 class PmxDevice:
@@ -142,9 +131,6 @@ class PmxDevice:
         self.controller.heard(now)
         reply = answer_program(self.programs, text, now)
         return self.controller.ask(text, now) if reply is None else reply
-
-    def world_changed(self) -> None:
-        """Nothing to do: `advance` looks at the whole world anyway."""
 
     def power(self, on: bool, now: float) -> None:
         self.advance(now)

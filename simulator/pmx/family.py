@@ -56,7 +56,6 @@ NAMES = tuple(f"V{n}" for n in range(VARIABLES))
 
 
 def read_drive(table: Table, folder: Folder) -> DriveSpec:
-    """Read the table of one controller. Raises Diagnostic."""
     common = common_keys(table, folder)
     name = table.text("name", "00")
     if not (len(name) == 2 and name.isascii() and name.isdigit()):
@@ -68,14 +67,12 @@ def read_drive(table: Table, folder: Folder) -> DriveSpec:
     scales = read_units(table, NAMES_OF_AXES)
     geared = {axis: _axis_scale(settings, axis.upper(), scales.get(axis)) for axis in NAMES_OF_AXES}
     x, y = read_worlds(world, NAMES_OF_AXES, (*WORLD_KEYS, *ENCODER_KEYS), INPUTS, COUNTS, geared)
-    variables = table.table("variables", "[bus.drive.variables]")
-    identity = table.table("identity", "[bus.drive.identity]")
     return DriveSpec(
         **common,
         name=name,
         set=settings,
-        variables=read_variables(variables, lambda name: name in NAMES, f"valid: {NAMES[0]} to {NAMES[-1]}"),
-        identity=read_identity(identity, ("part", "version"), {"position": len(AXES), "encoder": len(AXES)}),
+        variables=read_variables(table, lambda name: name in NAMES, f"valid: {NAMES[0]} to {NAMES[-1]}"),
+        identity=read_identity(table, ("part", "version"), {"position": len(AXES), "encoder": len(AXES)}),
         world=x,
         further=(y,),
         units=scales,
@@ -181,7 +178,6 @@ class UsbController:
 
     @property
     def present(self) -> bool:
-        """Whether the bus sees it: it has power."""
         return self.device.powered
 
     @property
@@ -198,7 +194,6 @@ class UsbController:
         return b""
 
     def request(self, setup: bytes) -> tuple[int, bytes]:
-        """Carry out a request on endpoint 0; give its status and the data for the host."""
         kind, request, value, index, length = struct.unpack("<BBHHH", setup)
         if (kind, request) == (REQUEST_TYPE, REQUEST):
             if value == Control.FLUSH:

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from math import copysign, hypot, inf
 
-from multidrop.simulator.kinematics import Profile, halt, slew
+from multidrop.simulator.kinematics import Pace, Profile, halt, slew
 from multidrop.simulator.pmx.axis import Axis
-from multidrop.simulator.pmx.pulses import Doing, Pace, paced, planned
+from multidrop.simulator.pmx.pulses import Doing, paced, planned
 from multidrop.simulator.pmx.settings import AXES, WINDOWS, Refusal, Settings
 
 PERIOD = 0.01
@@ -48,7 +48,7 @@ def jog(axis: Axis, direction: float, t: float) -> None:
     check(axis, t)
     pace = axis.own_pace()
     axis.loop.attempts = 0
-    axis.start(Doing.JOG, axis.pulses.to_speed(direction * pace.high, t, pace), t, pace)
+    axis.start(Doing.JOG, axis.pulses.to_speed(direction * pace.vm, t, pace), t, pace)
 
 
 def home(axis: Axis, word: str, direction: float, t: float) -> None:
@@ -84,7 +84,7 @@ def respeed(axis: Axis, speed: int, t: float) -> None:
         raise Refusal("?Speed out of range")
     if not pulses.profile.moving(t) or pulses.doing not in (Doing.MOVE, Doing.JOG):
         return
-    pace = pulses.pace._replace(high=wanted, low=min(pulses.pace.low, wanted))
+    pace = pulses.pace._replace(vm=wanted, vi=min(pulses.pace.vi, wanted))
     if pulses.doing is Doing.JOG:
         axis.start(Doing.JOG, pulses.to_speed(pulses.profile.direction(t) * wanted, t, pace), t, pace)
     else:
@@ -138,7 +138,7 @@ class Stick:
             speed = 0.0
         if speed or now:
             rate = max(abs(speed - now), SLOWEST) / PERIOD
-            path = slew(t, profile.position(t), now, speed, vi=0.0, a=rate, d=rate)
+            path = slew(t, profile.position(t), now, speed, Pace(0.0, abs(speed), rate, rate))
             axis.start(Doing.STICK, path, t, Pace(0.0, abs(speed), rate, max(rate, abs(speed) / PERIOD)))
 
     def fence(self, after: float) -> float:
@@ -148,8 +148,7 @@ class Stick:
             return inf
         direction = path.direction(after)
         place = self.edge(direction) - self._axis.pulses.counter(after) + path.position(after)
-        found = path.crossing(place, after, direction)
-        return inf if found is None else found
+        return path.crossing(place, after, direction)
 
     def edge(self, direction: float) -> float:
         """The outer soft limit in a direction, as a count of the counter."""
@@ -183,8 +182,8 @@ class Line:
             axis.loop.attempts, axis.goal = 0, target
             part = _part(whole, axis.pulses.profile.position(t), share, length)
             factor = abs(share) / length if length else 0.0
-            low, high, up, down = (each * factor for each in (pace.low, pace.high, pace.up, pace.down))
-            axis.pulses.begin(Doing.LINE, part, t, Pace(low, high, up, down, pace.shape))
+            vi, vm, a, d = (each * factor for each in pace[:4])
+            axis.pulses.begin(Doing.LINE, part, t, Pace(vi, vm, a, d, pace.up, pace.down))
         for axis in axes:
             axis.live(t)
         self.watch(t)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import partial
 from math import inf
@@ -22,8 +23,6 @@ from multidrop.dialects.text import counted, whole
 from multidrop.simulator.cell.spec import DriveSpec
 from multidrop.simulator.pmx.device import PmxDevice
 from multidrop.simulator.program_run import (
-    LONGEST,
-    MOST_LINES,
     NO_DEBUGGING,
     BreakPoint,
     Debugging,
@@ -37,7 +36,7 @@ from multidrop.simulator.program_run import (
     Value,
     Values,
     break_point,
-    next_look,
+    looks,
 )
 
 # What a person follows in the run of A-SCRIPT: which statement comes next, what variables and registers hold.
@@ -66,7 +65,7 @@ class Watcher(Recorder):
     def __init__(
         self, device: PmxDevice, debugging: Debugging, source: Mapping[int, int], text: Sequence[str], file: str
     ) -> None:
-        self._device, self._lines, self._text, self._file = device, source, text, file
+        self._device, self._lines, self._file = device, source, file
         self._now = 0.0
         self._open: dict[int, Statement] = {}
         names = [name.upper() for name in debugging.watch]
@@ -74,21 +73,18 @@ class Watcher(Recorder):
             self._check(name)
         valid = "LINE, or LINE,PASSES"
         points = {self._line_of(point := break_point(each, file, valid)): point for each in debugging.breaks}
-        everything = debugging.trace and not names
-        values = self._variables if everything else partial(self._read, names)
-        super().__init__(debugging, text, points, values)
+        watched = names or ([*_NAMES] if debugging.trace else [])
+        super().__init__(debugging, text, points, partial(self._read, watched))
 
     def before(self, t: float, program: int, line: int) -> bool:
-        """Begin a line; return whether the run ends before it."""
         self._now = t
         number = self._lines.get(line, 0)
         if line and self._lines.get(line - 1) == number and program in self._open:
             return False  # within a statement
         self._close(program)
         self._open[program] = Statement(t, number)
-        if not self.reaches(number):
+        if not self.reaches(t, number):
             return False
-        self.breaks(t, number, self._shown(number))
         del self._open[program]
         return True
 
@@ -109,13 +105,7 @@ class Watcher(Recorder):
     def _close(self, program: int) -> None:
         done = self._open.pop(program, None)
         if done is not None:
-            self.after(done.t, done.line, self._shown(done.line), done.changed, program)
-
-    def _shown(self, number: int) -> str:
-        return self._text[number - 1].strip() if 0 < number <= len(self._text) else ""
-
-    def _variables(self) -> Values:
-        return dict(zip(_NAMES, self._device.programs.variables, strict=True))
+            self.after(done.t, done.line, done.changed, program)
 
     def _read(self, names: Sequence[str]) -> Values:
         variables = self._device.programs.variables
@@ -127,17 +117,14 @@ class Watcher(Recorder):
     def _check(self, name: str) -> None:
         """Refuse a name that reads no number: another command could move an axis."""
         row = lookup(name)
-        if name in _NAMES or (row is not None and "R" in row.access and self._reads(name)):
+        if name in _NAMES:
             return
+        if row is not None and "R" in row.access:
+            with suppress(ValueError):
+                self._register(name)
+                return
         hint = "valid: V0 to V63, or a command that reads one number, such as PX"
         raise Diagnostic(f"no variable {name} to watch", self._file, hint)
-
-    def _reads(self, name: str) -> bool:
-        try:
-            self._register(name)
-        except ValueError:
-            return False
-        return True
 
     def _line_of(self, point: BreakPoint) -> int:
         number = whole(point.place, 0, LAST_LINE)
@@ -210,7 +197,7 @@ class ProgramRun:
         self._outputs: list[Output] = []
         self._later: list[Event] = []
         self._errors: list[str] = []
-        self.now = 0.0
+        self.now, self._stuck = 0.0, False
 
     def run(
         self, program: str = "", until: float | None = None, debugging: Debugging = NO_DEBUGGING
@@ -221,13 +208,8 @@ class ProgramRun:
             self._programs.watch(self._watcher.before, self._watcher.executed)
         for each in self._chosen(program):
             self._programs.control(each, 1, 0.0)
-        limit = LONGEST if until is None else until
-        most = MOST_LINES if until is None else inf
-        stuck = False
-        while self._programs.running and self.now < limit and self._programs.executed < most:
-            due = self._programs.deadline
-            stuck = due is None
-            self.now = next_look(due, self.now, limit)
+        programs = self._programs
+        for self.now, self._stuck in looks(programs, lambda: programs.deadline, until):
             self._device.advance(self.now)
             if self._broken:
                 self.now = self._programs.ended_at
@@ -235,7 +217,7 @@ class ProgramRun:
                 self._programs.watch(None, None)
             yield from self._news()
         yield from self._news(last=True)
-        yield self._summary(until, stuck)
+        yield self._summary(until)
 
     def _chosen(self, program: str) -> list[int]:
         there = [each for each in range(PROGRAMS) if self._programs.memory.start_of(each) is not None]
@@ -264,7 +246,7 @@ class ProgramRun:
             news += self._watcher.take()
             begun = self._watcher.open_since
         for each in self._programs.failures:
-            news.append(Failed(each.t, each.program, self._line(each.line), each.why, each.handled))
+            news.append(Failed(each.t, each.program, self._source.get(each.line, 0), each.why, each.handled))
             if not each.handled:
                 self._errors.append(each.why)
         self._outputs.clear()
@@ -273,10 +255,7 @@ class ProgramRun:
         self._later = [each for each in news if each.t >= begun]
         yield from (each for each in news if each.t < begun)
 
-    def _line(self, at: int) -> int:
-        return self._source.get(at, 0)
-
-    def _summary(self, until: float | None, stuck: bool) -> Summary:
+    def _summary(self, until: float | None) -> Summary:
         running = self._programs.running
         standing = [self._programs.counter(n) for n in range(PROGRAMS) if self._programs.status(n) in (1, 2)]
         x, y = (int(self._device.execute(f"P{axis}", self.now)) for axis in "XY")
@@ -294,10 +273,10 @@ class ProgramRun:
             moves=self._moves,
             instructions=lines,
             errors=errors,
-            lines_at=tuple(self._line(at) for at in standing),
+            lines_at=tuple(self._source.get(at, 0) for at in standing),
             moving=moving,
             given_up=running and until is None,
-            stuck=running and stuck,
+            stuck=running and self._stuck,
             counts=f"X {x}, Y {y}, {counted(self._moves, 'motion')}, {counted(lines, 'compiled line')}, {failed}",
             turning="a motor still turns; WAITX or WAITY before END waits for it" if moving and ended == "END" else "",
         )
@@ -308,7 +287,6 @@ class ProgramRun:
 
 
 def read(text: str, file: str) -> Load:
-    """Read the text of a file. Raises Diagnostic."""
     lines, source = program_file.read(text, file), split_lines(text)
     return lambda spec: ProgramRun(spec, lines, file, source)
 

@@ -23,6 +23,7 @@ from multidrop.dialects.pmx.manual.script_compiler import COMPARISON, LINES, MOV
 from multidrop.dialects.pmx.manual.script_parser import AXES, HANDLER, PROGRAMS, VARIABLES, WORDS
 from multidrop.simulator.pmx.commands import CommandedController
 from multidrop.simulator.pmx.memory import Memory
+from multidrop.simulator.pmx.settings import wrapped
 
 KEPT = 32
 """The first variable that STORE keeps; those below are zero after power-up."""
@@ -59,12 +60,6 @@ class _Frame:
 
     to: int | None
     handler: bool = False
-
-
-def signed(value: int) -> int:
-    """Wrap a value around, as a 32-bit register does."""
-    value &= MASK
-    return value - (1 << 32) if value >> 31 else value
 
 
 _OPERATIONS: Mapping[str, Callable[[int, int], int]] = {
@@ -215,21 +210,30 @@ class Thread:
                 self.at += _COMPARISONS[argument](left, right)
             case "JR" | "JO":
                 self.at += int(argument) - 1
-            case "JM-":
-                self._go_back(argument)
+            case "JM-":  # back to a JW, which is carried out again from the first of its values
+                to = self.at - int(argument)
+                back = self.machine.memory.code[to] if to >= OPERANDS else None
+                if back is None or back[0] != "JW":
+                    raise Fault(f"JM-{argument} goes back to no JW")
+                self.at = to - OPERANDS
                 return
             case "EI" | "PS" | "SS":
                 pass
-            case "DD":
-                self._delay(int(argument), now)
-            case "DV":
-                self._delay(self.machine.variables[int(argument)], now)
+            case "DD" | "DV":
+                milliseconds = int(argument) if word == "DD" else self.machine.variables[int(argument)]
+                self.due = now + (milliseconds & MASK) / 1000
             case "WX":
                 if self.machine.moving(axis := AXES[int(argument)], now):
                     self.waiting, self.due = axis, None
                     return
             case "GS":
-                self._enter(int(argument))
+                at = self.machine.memory.subroutine(int(argument))
+                if at is None:
+                    raise Fault(f"SUB {int(argument)} is not defined")
+                if len(self._frames) >= DEEPEST:
+                    raise Fault(f"more than {DEEPEST} nested calls")
+                self._frames.append(_Frame(self.at + 1))
+                self.at = at
                 return
             case "SE":
                 self._leave(now)
@@ -269,27 +273,7 @@ class Thread:
             raise Fault("division by zero") from None
         if isinstance(target, int) or target[0] != "V":
             raise Fault(f"OX{argument} cannot set {target}")
-        self.machine.variables[int(target[1:])] = signed(result)
-
-    def _go_back(self, by: str) -> None:
-        """Go back to a JW, which is carried out again from the first of its values."""
-        to = self.at - int(by)
-        found = self.machine.memory.code[to] if to >= OPERANDS else None
-        if found is None or found[0] != "JW":
-            raise Fault(f"JM-{by} goes back to no JW")
-        self.at = to - OPERANDS
-
-    def _delay(self, milliseconds: int, now: float) -> None:
-        self.due = now + (milliseconds & MASK) / 1000
-
-    def _enter(self, subroutine: int) -> None:
-        at = self.machine.memory.subroutine(subroutine)
-        if at is None:
-            raise Fault(f"SUB {subroutine} is not defined")
-        if len(self._frames) >= DEEPEST:
-            raise Fault(f"more than {DEEPEST} nested calls")
-        self._frames.append(_Frame(self.at + 1))
-        self.at = at
+        self.machine.variables[int(target[1:])] = wrapped(result)
 
     def _leave(self, now: float) -> None:
         """Return from a subroutine; from SUB 31 perhaps to the begin of the program."""
@@ -325,7 +309,7 @@ class Thread:
             return self.machine.variables[int(value[1:])]
         text = self.ask(WORDS[value].ascii, now, changes=False)
         try:
-            return signed(int(text))
+            return wrapped(int(text))
         except ValueError:
             raise Fault(f"{value} answers {text}") from None
 

@@ -9,10 +9,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from enum import Enum, IntEnum
 from math import ceil, floor, inf
-from typing import NamedTuple
 
 from multidrop.simulator.cell.spec import WorldSpec
-from multidrop.simulator.kinematics import LINEAR, TRIANGLE, Profile, Shape, halt, move, slew
+from multidrop.simulator.kinematics import LINEAR, TRIANGLE, Pace, Profile, Shape, halt, move, slew
 from multidrop.simulator.pmx.settings import INT32, Refusal, Settings, rate, window, wrapped
 from multidrop.simulator.world import TOUCH, Shaft, World
 
@@ -66,16 +65,6 @@ STATES = {
 }
 
 
-class Pace(NamedTuple):
-    """The pace of a motion: low and high speed, pulses/s, and both rates, pulses/s2."""
-
-    low: float
-    high: float
-    up: float
-    down: float
-    shape: Shape = Shape()
-
-
 def paced(
     settings: Settings, axis: str, speeds: tuple[float, float], times: tuple[int, int], *, strict: bool = True
 ) -> Pace:
@@ -90,7 +79,8 @@ def paced(
         raise Refusal("?Low speed out of range")
     up = rate(low, high, times[0])
     down = rate(low, high, times[1]) if settings["EDEC"] else up
-    return Pace(low, high, up, down, Shape(TRIANGLE if settings["SCV" + axis] else LINEAR))
+    shape = Shape(TRIANGLE if settings["SCV" + axis] else LINEAR)
+    return Pace(low, high, up, down, shape, shape)
 
 
 class Rotor(Shaft):
@@ -142,16 +132,13 @@ class Rotor(Shaft):
             return inf
         turns = (self.position(after) - self._index) / TURN
         mark = self._index + TURN * (floor(turns + TOUCH) + 1 if direction > 0 else ceil(turns - TOUCH) - 1)
-        found = self.path.crossing(mark - self.offset, after)
-        return inf if found is None else found
+        return self.path.crossing(mark - self.offset, after)
 
 
 def planned(t: float, here: float, place: float, pace: Pace) -> Profile:
     """Plan a move from rest; where the ramps do not each fit into half of it, the first serves twice (A.2)."""
-    longest = (pace.high**2 - pace.low**2) / (2 * min(pace.up, pace.down))
-    down = pace.up if longest > abs(place - here) / 2 else pace.down
-    shape = pace.shape
-    return move(t, here, 0.0, place, vi=pace.low, vm=pace.high, a=pace.up, d=down, up=shape, down=shape)
+    longest = (pace.vm**2 - pace.vi**2) / (2 * min(pace.a, pace.d))
+    return move(t, here, 0.0, place, pace._replace(d=pace.a) if longest > abs(place - here) / 2 else pace)
 
 
 class Pulses:
@@ -204,17 +191,13 @@ class Pulses:
 
     def to_place_on_the_fly(self, place: float, t: float, pace: Pace) -> Profile:
         """Plan the rest of a motion to another place, or at another pace."""
-        here, now = self.profile.position(t), self.profile.velocity(t)
-        a, d, shape = pace.up, pace.down, pace.shape
-        return move(t, here, now, place, vi=pace.low, vm=pace.high, a=a, d=d, up=shape, down=shape)
+        return move(t, self.profile.position(t), self.profile.velocity(t), place, pace)
 
     def to_speed(self, velocity: float, t: float, pace: Pace) -> Profile:
         """Plan a motion to a velocity; 0 stops."""
-        here, now = self.profile.position(t), self.profile.velocity(t)
-        return slew(t, here, now, velocity, vi=pace.low, a=pace.up, d=pace.down, up=pace.shape, down=pace.shape)
+        return slew(t, self.profile.position(t), self.profile.velocity(t), velocity, pace)
 
     def begin(self, doing: Doing, profile: Profile, t: float, pace: Pace) -> None:
-        """Begin a motion in place of any other."""
         self.on_change(t)
         self.doing, self.pace = doing, pace
         self._follow(profile, t)

@@ -45,60 +45,49 @@ async def serve_bus(floor: RunningFloor, bus: BusSpec, stack: AsyncExitStack) ->
     """Open all endpoints of a bus; the stack closes them. Raises Diagnostic for one that cannot be served."""
     served = []
     for endpoint in bus.serve:
-        where = f'bus "{bus.name}"'
         try:
-            url = await _OPENERS[endpoint.scheme](floor, bus.name, endpoint, stack)
+            urls = await _open(floor, bus.name, endpoint, stack)
         except OSError as error:
             reason = error.strerror or str(error)
-            raise Diagnostic(f"cannot serve {endpoint.text} ({reason})", where) from None
-        served += [Served(bus.name, each) for each in ([url] if isinstance(url, str) else url)]
+            raise Diagnostic(f"cannot serve {endpoint.text} ({reason})", f'bus "{bus.name}"') from None
+        served += [Served(bus.name, each) for each in urls]
     if sys.platform == "win32" and bus.serve and not served:
         raise Diagnostic(NO_TERMINALS, f'bus "{bus.name}"', 'serve = ["tcp://127.0.0.1:0"]')
     return served
 
 
-async def _serve_pty(floor: RunningFloor, bus: str, endpoint: Endpoint, stack: AsyncExitStack) -> str | list[str]:
-    if sys.platform == "win32":
-        floor.notify(f'bus "{bus}": {endpoint.text} is not served: {NO_TERMINALS}; its other endpoints are')
-        return []
-    else:
-        from multidrop.simulator.serving.pty import PtyServer
+async def _open(floor: RunningFloor, bus: str, endpoint: Endpoint, stack: AsyncExitStack) -> list[str]:
+    """Open one endpoint; return what clients open, nothing where the system has no such thing. Raises OSError."""
+    place = f"{endpoint.scheme}://" + (f"[{endpoint.host}]" if ":" in endpoint.host else endpoint.host)
+    match endpoint.scheme:
+        case "pty":
+            if sys.platform == "win32":
+                floor.notify(f'bus "{bus}": {endpoint.text} is not served: {NO_TERMINALS}; its other endpoints are')
+                return []
+            else:
+                from multidrop.simulator.serving.pty import PtyServer
 
-        server = PtyServer(floor, bus, endpoint.path)
-        stack.callback(server.close)
-        return server.endpoint
+                terminal = PtyServer(floor, bus, endpoint.path)
+                stack.callback(terminal.close)
+                return [terminal.endpoint]
+        case "udp":
+            transport, datagrams = await floor.loop.create_datagram_endpoint(
+                lambda: UdpServer(floor, bus), local_addr=(endpoint.host, endpoint.port)
+            )
+            stack.callback(transport.close)
+            stack.callback(datagrams.close)
+            return [f"{place}:{transport.get_extra_info('sockname')[1]}"]
+        case "usbip":
+            from multidrop.simulator.serving.usbip import UsbipServer
 
-
-async def _serve_tcp(floor: RunningFloor, bus: str, endpoint: Endpoint, stack: AsyncExitStack) -> str:
+            exports = UsbipServer(floor, bus)
+            stack.push_async_callback(exports.close)
+            port = await exports.open(endpoint.host, endpoint.port)
+            return [f"{place}:{port}/{bus_id}" for bus_id in exports.devices]
     server = TcpServer(floor, bus, endpoint)
     stack.push_async_callback(server.close)
     await server.open()
-    return f"{endpoint.scheme}://{_bracketed(endpoint.host)}:{server.port}"
-
-
-async def _serve_udp(floor: RunningFloor, bus: str, endpoint: Endpoint, stack: AsyncExitStack) -> str:
-    transport, server = await floor.loop.create_datagram_endpoint(
-        lambda: UdpServer(floor, bus), local_addr=(endpoint.host, endpoint.port)
-    )
-    stack.callback(transport.close)
-    stack.callback(server.close)
-    return f"udp://{_bracketed(endpoint.host)}:{transport.get_extra_info('sockname')[1]}"
-
-
-async def _serve_usbip(floor: RunningFloor, bus: str, endpoint: Endpoint, stack: AsyncExitStack) -> list[str]:
-    from multidrop.simulator.serving.usbip import UsbipServer
-
-    server = UsbipServer(floor, bus)
-    stack.push_async_callback(server.close)
-    port = await server.open(endpoint.host, endpoint.port)
-    return [f"usbip://{_bracketed(endpoint.host)}:{port}/{bus_id}" for bus_id in server.devices]
-
-
-_OPENERS = {"pty": _serve_pty, "tcp": _serve_tcp, "udp": _serve_udp, "modbus": _serve_tcp, "usbip": _serve_usbip}
-
-
-def _bracketed(host: str) -> str:
-    return f"[{host}]" if ":" in host else host
+    return [f"{place}:{server.port}"]
 
 
 class TcpServer(Listener):
@@ -121,7 +110,6 @@ class TcpServer(Listener):
         self.port = self._server.sockets[0].getsockname()[1]
 
     async def close(self) -> None:
-        """End the service."""
         self._closed = True
         self._detach()
         if self._opening is not None:
@@ -177,7 +165,6 @@ class TcpClient(asyncio.BufferedProtocol, Client):
             self.unplugged()
 
     def get_buffer(self, sizehint: int) -> memoryview:
-        """Offer as much as there is room for."""
         return memoryview(self._buffer)[: max(1, self._queue.room)]
 
     def buffer_updated(self, nbytes: int) -> None:

@@ -114,24 +114,20 @@ def _open(key: str, running: _Running, spec: BusSpec, path: str) -> SimBus:
         running.pipes += 1
         return SimPipe(f"sim:{path}#{spec.name}", running.floor, spec.name, closed)
 
+    families = [family_of(drive.personality) for drive in spec.drives]
+    # on a mixed bus the dialect is that of a family whose drives always have an address
+    chosen = next((each for each in families if each.addressed), families[0] if families else None)
     return SimBus(
         name=spec.name,
         transport=pipe(),
         again=pipe,
         names=tuple(drive.name for drive in spec.drives),
-        dialect=_dialect(spec),
-        party=any(drive.party or family_of(drive.personality).addressed for drive in spec.drives),
+        dialect=chosen.name if chosen else DEFAULT,
+        party=any(drive.party for drive in spec.drives) or any(each.addressed for each in families),
         floor=running.floor,
         baud=spec.baud,
         units={f"{drive.name}.{axis}".rstrip("."): each for drive in spec.drives for axis, each in drive.units.items()},
     )
-
-
-def _dialect(bus: BusSpec) -> str:
-    """Choose the dialect for a bus: on a mixed one that of a family whose drives always have an address."""
-    families = [family_of(drive.personality) for drive in bus.drives]
-    chosen = next((each for each in families if each.addressed), families[0] if families else None)
-    return chosen.name if chosen else DEFAULT
 
 
 class SimPipe(Transport, Listener):

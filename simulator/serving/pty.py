@@ -125,7 +125,6 @@ class Link:
             raise self._cannot(error) from None
 
     def remove(self, device: str) -> None:
-        """Remove the symlink if it still leads to this device."""
         if self.path.is_symlink() and os.readlink(self.path) == device:
             self.path.unlink(missing_ok=True)
 
@@ -196,7 +195,6 @@ class PtyServer(Client):
         self._shut()
 
     def plugged(self) -> None:
-        """Serve a new pseudo-terminal by the link."""
         self._open()
 
     def close(self) -> None:
@@ -274,7 +272,6 @@ class PtyServer(Client):
         return packet[1:]
 
     def has_left(self) -> bool:
-        """Whether no client has it open."""
         return self._watch is not None and self._watch.deserted()
 
     def discard(self) -> None:

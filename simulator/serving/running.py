@@ -16,7 +16,6 @@ from collections import deque
 from collections.abc import Callable
 from math import inf
 
-from multidrop.simulator.cell.spec import BusSpec
 from multidrop.simulator.family import Connection, Shadow
 from multidrop.simulator.floor import Floor
 from multidrop.simulator.wire import BITS_A_BYTE, Wire
@@ -109,17 +108,16 @@ class RunningFloor:
         self._deadline: float | None = None
         """When something happens next, as of the last turn."""
         self._listeners: dict[str, list[Listener]] = {name: [] for name in floor.wires}
-        self._gathered = {bus.name: self._gathering(bus) for bus in floor.cell.buses}
+        self._gathered = {  # an Ethernet drive sends in pieces of its own
+            bus.name: Gathered(floor.wires[bus.name], 0.0 if bus.name in floor.ethernet else bus.gather)
+            for bus in floor.cell.buses
+        }
         self._down = {name: wire.hung_up for name, wire in floor.wires.items()}
         self._connectable = {name: floor.connectable(name) for name in floor.ethernet}
         self._wake: asyncio.TimerHandle | None = None
         self._closed = False
         self._sources = 0
         self._turn()
-
-    def _gathering(self, bus: BusSpec) -> Gathered:
-        """The pieces of a bus; an Ethernet drive sends in its own."""
-        return Gathered(self.floor.wires[bus.name], 0.0 if bus.name in self.floor.ethernet else bus.gather)
 
     def now(self) -> float:
         """The floor's time: seconds since the start, times the speed; less where it stood still."""
@@ -198,7 +196,6 @@ class RunningFloor:
         return named[0].unit.shadow if named else None
 
     def close(self) -> None:
-        """Stop the time."""
         self._closed = True
         if self._wake is not None:
             self._wake.cancel()
@@ -329,16 +326,13 @@ class InputQueue:
         elif self._gone_at is None:
             self._gone_at = now
         elif now - self._gone_at > GRACE:
-            self._drop()
+            self._gone_at = None
+            self._paused = self._paused and self._client is not None
+            self.retract()
+            if self._client is not None:
+                self._client.discard()
+            self._floor.notify(f"{self._bus}: a client has left; what it wrote faster than the wire is dropped")
         if self._paused and self._client is not None and 2 * self._waiting <= HOLD:
             self._paused = False
             self._client.resume()
         self._come_back()
-
-    def _drop(self) -> None:
-        self._gone_at = None
-        self._paused = self._paused and self._client is not None
-        self.retract()
-        if self._client is not None:
-            self._client.discard()
-        self._floor.notify(f"{self._bus}: a client has left; what it wrote faster than the wire is dropped")

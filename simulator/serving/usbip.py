@@ -71,7 +71,6 @@ class UsbipServer(Listener):
         return int(self._server.sockets[0].getsockname()[1])
 
     async def close(self) -> None:
-        """End the service."""
         self._detach()
         if self._server is not None:
             self._server.close()
@@ -116,7 +115,6 @@ class UsbipClient(asyncio.Protocol):
             self._plugged.waiting.clear()
 
     def end(self) -> None:
-        """Disconnect it."""
         if self._transport is not None:
             self._transport.close()
 
@@ -154,12 +152,9 @@ class UsbipClient(asyncio.Protocol):
     def _import(self) -> bytes:
         name, rest = self._buffer[OPERATION.size :][:BUS_ID], self._buffer[OPERATION.size + BUS_ID :]
         plugged = self._server.devices.get(name.partition(b"\0")[0].decode("ascii", "replace"))
-        if plugged is None or not self._server.present(plugged):
-            self._send(operation(REP_IMPORT, ABSENT))
-            self.end()
-            return b""
-        if plugged.client is not None:
-            self._send(operation(REP_IMPORT, BUSY))
+        there = plugged is not None and self._server.present(plugged)
+        if plugged is None or not there or plugged.client is not None:
+            self._send(operation(REP_IMPORT, BUSY if there else ABSENT))
             self.end()
             return b""
         plugged.client, self._plugged = self, plugged

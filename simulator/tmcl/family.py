@@ -64,7 +64,6 @@ FULL_STEPS = 200
 
 
 def read_drive(table: Table, folder: Folder) -> DriveSpec:
-    """Read the table of one module. Raises Diagnostic."""
     common = common_keys(table, folder)
     if wrong := errors(program_file.check(common["program"])):
         raise table.wrong("program", f"has an error in line {wrong[0].line}: {wrong[0].what}", wrong[0].hint)
@@ -85,19 +84,16 @@ def read_drive(table: Table, folder: Folder) -> DriveSpec:
     }
     surroundings = table.table("world", "[bus.drive.world]")
     world, *further = read_worlds(surroundings, names, WORLD_KEYS, inputs_of(module), COUNTS, geared)
-    variables = table.table("variables", "[bus.drive.variables]")
-    rows = table.table("identity", "[bus.drive.identity]")
-    identity = read_identity(rows, ("version",), {"position": module.motors, "target": module.motors})
+    identity = read_identity(table, ("version",), {"position": module.motors, "target": module.motors})
     if identity.version and not VERSION_FORM.fullmatch(identity.version):
         hint = "valid: module and firmware, as in 1241V115"
+        rows = table.table("identity", "[bus.drive.identity]")
         raise rows.wrong("version", f"cannot be {quoted(identity.version)}", hint)
     return DriveSpec(
         **common,
         name=name,
         set=settings,
-        variables=read_variables(
-            variables, lambda name: name in VARIABLES, "valid: user variables by number, 0 to 255"
-        ),
+        variables=read_variables(table, lambda name: name in VARIABLES, "valid: user variables by number, 0 to 255"),
         identity=identity,
         world=world,
         further=tuple(further),

@@ -91,15 +91,17 @@ class TmclModule:
         self._variables: dict[int, int] = {}
         self._fresh()
         self._kept_variables.update({int(number): value for number, value in spec.variables.items()})
-        for name, value in spec.set.items():
-            self._preset(name, int(value))  # type: ignore[arg-type]
+        for name, held in spec.set.items():  # `4`, `4_1` for motor 1, `G75`
+            number, _, motor = name.partition("_")
+            kept, key = (self._axis[int(motor or 0)], number) if name.isdigit() or motor else (self._global, name[1:])
+            kept[int(key)] = int(held)  # type: ignore[arg-type]
         self._global[Global.ADDRESS] = int(spec.name)
         if f"G{int(Global.BAUD)}" not in spec.set:
             self._global[Global.BAUD] = next((code for code, each in BAUDS.items() if each == baud), 0)
         self.power(True, 0.0)
         targets = iter(spec.identity.counters.get("target", ()))
-        for motor, position in zip(self.motors, spec.identity.counters.get("position", ()), strict=False):
-            motor.stand_at(position, 0.0, next(targets, position))
+        for each, position in zip(self.motors, spec.identity.counters.get("position", ()), strict=False):
+            each.stand_at(position, 0.0, next(targets, position))
 
     def _fresh(self) -> None:
         """Set what EEPROM holds to the factory's values."""
@@ -108,14 +110,6 @@ class TmclModule:
         self._global = {number: row.fresh for number, row in {**GLOBAL, **self.table.banks[0]}.items()}
         self._interrupts = dict.fromkeys(self.table.banks[3], 0)
         self._kept_variables: dict[int, int] = {}
-
-    def _preset(self, name: str, value: int) -> None:
-        """Put a setting of the cell file into EEPROM: `4`, `4_1` for motor 1, `G75`."""
-        number, _, motor = name.partition("_")
-        if name.isdigit() or motor:
-            self._axis[int(motor or 0)][int(number)] = value
-        else:
-            self._global[int(name[1:])] = value
 
     def __getitem__(self, parameter: Global) -> int:
         return self._global[parameter]
@@ -136,7 +130,6 @@ class TmclModule:
         return notices
 
     def advance(self, now: float) -> None:
-        """Live up to `now`."""
         if not self.powered:
             self._now = max(self._now, now)
             return
@@ -187,9 +180,6 @@ class TmclModule:
     def supply(self, on: bool, now: float) -> None:
         """Do nothing: the module has one supply."""
 
-    def world_changed(self) -> None:
-        """Do nothing: `advance` looks at all of the world."""
-
     def carry_out(self, call: Call, now: float) -> tuple[int, int]:
         """Carry out a command of the direct mode as a line of the program; its status and value."""
         try:
@@ -226,8 +216,11 @@ class TmclModule:
             case Command.VERSION:
                 if call.type == Version.TEXT:
                     return Answer(text=self._version_text)
-                if call.type == Version.BINARY:
-                    return Answer(value=_number_of(self._version_text))
+                if (
+                    call.type == Version.BINARY
+                ):  # the module in the upper half, then both parts of the firmware's number
+                    module, _, firmware = self._version_text.partition("V")
+                    return Answer(value=int(module) << 16 | int(firmware[0]) << 8 | int(firmware[1:]))
                 raise Refused(Status.WRONG_TYPE)
             case Command.FACTORY:
                 if call.value != FACTORY_CODE:
@@ -297,8 +290,17 @@ class TmclModule:
                     motor.go_by(call.value, now)
                     return motor.read(Axis.TARGET_POSITION, now)
                 motor.go(call.value, now)
+            case Command.RFS if call.type not in tuple(Search):
+                raise Refused(Status.WRONG_TYPE)
+            case Command.RFS if call.type == Search.STATUS:
+                return motor.search.number if motor.search is not None else 0
+            case Command.RFS if call.type == Search.START:
+                motor.seek(now)
+            case Command.RFS if motor.search is not None:
+                motor.end_search()
+                motor.rotate(0, now)
             case Command.RFS:
-                return self._reference(motor, call, now)
+                pass
             case _:
                 return self._axis_parameter(motor, call, now)
         return call.value
@@ -308,18 +310,6 @@ class TmclModule:
         _in_range(self.table.axis[parameter], value)
         motor.end_search()
         motor.write(parameter, value, now)
-
-    def _reference(self, motor: Motor, call: Call, now: float) -> int:
-        if call.type not in tuple(Search):
-            raise Refused(Status.WRONG_TYPE)
-        if call.type == Search.STATUS:
-            return motor.search.number if motor.search is not None else 0
-        if call.type == Search.START:
-            motor.seek(now)
-        elif motor.search is not None:
-            motor.end_search()
-            motor.rotate(0, now)
-        return call.value
 
     def _axis_parameter(self, motor: Motor, call: Call, now: float) -> int:
         row = self.table.axis.get(call.type)
@@ -356,28 +346,27 @@ class TmclModule:
             case Command.SGP:
                 _in_range(row, call.value)
                 held[call.type] = call.value
+            case Command.GGP if call.motor == 0 and not row.writable:  # the program's state
+                states = {Global.PROGRAM_STATUS: self.program.running, Global.DOWNLOAD_MODE: self.program.storing}
+                return int(states.get(Global(call.type), self.program.counter))
             case Command.GGP:
-                return (
-                    self._program_state(call.type) if call.motor == 0 and not row.writable else held.get(call.type, 0)
-                )
+                return held.get(call.type, 0)
             case Command.STGP if call.motor == USER_BANK:
                 self._kept_variables[call.type] = held.get(call.type, 0)
             case Command.RSGP if call.motor == USER_BANK:
                 held[call.type] = self._kept_variables.get(call.type, 0)
         return call.value
 
-    def _program_state(self, number: int) -> int:
-        """A global parameter that shows the program's state."""
-        program = self.program
-        states = {Global.PROGRAM_STATUS: program.running, Global.DOWNLOAD_MODE: program.storing}
-        return int(states.get(Global(number), program.counter))
-
     def _port(self, call: Call, now: float) -> int:
         """Set an output, or read a port."""
         if call.motor not in (DIGITAL, ANALOG, OUTPUTS) or (call.command == Command.SIO and call.motor != OUTPUTS):
             raise Refused(Status.INVALID_VALUE)
         if call.motor == ANALOG:
-            return self._measured(call.type, now)
+            if call.type not in self.table.analog:
+                raise Refused(Status.WRONG_TYPE)
+            if call.type in (VOLTAGE, TEMPERATURE):
+                return VOLTS if call.type == VOLTAGE else DEGREES
+            return self.worlds[self.table.analog.index(call.type)].analog(now)
         ports = self._outputs if call.motor == OUTPUTS else self._inputs(now)
         if call.type == ALL_PORTS:
             if call.command == Command.GIO:
@@ -396,17 +385,10 @@ class TmclModule:
         """Digital inputs, by port; port n is input n + 1 of the world."""
         return {port: int(any(world.level(port + 1, now) for world in self.worlds)) for port in self.table.inputs}
 
-    def _measured(self, port: int, now: float) -> int:
-        if port not in self.table.analog:
-            raise Refused(Status.WRONG_TYPE)
-        if port in (VOLTAGE, TEMPERATURE):
-            return VOLTS if port == VOLTAGE else DEGREES
-        return self.worlds[self.table.analog.index(port)].analog(now)
-
     def _next_event(self, after: float) -> float:
         events = [at for motor in self.motors for at in motor.events(after)]
         if self.program.running:  # an input may be an interrupt
-            events += [at for world in self.worlds if (at := world.next_change(after)) is not None]
+            events += [world.next_change(after) for world in self.worlds]
         return min((at for at in (*events, self.program.due, self._silent_at) if at > after), default=inf)
 
     @property
@@ -438,12 +420,6 @@ STARTERS = frozenset({Axis.TARGET_POSITION, Axis.TARGET_VELOCITY})
 def storable(number: int, row: Parameter) -> bool:
     """Whether EEPROM holds an axis parameter."""
     return row.writable and number > Axis.TARGET_VELOCITY
-
-
-def _number_of(version: str) -> int:
-    """The binary form of `1241V115`: the module in the upper half, then both parts of the firmware's number."""
-    module, _, firmware = version.partition("V")
-    return int(module) << 16 | int(firmware[0]) << 8 | int(firmware[1:])
 
 
 def _in_range(row: Parameter, value: int) -> None:

@@ -20,7 +20,7 @@ from typing import NamedTuple
 
 from multidrop.dialects.tmcl.manual.commands import Axis
 from multidrop.dialects.tmcl.manual.modules import INVERTED, MIRRORED, Module
-from multidrop.simulator.kinematics import Effort, halt, move, slew
+from multidrop.simulator.kinematics import Effort, Pace, halt, move, slew
 from multidrop.simulator.world import REVOLUTION, Shaft, World
 
 FULL = 256
@@ -152,7 +152,6 @@ class Motor:
                     yield each.start + (self._stall_speed * each.direction - each.velocity) / each.acceleration
 
     def seek(self, t: float) -> None:
-        """Begin a reference search."""
         self.search = ReferenceSearch(self, self.parameters[Axis.SEARCH_MODE], t)
 
     def end_search(self) -> None:
@@ -194,14 +193,14 @@ class Motor:
     def _follow_from(self, position: float, velocity: float, t: float) -> None:
         of_velocity, of_rate = self._units
         rate = max(1, self.parameters[Axis.MAXIMUM_ACCELERATION]) * of_rate
-        speed = self.parameters[Axis.MAXIMUM_VELOCITY] * of_velocity
-        if not self.positioning or not speed:
+        pace = Pace(0.0, self.parameters[Axis.MAXIMUM_VELOCITY] * of_velocity, rate, rate)
+        if not self.positioning or not pace.vm:
             wanted = 0 if self.positioning else self.parameters[Axis.TARGET_VELOCITY]
-            self._profile = slew(t, position, velocity, wanted * of_velocity, vi=0.0, a=rate, d=rate)
+            self._profile = slew(t, position, velocity, wanted * of_velocity, pace)
         else:
             here = round(position)
             place = float(here + wrapped(self._target - here))
-            self._profile = move(t, position, velocity, place, vi=0.0, vm=speed, a=rate, d=rate)
+            self._profile = move(t, position, velocity, place, pace)
         if self.moving(t) and self._blocked(self._profile.direction(t), t):
             self.freeze(t)
         else:

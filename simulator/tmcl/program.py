@@ -28,6 +28,7 @@ from multidrop.dialects.tmcl.manual.instructions import (
     Wait,
     Word,
 )
+from multidrop.simulator.tmcl.motor import wrapped
 
 LINE_TIME = 0.001
 TICK = 0.01
@@ -229,25 +230,40 @@ class Program:
     def _carry_out(self, call: Call, t: float) -> None:
         number = call.command
         if number in JUMPS:
-            self._jump(call, t)
-        elif number in OPERANDS:
-            self._calculate(call, t)
-        elif number in FROM_ACCUMULATOR:
-            self._do(Call(FROM_ACCUMULATOR[number], call.type, call.motor, self.accumulator), t)
-        elif number in (Word.SIV, Word.GIV, Word.AIV):
-            self._indexed(call, t)
-        elif number == Word.WAIT:
-            self._wait(call, t)
-        elif number == Word.COMP:
-            self._compare(self.accumulator, call.value)
-        elif number == Word.CLE:
-            self._errors -= {Flag(call.type)} if call.type in tuple(Flag)[1:] else set(Flag)
-        elif number in (Word.EI, Word.DI, Word.VECT):
-            self._set_interrupt(call, t)
-        elif number == Word.SIO and (call.type, call.value) == (ALL_PORTS, BY_ACCUMULATOR):
-            self._do(Call(number, call.type, call.motor, self.accumulator), t)
-        else:
-            self._do(call, t)
+            return self._jump(call, t)
+        if number in OPERANDS:
+            return self._calculate(call, t)
+        match number:
+            case Word.SIV | Word.GIV | Word.AIV if self.x not in VARIABLES:
+                pass  # the user variable whose number is in X: any other number is ignored
+            case Word.GIV:
+                self._take(self._variable(self.x, t))
+            case Word.SIV | Word.AIV:
+                self._set_variable(self.x, call.value if number == Word.SIV else self.accumulator, t)
+            case Word.WAIT:
+                ticks = self.accumulator if call.value == BY_ACCUMULATOR else call.value
+                if call.type == Wait.TICKS:
+                    self._waits, self._due = call, t + max(LINE_TIME, ticks * TICK)
+                elif not self._over(call, t):
+                    self._waits, self._due = call, t + ticks * TICK if ticks > 0 else inf
+            case Word.COMP:
+                self._compare(self.accumulator, call.value)
+            case Word.CLE:
+                self._errors -= {Flag(call.type)} if call.type in tuple(Flag)[1:] else set(Flag)
+            case Word.VECT:
+                self._vectors[call.type] = max(0, call.value)
+            case Word.DI:
+                self._enabled.discard(call.type)
+                self._timers.pop(call.type, None)
+            case Word.EI:
+                self._enabled.add(call.type)
+                self._start_timer(call.type, t)
+            case Word.SIO if (call.type, call.value) == (ALL_PORTS, BY_ACCUMULATOR):
+                self._do(Call(number, call.type, call.motor, self.accumulator), t)
+            case _ if number in FROM_ACCUMULATOR:
+                self._do(Call(FROM_ACCUMULATOR[number], call.type, call.motor, self.accumulator), t)
+            case _:
+                self._do(call, t)
 
     def _do(self, call: Call, t: float) -> int:
         """Carry out a command of the direct mode; what it reads goes into the accumulator."""
@@ -261,13 +277,12 @@ class Program:
         return value
 
     def _take(self, value: int) -> None:
-        """Put a value into the accumulator."""
         self.accumulator, self._zero = value, value == 0
 
     def _compare(self, left: int, right: int) -> None:
         self._order = (left > right) - (left < right)
 
-    # Jumps and waits
+    # Jumps
 
     def _jump(self, call: Call, t: float) -> None:
         match call.command:
@@ -277,8 +292,13 @@ class Program:
                 self.counter = self._stack.pop() if self._stack else self.counter
             case Word.RST:
                 self._reset(max(0, call.value))
+            case Word.RETI if self._context is not None:
+                kept, self._context = self._context, None
+                self.counter, self.accumulator, self.x = kept.counter, kept.accumulator, kept.x
+                self._zero, self._order = kept.zero, kept.order
+                self._waits, self._due = kept.waits, max(kept.due, self._due)
             case Word.RETI:
-                self._return()
+                pass
             case Word.DJNZ:
                 left = wrapped(self._variable(call.type, t) - 1)
                 self._set_variable(call.type, left, t)
@@ -308,13 +328,6 @@ class Program:
         }
         return by_order.get(condition, False)
 
-    def _wait(self, call: Call, t: float) -> None:
-        ticks = self.accumulator if call.value == BY_ACCUMULATOR else call.value
-        if call.type == Wait.TICKS:
-            self._waits, self._due = call, t + max(LINE_TIME, ticks * TICK)
-        elif not self._over(call, t):
-            self._waits, self._due = call, t + ticks * TICK if ticks > 0 else inf
-
     # Registers and user variables
 
     def _variable(self, number: int, t: float) -> int:
@@ -322,15 +335,6 @@ class Program:
 
     def _set_variable(self, number: int, value: int, t: float) -> None:
         self._do(Call(Command.SGP, number, USERS, value), t)
-
-    def _indexed(self, call: Call, t: float) -> None:
-        """Read or set the user variable whose number is in X; any other number is ignored."""
-        if self.x not in VARIABLES:
-            return
-        if call.command == Word.GIV:
-            self._take(self._variable(self.x, t))
-        else:
-            self._set_variable(self.x, call.value if call.command == Word.SIV else self.accumulator, t)
 
     def _calculate(self, call: Call, t: float) -> None:
         target, other = OPERANDS[call.command]
@@ -365,16 +369,6 @@ class Program:
 
     # Interrupts
 
-    def _set_interrupt(self, call: Call, t: float) -> None:
-        if call.command == Word.VECT:
-            self._vectors[call.type] = max(0, call.value)
-        elif call.command == Word.DI:
-            self._enabled.discard(call.type)
-            self._timers.pop(call.type, None)
-        else:
-            self._enabled.add(call.type)
-            self._start_timer(call.type, t)
-
     def _start_timer(self, number: int, t: float) -> None:
         period = self._execute(Call(Command.GGP, number, INTERRUPTS), t)[1] if number in TIMERS else 0
         if period > 0:
@@ -395,13 +389,6 @@ class Program:
         state = (self.counter, self.accumulator, self.x, self._zero, self._order)
         self._context = Context(*state, self._waits, self._due)
         self.counter, self._waits, self._due = self._vectors[first], None, t + LINE_TIME
-
-    def _return(self) -> None:
-        if self._context is not None:
-            kept, self._context = self._context, None
-            self.counter, self.accumulator, self.x = kept.counter, kept.accumulator, kept.x
-            self._zero, self._order = kept.zero, kept.order
-            self._waits, self._due = kept.waits, max(kept.due, self._due)
 
 
 def calculated(operation: int, left: int, right: int) -> int:
@@ -425,7 +412,3 @@ def calculated(operation: int, left: int, right: int) -> int:
         case Operation.NOT:
             return ~right
     return right
-
-
-def wrapped(number: int) -> int:
-    return (number + 2**31) % 2**32 - 2**31

@@ -9,20 +9,17 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from math import inf
 from typing import Any
 
 from multidrop.dialects import Diagnostic
 from multidrop.dialects.files import split_lines
 from multidrop.dialects.text import counted, whole
 from multidrop.dialects.tmcl.manual import program_file
-from multidrop.dialects.tmcl.manual.commands import Axis, Call, Command, Search, Status
+from multidrop.dialects.tmcl.manual.commands import Axis, Call, Command, Search
 from multidrop.dialects.tmcl.manual.instructions import Word
 from multidrop.dialects.tmcl.manual.program_file import Assembled
 from multidrop.simulator.cell.spec import DriveSpec
 from multidrop.simulator.program_run import (
-    LONGEST,
-    MOST_LINES,
     NO_DEBUGGING,
     Debugging,
     Event,
@@ -33,7 +30,7 @@ from multidrop.simulator.program_run import (
     Summary,
     Values,
     break_point,
-    next_look,
+    looks,
 )
 from multidrop.simulator.tmcl.module import TmclModule, worlds_of
 from multidrop.simulator.tmcl.program import ALL_PORTS, USERS
@@ -82,9 +79,8 @@ class ProgramRun:
             valid = ", ".join(TABLE["tmcl"].personalities)
             raise Diagnostic(f"a {spec.personality} does not run TMCL", name, f"valid: {valid}")
         self._name, self._made, self._text = name, made, source
-        address = (
-            spec.name if spec.name.isdigit() else RUNS.drive.name
-        )  # without a cell it has the name of another drive
+        # without a cell it has the name of another drive
+        address = spec.name if spec.name.isdigit() else RUNS.drive.name
         self._device = TmclModule(replace(spec, name=address, program="", program_name=""), worlds_of(spec))
         self._program = self._device.program
         self._program.load({each.at: each.call for each in made.lines})
@@ -95,33 +91,24 @@ class ProgramRun:
         self._moves = 0
         self._errors: list[str] = []
         self._ended_at = 0.0
-        self.now = 0.0
+        self.now, self._stuck = 0.0, False
 
     def run(self, start: str = "", until: float | None = None, debugging: Debugging = NO_DEBUGGING) -> Iterator[Event]:
         """Run from a label or an address; a Summary is the last event. Raises Diagnostic."""
-        address = self._address(start)
-        if debugging.wanted:
-            self._recorder = self._recorded(debugging)
-        self._program.before, self._program.after = self._before, self._after
-        self._program.run(0.0, address)
-        limit = LONGEST if until is None else until
-        most = MOST_LINES if until is None else inf
-        stuck = False
-        while self._program.running and self.now < limit and self._program.executed < most:
-            due = self._device.deadline
-            stuck = due is None
-            self.now = next_look(due, self.now, limit)
-            self._device.advance(self.now)
-            yield from self._news()
-        yield self._summary(until, stuck)
-
-    def _address(self, start: str) -> int:
         if not self._made.lines:
             raise Diagnostic("no line to run", self._name, "a program has one command at least")
-        found = self._made.labels.get(start.upper(), whole(start or "0", 0, len(self._made.lines) - 1))
-        if found is None:
+        address = self._made.labels.get(start.upper(), whole(start or "0", 0, len(self._made.lines) - 1))
+        if address is None:
             raise Diagnostic(f"no label {start}", self._name, f"valid: {', '.join(self._made.labels) or '0'}")
-        return found
+        if debugging.wanted:
+            self._recorder = self._recorded(debugging)
+        program, device = self._program, self._device
+        program.before, program.after = self._before, self._after
+        program.run(0.0, address)
+        for self.now, self._stuck in looks(program, lambda: device.deadline, until):
+            device.advance(self.now)
+            yield from self._news()
+        yield self._summary(until)
 
     # Debugging
 
@@ -131,7 +118,8 @@ class ProgramRun:
             point = break_point(each, self._name, "LINE, LABEL, or either with ,PASSES")
             points[self._line_of(point.place)] = point
         names = {name.upper(): self._reader(name.upper()) for name in debugging.watch}
-        return Recorder(debugging, self._text, points, partial(self._values, names or {"A": "A", "X": "X"}))
+        values = partial(self._values, names or {"A": "A", "X": "X"})
+        return Recorder(debugging, self._text, points, values, _shown)
 
     def _line_of(self, place: str) -> int:
         at = self._made.labels.get(place.upper())
@@ -156,37 +144,23 @@ class ProgramRun:
 
     def _values(self, names: Mapping[str, Call | str]) -> Values:
         registers = {"A": self._program.accumulator, "X": self._program.x}
-        return {name: registers[how] if isinstance(how, str) else self._read(how) for name, how in names.items()}
-
-    def _read(self, call: Call) -> int:
-        status, value = self._device.carry_out(call, self._begun[0])
-        return value if status == Status.DONE else 0
+        t, read = self._begun[0], self._device.carry_out
+        return {name: registers[how] if isinstance(how, str) else read(how, t)[1] for name, how in names.items()}
 
     # The run
 
     def _before(self, t: float, at: int) -> bool:
         self._begun = t, self._source.get(at, 0)
-        recorder = self._recorder
-        if recorder is None or not recorder.reaches(self._begun[1]):
-            return False
-        recorder.breaks(t, self._begun[1], self._shown(self._begun[1]))
-        return True
+        return self._recorder is not None and self._recorder.reaches(*self._begun)
 
     def _after(self, t: float, call: Call) -> None:
         self._ended_at = t
         self._moves += _begins_motion(call)
-        if call.command == Word.SIO and call.motor == USERS and not self._failed_now(t):
+        failed = bool(self._program.failures) and self._program.failures[-1].t == t
+        if call.command == Word.SIO and call.motor == USERS and not failed:
             self._events.append(Output(t, call.type, call.value))
-        if self._recorder is not None and not self._recorder.full:
-            _, line = self._begun
-            self._recorder.after(t, line, self._shown(line), self._recorder.changed())
-
-    def _failed_now(self, t: float) -> bool:
-        return bool(self._program.failures) and self._program.failures[-1].t == t
-
-    def _shown(self, number: int) -> str:
-        line = self._text[number - 1] if 0 < number <= len(self._text) else ""
-        return line[: program_file.remark_at(line)].strip()
+        if self._recorder is not None:
+            self._recorder.after(t, self._begun[1])
 
     def _news(self) -> Iterator[Event]:
         """Yield what was executed, set and not carried out since the last look, in the order of time."""
@@ -195,17 +169,20 @@ class ProgramRun:
             news += self._recorder.take()
         for each in self._program.failures:
             line = self._source.get(each.at, 0)
-            news.append(Failed(each.t, line, self._shown(line), each.why))
+            news.append(Failed(each.t, line, _shown(self._text[line - 1]) if line else "", each.why))
             self._errors.append(each.why)
         self._program.failures.clear()
         yield from sorted(news, key=lambda each: each.t)
 
-    def _summary(self, until: float | None, stuck: bool) -> Summary:
+    def _summary(self, until: float | None) -> Summary:
         running, errors = self._program.running, tuple(self._errors)
         broken = self._recorder is not None and self._recorder.broken
         t = self.now if running else self._begun[0] if broken else self._ended_at
-        position = self._read_axis(Axis.ACTUAL_POSITION)
-        moving = self._read_axis(Axis.ACTUAL_VELOCITY) != 0
+        position, velocity = (
+            self._device.carry_out(Call(Command.GAP, each), self.now)[1]
+            for each in (Axis.ACTUAL_POSITION, Axis.ACTUAL_VELOCITY)
+        )
+        moving = velocity != 0
         ended = "break" if broken else "until" if running else "error" if errors else "END"
         failed = counted(len(errors), "error") if errors else "no errors"
         lines = self._program.executed
@@ -219,13 +196,14 @@ class ProgramRun:
             lines_at=tuple(each for each in (self._source.get(self._program.counter, 0),) if running),
             moving=moving,
             given_up=running and until is None,
-            stuck=running and stuck,
+            stuck=running and self._stuck,
             counts=f"position {position}, {counted(self._moves, 'motion')}, {counted(lines, 'line')}, {failed}",
             turning="the motor still turns; WAIT POS before STOP waits for it" if moving and ended == "END" else "",
         )
 
-    def _read_axis(self, parameter: Axis) -> int:
-        return self._device.carry_out(Call(Command.GAP, parameter), self.now)[1]
+
+def _shown(line: str) -> str:
+    return line[: program_file.remark_at(line)].strip()
 
 
 def _begins_motion(call: Call) -> bool:
@@ -235,7 +213,6 @@ def _begins_motion(call: Call) -> bool:
 
 
 def read(text: str, file: str) -> Load:
-    """Read the text of a file. Raises Diagnostic."""
     made, source = program_file.assembled(program_file.read(text, file)), split_lines(text)
     return lambda spec: ProgramRun(spec, made, file, source)
 

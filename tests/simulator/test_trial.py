@@ -7,7 +7,8 @@ import pytest
 from multidrop.dialects import Diagnostic
 from multidrop.dialects.mcode.manual import program_file
 from multidrop.simulator.cell.spec import DriveSpec, WorldSpec
-from multidrop.simulator.lexium.program_run import LONGEST, Failed, Printed, ProgramRun, Summary
+from multidrop.simulator.lexium.program_run import Failed, Printed, ProgramRun, Summary
+from multidrop.simulator.program_run import LONGEST
 
 Event = Printed | Failed | Summary
 

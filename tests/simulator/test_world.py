@@ -1,12 +1,14 @@
 """The physical world around a drive: schedules, what is set by hand, switches by position, pushes."""
 
+from math import inf
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from multidrop.simulator.cell.spec import WorldSpec
-from multidrop.simulator.kinematics import move, slew
-from multidrop.simulator.world import REVOLUTION, World
+from multidrop.simulator.kinematics import Pace, move, slew
+from multidrop.simulator.world import World
 
 SCHEDULE = WorldSpec(inputs=((2.0, 1, 0), (2.5, 1, 1), (1.0, 3, 1)), analog=((0.5, 2048), (3.0, 100)))
 
@@ -15,14 +17,14 @@ def test_an_input_that_nobody_drives_has_no_level() -> None:
     world = World(WorldSpec())
     assert world.level(1, 0) is None
     assert world.analog(0) == 0
-    assert world.next_change(0) is None
+    assert world.next_change(0) == inf
 
 
 def test_the_schedule_is_followed_in_the_order_of_time() -> None:
     world = World(SCHEDULE)
     world.powered_up(0)
     changes = [0.0]
-    while (at := world.next_change(changes[-1])) is not None:
+    while (at := world.next_change(changes[-1])) < inf:
         changes.append(at)
     assert changes == [0, 0.5, 1, 2, 2.5, 3]
     world.powered_up(0)
@@ -104,9 +106,9 @@ def test_pushes_add_up() -> None:
 
 def test_every_switch_on_the_way_is_met_once() -> None:
     world = World(WorldSpec(home=0, limit_plus=2000, limit_minus=-1000))
-    profile = move(5, -3000, 0, 3000, vi=100, vm=5000, a=1e4, d=1e4)
+    profile = move(5, -3000, 0, 3000, Pace(vi=100, vm=5000, a=1e4, d=1e4))
     seen, t = [], 0.0
-    while (at := world.next_switch(profile, t)) is not None:
+    while (at := world.next_switch(profile, t)) < inf:
         assert at > t
         seen.append((round(profile.position(at)), world.switches(profile.position(at))))
         t = at
@@ -119,17 +121,17 @@ def test_every_switch_on_the_way_is_met_once() -> None:
 
 def test_a_switch_is_met_on_the_way_out_and_on_the_way_back() -> None:
     world = World(WorldSpec(limit_plus=1000))
-    profile = move(0, 0, 50_000, 0, vi=1000, vm=60_000, a=1e6, d=1e6)
+    profile = move(0, 0, 50_000, 0, Pace(vi=1000, vm=60_000, a=1e6, d=1e6))
     first = world.next_switch(profile, 0)
-    assert first is not None and world.switches(profile.position(first))[1]
+    assert world.switches(profile.position(first))[1]
     second = world.next_switch(profile, first)
-    assert second is not None and not world.switches(profile.position(second))[1]
-    assert world.next_switch(profile, second) is None
+    assert not world.switches(profile.position(second))[1]
+    assert world.next_switch(profile, second) == inf
 
 
 def test_a_push_moves_the_switches_against_the_motor() -> None:
     world = World(WorldSpec(home=0))
-    profile = slew(0, 500, 0, -100, vi=100, a=1, d=1)
+    profile = slew(0, 500, 0, -100, Pace(vi=100, vm=inf, a=1, d=1))
     assert world.next_switch(profile, 0) == pytest.approx(5)
     assert world.next_switch(profile, 0, offset=-200) == pytest.approx(3)
 
@@ -137,19 +139,10 @@ def test_a_push_moves_the_switches_against_the_motor() -> None:
 @given(st.integers(-(10**6), 10**6), st.sampled_from((-1.0, 1.0)), st.floats(0, 1e5), st.integers(1, 10**6))
 def test_the_time_of_a_switch_is_one_at_which_it_has_changed(mark: int, way: float, at: float, speed: int) -> None:
     world = World(WorldSpec(home=mark))
-    profile = slew(at, mark - way * 1000, 0, way * speed, vi=1, a=1e9, d=1e9)
+    profile = slew(at, mark - way * 1000, 0, way * speed, Pace(vi=1, vm=inf, a=1e9, d=1e9))
     before = world.switches(profile.origin)[0]
     found = world.next_switch(profile, at)
-    assert found is not None
+    assert found < inf
     assert world.switches(profile.position(found))[0] is not before
     assert profile.position(found) == pytest.approx(mark, abs=1.1)
-    assert world.next_switch(profile, found) is None
-
-
-@given(st.floats(-1e6, 1e6), st.floats(0, REVOLUTION))
-def test_there_is_an_index_mark_every_turn(position: float, index: float) -> None:
-    world = World(WorldSpec(), index=index)
-    ahead, behind = world.next_index(position, 1), world.next_index(position, -1)
-    assert behind < position < ahead
-    assert ahead - behind in (pytest.approx(REVOLUTION), pytest.approx(2 * REVOLUTION))
-    assert (ahead - index) % REVOLUTION in (pytest.approx(0, abs=1e-6), pytest.approx(REVOLUTION))
+    assert world.next_switch(profile, found) == inf

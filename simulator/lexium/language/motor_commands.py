@@ -38,16 +38,17 @@ class MotorCommands:
         self.begun = 0
 
     def commands(self) -> Mapping[str, Compile]:
-        moves = {"MA": self._move, "MR": self._move, "SL": self._slew, "SC": self._test}
-        homings = dict.fromkeys(("HM", "HI", "HF"), self._home)
-        return {
-            **{word: partial(self._counting, word, compiler) for word, compiler in {**moves, **homings}.items()},
-            "CF": bare(self._motor.hmt.clear),
-            "MU": self._make_up,
-        }
+        begin = {**dict.fromkeys(("MA", "MR"), self._move), **dict.fromkeys(("HM", "HI", "HF"), self._home)}
+        begin |= {"SL": self._slew, "SC": self._test}
 
-    def _counting(self, word: str, compiler: Compile, statement: Statement) -> Action:
-        return self.counted(word, compiler(statement))
+        def counting(word: str, compiler: Compile, statement: Statement) -> Action:
+            return self.counted(word, compiler(statement))
+
+        return {
+            **{word: partial(counting, word, each) for word, each in begin.items()},
+            "CF": bare(self._motor.hmt.clear),
+            "MU": self._variables.numbers(self._make_up, 1, 2),
+        }
 
     def counted(self, word: str, action: Action) -> Action:
         """Count the motions that an action begins; one that only slows down does not count. No word: as MD says."""
@@ -103,30 +104,24 @@ class MotorCommands:
         read = self._variables.value(statement.arguments[0])
         return lambda: self._motor.homing.start(word, whole(read()), self._timeline.now)
 
-    def _make_up(self, statement: Statement) -> Action:
+    def _make_up(self, values: list[int]) -> None:
         """MU: the mode, and 1 to clear lead and lag."""
-        read = self._variables.numbers(statement, 1, 2)
-
-        def set_up() -> None:
-            mode, clearing = (*read(), 0)[:2]
-            if mode not in (0, 1, 2) or clearing not in (0, 1):
-                raise Fault(E.OUT_OF_RANGE)
-            self._motor.hmt.make_up(mode, clearing, self._timeline.now)
-
-        return set_up
+        mode, clearing = (*values, 0)[:2]
+        if mode not in (0, 1, 2) or clearing not in (0, 1):
+            raise Fault(E.OUT_OF_RANGE)
+        self._motor.hmt.make_up(mode, clearing, self._timeline.now)
 
     def _test(self, statement: Statement) -> Action:
         """SC 1. Raises Fault (24) without its number."""
         if not statement.arguments:
             raise Fault(E.ILLEGAL_DATA)
-        read = self._variables.numbers(statement, 1, 1)
 
-        def start() -> None:
-            if read() != [1]:
+        def start(values: list[int]) -> None:
+            if values != [1]:
                 raise Fault(E.OUT_OF_RANGE)
             self._motor.start_test(self._timeline.now)
 
-        return start
+        return self._variables.numbers(start, 1, 1)(statement)
 
 
 class Setups:
@@ -139,52 +134,39 @@ class Setups:
         self._points = core.model.points
 
     def commands(self) -> Mapping[str, Compile]:
+        numbers = self._variables.numbers
         return {
             "DN": self._device_name,
-            "IS": self._input,
-            "OS": self._output,
-            "LS": self._software_limit,
-            "PF": self._print_format,
-            "PW": partial(self._texts, 4),
-            **{f"S{n}": partial(self._point, n) for n in (*range(1, 6), *range(7, 14))},
+            "IS": numbers(self._input, 2, 3),
+            "OS": numbers(self._outputs.set_up, 2, 3),
+            "LS": numbers(self._software_limit, 3, 3),
+            "PF": numbers(self._print_format, 1, 4),
+            "PW": numbers(partial(self._keep, "PW"), 4, 4),
+            **{f"S{n}": self._point(n) for n in self._points.fresh if self._points.shared},
             **{word: partial(self._place_trip, word) for word in ("TC", "TM")},
             **{word: partial(self._value_trip, word) for word in ("TI", "TP", "TT", "TR", "TA")},
         }
 
     # Inputs and outputs.
 
-    def _input(self, statement: Statement) -> Action:
+    def _input(self, values: list[int]) -> None:
         """IS (manual 5.1.64)."""
-        read = self._variables.numbers(statement, 2, 3)
-
-        def set_up() -> None:
-            n, *rest = read()
-            was = self._inputs.types.get(n, (0, 0))
-            self._inputs.set_up([n, *rest])
-            self._wired(n, was)
-
-        return set_up
+        was = self._inputs.types.get(values[0], (0, 0))
+        self._inputs.set_up(values)
+        self._wired(values[0], was)
 
     def _wired(self, n: int, was: tuple[int, ...]) -> None:
-        """Act on an input's new set-up."""
         self._motor.limit_stop.wired(n, was[0], self._timeline.now)
         self._timeline.replan()
         if n in self._inputs.numbers:
             self._drive.wired(n, was)
 
-    def _output(self, statement: Statement) -> Action:
-        """OS (manual 5.1.93)."""
-        read = self._variables.numbers(statement, 2, 3)
-        return lambda: self._outputs.set_up(read())
-
-    def _point(self, n: int, statement: Statement) -> Action:
+    def _point(self, n: int) -> Compile:
         """S<n> of an MDrivePlus: type, active level, and of a point that is either, whether it sources."""
-        points = self._points
-        fields = len(points.fresh[n])
-        read = self._variables.numbers(statement, 1 if n == ANALOG else 2, fields)
+        points, fields = self._points, len(self._points.fresh[n])
 
-        def set_up() -> None:
-            values = (*read(), 0, 0)[:fields]
+        def set_up(given: list[int]) -> None:
+            values = (*given, 0, 0)[:fields]
             if any(each not in (0, 1) for each in values[1:]):
                 raise Fault(E.OUT_OF_RANGE)
             was = self._inputs.types[n]
@@ -192,7 +174,7 @@ class Setups:
                 self._set_point(each, values)
             self._wired(n, was)
 
-        return set_up
+        return self._variables.numbers(set_up, 1 if n == ANALOG else 2, fields)
 
     def _set_point(self, n: int, values: tuple[int, ...]) -> None:
         """Make a point an input or an output. Raises Fault (6, 8, 21)."""
@@ -206,47 +188,30 @@ class Setups:
             self._outputs.release(n)
         self._inputs.types[n] = values
 
-    def _software_limit(self, statement: Statement) -> Action:
+    def _software_limit(self, values: list[int]) -> None:
         """LS; the minus limit must be below the plus limit while both are enabled (manual 5.1.78)."""
-        read, limits = self._variables.numbers(statement, 3, 3), self._motor.limits.software
-
-        def set_up() -> None:
-            which, position, enabled = read()
-            if which not in (0, 1) or enabled not in (0, 1) or not -0x80000000 <= position <= 0x7FFFFFFF:
-                raise Fault(E.OUT_OF_RANGE)
-            other, other_enabled = limits[1 - which]
-            crossed = position <= other if which else position >= other
-            if enabled and other_enabled and crossed:
-                raise Fault(E.OUT_OF_RANGE)
-            change = {which: (position, enabled)}
-            self._motor.limit_stop.relocate(lambda: limits.update(change), self._timeline.now)
-            self._timeline.replan()
-
-        return set_up
+        limits, (which, position, enabled) = self._motor.limits.software, values
+        if which not in (0, 1) or enabled not in (0, 1) or not -0x80000000 <= position <= 0x7FFFFFFF:
+            raise Fault(E.OUT_OF_RANGE)
+        other, other_enabled = limits[1 - which]
+        crossed = position <= other if which else position >= other
+        if enabled and other_enabled and crossed:
+            raise Fault(E.OUT_OF_RANGE)
+        change = {which: (position, enabled)}
+        self._motor.limit_stop.relocate(lambda: limits.update(change), self._timeline.now)
+        self._timeline.replan()
 
     # Texts.
 
-    def _print_format(self, statement: Statement) -> Action:
+    def _print_format(self, values: list[int]) -> None:
         """PF (manual 5.1.97)."""
-        read = self._variables.numbers(statement, 1, 4)
+        values = [*values, *PRINT_FORMAT[len(values) :]]
+        if not all(0 <= value <= most for value, most in zip(values, (16, 16, 1, 1), strict=True)):
+            raise Fault(E.OUT_OF_RANGE)
+        self._keep("PF", values)
 
-        def set_up() -> None:
-            values = (*read(), *PRINT_FORMAT[len(statement.arguments) :])
-            ranges = (16, 16, 1, 1)
-            if not all(0 <= value <= most for value, most in zip(values, ranges, strict=True)):
-                raise Fault(E.OUT_OF_RANGE)
-            self._memory.texts["PF"] = ",".join(str(each) for each in values)
-
-        return set_up
-
-    def _texts(self, count: int, statement: Statement) -> Action:
-        """Numbers that are kept as they are."""
-        read, word = self._variables.numbers(statement, count, count), statement.word
-
-        def keep() -> None:
-            self._memory.texts[word] = ",".join(str(each) for each in read())
-
-        return keep
+    def _keep(self, word: str, values: list[int]) -> None:
+        self._memory.texts[word] = ",".join(map(str, values))
 
     def _device_name(self, statement: Statement) -> Action:
         """DN: a letter or digit, in the forms that the product takes (manual 5.1.33)."""

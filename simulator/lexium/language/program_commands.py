@@ -9,15 +9,16 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 
 from multidrop.dialects.mcode.manual.errors import ErrorNumber as E
-from multidrop.dialects.mcode.manual.grammar import Argument, Compare, Name, Number, Statement, Text
+from multidrop.dialects.mcode.manual.grammar import Compare, Name, Number, Statement, Text
 from multidrop.dialects.mcode.manual.table import lookup
 from multidrop.simulator.lexium.event_loop import EventLoop
 from multidrop.simulator.lexium.language.variables import Compile, Variables, bare, is_place, only, pair
 from multidrop.simulator.lexium.state.errors import CRLF, Fault
-from multidrop.simulator.lexium.state.expressions import compile_condition, whole
+from multidrop.simulator.lexium.state.expressions import whole
 from multidrop.simulator.lexium.state.memory import within
 from multidrop.simulator.lexium.state.program_memory import FIRST, SPACE, Action
 
+ADDRESSES = range(FIRST, FIRST + SPACE)
 MOST_PASSES = 65535
 OPTIONS = (Number(0), Number(1))
 """CP's parameter: keep the user's variables, or delete them too."""
@@ -72,9 +73,7 @@ class ProgramCommands:
         if target is None or not is_place(target) or isinstance(condition, Text):
             raise Fault(E.ILLEGAL_DATA)
 
-        holds = None
-        if condition is not None:
-            holds = compile_condition(condition, self._variables.reader, self._memory.model.floating)
+        holds = None if condition is None else self._variables.compiler.condition(condition)
         printer, thread, linked = self._printer, self._thread, self._interpreter.linked
         calls, places, place = statement.word == "CL", linked.places, -1
 
@@ -236,19 +235,15 @@ class ProgramCommands:
                 raise Fault(E.NOT_IN_PROGRAM_MODE)
             self._check_idle(E.MOVING_SAVE)
             self._check_unlocked()
-            self._mode.address = self._address(statement.arguments[0])
+            target = statement.arguments[0]
+            if isinstance(target, Name):
+                self._mode.address = self._program.resolve(target)
+            elif isinstance(target, Number) and isinstance(target.value, int) and target.value in ADDRESSES:
+                self._mode.address = target.value
+            else:
+                raise Fault(E.NO_SUCH_ADDRESS)
 
         return enter
-
-    def _address(self, target: Argument | None) -> int:
-        """Where program mode begins. Raises Fault (30, 34, 42)."""
-        if isinstance(target, Name):
-            return self._program.resolve(target)
-        if not isinstance(target, Number) or not isinstance(target.value, int):
-            raise Fault(E.NO_SUCH_ADDRESS)
-        if not FIRST <= target.value < FIRST + SPACE:
-            raise Fault(E.NO_SUCH_ADDRESS)
-        return target.value
 
     def _on_error(self, statement: Statement) -> Action:
         """OE; 0 or nothing takes the handler away (manual 5.1.91)."""
@@ -296,7 +291,7 @@ class ProgramCommands:
     # CP (manual 5.1.23): CP; CP <0/1>; CP <label>; CP <0/1>,<label>; CP S also saves.
 
     def _clear(self, statement: Statement) -> Action:
-        arguments, takes_option = statement.arguments, self._memory.model.clears_variables
+        memory, arguments, takes_option = self._memory, statement.arguments, self._memory.model.clears_variables
         if len(arguments) > (2 if takes_option else 1):
             raise Fault(E.ILLEGAL_DATA)
         saves = arguments == (Name("S"),) and takes_option
@@ -309,25 +304,21 @@ class ProgramCommands:
         def clear() -> None:
             if all_of_it:  # only CP without a parameter opens a lock (manual 5.1.75)
                 self._check_unlocked()
-            self._clear_from(target, variables=option == Number(1))
+            self._check_idle(E.MOVING_CLEAR)
+            if target is None:
+                memory.values["LK"] = 0
+            self._check_unlocked()
+            everything = target is None or target == Number(FIRST)  # the beginning is there in an empty memory too
+            self._program.clear(FIRST if everything else self._program.resolve(target))
+            self._interpreter.linked.forget()
+            if target is None and memory.model.clear_ends_handler:
+                self._interpreter.handler = None
+            if option == Number(1):
+                for name in list(memory.scopes):
+                    memory.forget(name)
+            else:
+                memory.forget_local()
             if saves:
                 self._nvm.save()
 
         return clear
-
-    def _clear_from(self, target: Argument | None, variables: bool) -> None:
-        memory, interpreter = self._memory, self._interpreter
-        self._check_idle(E.MOVING_CLEAR)
-        if target is None:
-            memory.values["LK"] = 0
-        self._check_unlocked()
-        everything = target is None or target == Number(FIRST)  # the beginning of memory is there in an empty one too
-        self._program.clear(FIRST if everything else self._program.resolve(target))
-        self._interpreter.linked.forget()
-        if target is None and memory.model.clear_ends_handler:
-            interpreter.handler = None
-        if variables:
-            for name in list(memory.scopes):
-                memory.forget(name)
-        else:
-            memory.forget_local()

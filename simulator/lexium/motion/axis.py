@@ -10,10 +10,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from math import floor, inf
-from typing import Protocol, TypedDict
+from typing import Protocol
 
 from multidrop.dialects.mcode.manual.errors import ErrorNumber as E
-from multidrop.simulator.kinematics import LINEAR, Profile, Shape, halt, move, slew
+from multidrop.simulator.kinematics import LINE, LINEAR, Pace, Profile, Shape, halt, move, slew
 from multidrop.simulator.lexium.motion.counters import Counters
 from multidrop.simulator.lexium.motion.rotor import CATCHING, Rotor
 from multidrop.simulator.lexium.state.errors import Fault
@@ -53,17 +53,6 @@ class Bridges:
 
 STEEPEST = 1.1e9
 """The highest acceleration that a drive makes, steps/s2; an S-curve's peak may not be above it."""
-STRAIGHT = Shape()
-
-
-class Ramps(TypedDict):
-    """How the velocity changes (manual 5.1.7, 5.1.9, 5.1.27, 5.1.30): steps/s, steps/s2, the shapes of both ramps."""
-
-    vi: float
-    a: float
-    d: float
-    up: Shape
-    down: Shape
 
 
 class Backlash:
@@ -135,7 +124,7 @@ class Axis:
     """One motor. `kind` is what moves or moved it: MA, MR, SL, or one of the kinds above.
 
     `announce`: the drive's name is sent when the motion is over. `arriving`: the motion will end by itself. `mark` is
-    when a motion that runs on passes its target, `back` the steps that follow the motion (BM=1).
+    when a motion that runs on passes its target (infinite: never), `back` the steps that follow the motion (BM=1).
     """
 
     def __init__(self, memory: Memory, rotor: Rotor, counters: Counters, supervisor: Supervisor) -> None:
@@ -147,7 +136,7 @@ class Axis:
         self.kind = ""
         self.announce = False
         self.arriving = False
-        self.mark: float | None = None
+        self.mark = inf
         self.back = 0.0
         self.aligned = 0.0
         self._top = 0.0
@@ -181,7 +170,7 @@ class Axis:
 
     def go(self, kind: str, value: int, t: float, announce: bool = False, run_on: bool = False) -> None:
         """Carry out MA or MR. `announce`: send the name when it is over; `run_on`: do not stop there. Raises Fault."""
-        counters, scale = self.counters, self._memory.scale
+        counters = self.counters
         if not -0x80000000 <= value <= 0x7FFFFFFF:
             raise Fault(E.OUT_OF_RANGE)
         distance = value - counters.position(t) if kind == "MA" else value
@@ -189,7 +178,7 @@ class Axis:
         self._ready(t, distance)
         if self.kind == CORRECTION and self.commanded(t):
             raise Fault(E.STILL_CORRECTING)
-        velocity, ramps = self.profile.velocity(t), self._ramps()
+        velocity, pace = self.profile.velocity(t), self._pace()
         if self.kind in (SLEW, HOMING, TORQUE):
             self.backlash.flank = int(self.direction(t))
         first, after = self.backlash.plan(distance, absolute=kind == "MA")
@@ -197,14 +186,14 @@ class Axis:
             first, after = first + after, 0
         place = counters.place_of_raw(raw + first) + counters.stator_shift(t)
         self.back = counters.place_of_raw(raw + first + after) - counters.place_of_raw(raw + first) if after else 0.0
-        top = self._top = self._memory.values["VM"] * scale
+        self._top = pace.vm
         begin = t if self.profile.moving(t) else t + self._memory.model.compute
         if run_on and (distance or velocity):
-            signed = top if (distance or velocity) > 0 else -top
-            self.begin(kind, slew(begin, here, velocity, signed, **ramps), t)
+            signed = pace.vm if (distance or velocity) > 0 else -pace.vm
+            self.begin(kind, slew(begin, here, velocity, signed, pace), t)
             self.mark = self.profile.crossing(place, t)
         else:
-            self.begin(kind, move(begin, here, velocity, place, vm=top, **ramps), t)
+            self.begin(kind, move(begin, here, velocity, place, pace), t)
         self.announce = announce
 
     def slew(self, value: int, t: float) -> None:
@@ -227,13 +216,13 @@ class Axis:
         here, now = self.profile.position(t), self.profile.velocity(t)
         default = SLEW if velocity or self.kind not in MOVES else self.kind
         self.back = 0.0
-        self.begin(kind or default, slew(t, here, now, velocity, **self._ramps()), t)
+        self.begin(kind or default, slew(t, here, now, velocity, self._pace()), t)
         self._stopping, self.announce = stopping, False
 
     def correct(self, distance: float, t: float) -> None:
         """Go back to where the last motion should have ended: at VI, without ramps (PM)."""
         here, vi = self.profile.position(t), self._memory.values["VI"] * self._memory.scale
-        self.begin(CORRECTION, move(t, here, 0.0, here + distance, vi=vi, vm=vi, a=1.0, d=1.0), t)
+        self.begin(CORRECTION, move(t, here, 0.0, here + distance, Pace(vi, vi, 1.0, 1.0)), t)
 
     def step(self, steps: int, t: float) -> None:
         """Make a few steps at once, as a clock on the inputs asks for them (FL)."""
@@ -247,12 +236,11 @@ class Axis:
         here = self.profile.position(t)
         place = floor(here) + 1 if direction > 0 else -floor(-here) - 1 if direction < 0 else floor(here + 0.5)
         self._take(halt(t, place), t)
-        self.kind, self.mark, self.back = "", None, 0.0
+        self.kind, self.mark, self.back = "", inf, 0.0
         self.announce = self.arriving = self._stopping = False
 
     def begin(self, kind: str, profile: Profile, t: float) -> None:
-        """Let a motion take the place of the one before."""
-        self.kind, self.mark = kind, None
+        self.kind, self.mark = kind, inf
         self.arriving = profile.end < inf
         self._stopping = False
         self._supervisor.motion_began()
@@ -268,8 +256,8 @@ class Axis:
         self.arriving = self._stopping = False
         if self.back:
             place, self.back = self.profile.position(t) + self.back, 0.0
-            announce, ramps = self.announce, self._ramps()
-            self.begin(self.kind, move(t, self.profile.position(t), 0.0, place, vm=self._top, **ramps), t)
+            announce, pace = self.announce, self._pace()._replace(vm=self._top)
+            self.begin(self.kind, move(t, self.profile.position(t), 0.0, place, pace), t)
             self.announce = announce
             return False
         announce, self.announce = self.announce, False
@@ -281,47 +269,41 @@ class Axis:
 
     def pass_mark(self) -> bool:
         """Take note that a motion that runs on passes its target. Return whether the name is sent."""
-        announce, self.announce, self.mark, self.kind = self.announce, False, None, SLEW
+        announce, self.announce, self.mark, self.kind = self.announce, False, inf, SLEW
         return announce
 
     def pause(self, t: float) -> Callable[[float], None]:
         """Slow down and stop; what is given goes on with the motion, and with the name that is to be sent."""
-        (goal_kind, goal), kind, announce, back = self._goal(), self.kind, self.announce, self.back
-        place = None if self.mark is None else self.profile.position(self.mark)
+        goal_kind, goal = self.kind, self.profile.target
+        if self.profile.end == inf:
+            goal_kind, goal = SLEW, self.profile.segments[-1].velocity
+        elif self.kind == SLEW:
+            goal = 0.0
+        kind, announce, back = self.kind, self.announce, self.back
+        place = None if self.mark == inf else self.profile.position(self.mark)
         self.slow_to(0, t)
-        if place is not None and (mark := self.profile.crossing(place, t)) is not None:
+        if place is not None and (mark := self.profile.crossing(place, t)) < inf:
             self.mark, self.announce = mark, announce
             kind, announce, place = SLEW, False, None
         else:
             self.announce = False
 
         def go_on(t: float) -> None:
-            distance = goal if goal_kind == SLEW else goal - self.profile.position(t)
-            if distance:
+            here, now = self.profile.position(t), self.profile.velocity(t)
+            if distance := goal if goal_kind == SLEW else goal - here:
                 self._ready(t, distance)
-            self._take_up(goal_kind, goal, t)
+            if goal_kind == SLEW:
+                self.slow_to(goal, t)
+            elif goal_kind == CORRECTION:
+                self.correct(distance, t)
+            else:
+                self.begin(goal_kind, move(t, here, now, goal, self._pace()), t)
             self.back = back
             if place is not None:
                 self.kind, self.mark = kind, self.profile.crossing(place, t)
             self.announce = announce
 
         return go_on
-
-    def _goal(self) -> tuple[str, float]:
-        """The kind of motion, and its target or its velocity in steps."""
-        if self.profile.end == inf:
-            return SLEW, self.profile.segments[-1].velocity
-        return (SLEW, 0.0) if self.kind == SLEW else (self.kind, self.profile.target)
-
-    def _take_up(self, kind: str, value: float, t: float) -> None:
-        here, now = self.profile.position(t), self.profile.velocity(t)
-        if kind == SLEW:
-            self.slow_to(value, t)
-        elif kind == CORRECTION:
-            self.correct(value - here, t)
-        else:
-            top = self._memory.values["VM"] * self._memory.scale
-            self.begin(kind, move(t, here, now, value, vm=top, **self._ramps()), t)
 
     def _take(self, profile: Profile, t: float) -> None:
         self._direction = self.direction(t)
@@ -357,17 +339,21 @@ class Axis:
             if self._shape(shape, rate) is None:
                 raise Fault(code)
 
-    def _ramps(self) -> Ramps:
-        """The ramps in steps: straight where a curve would be too steep, as a stop is never refused."""
+    def _pace(self) -> Pace:
+        """VI, VM, A and D in steps (manual 5.1.7, 5.1.9, 5.1.27, 5.1.30) with both ramps.
+
+        They are straight where a curve would be too steep, as a stop is never refused.
+        """
         values, scale = self._memory.values, self._memory.scale
-        up, down = self._shape("AT", "A") or STRAIGHT, self._shape("DT", "D") or STRAIGHT
-        return {"vi": values["VI"] * scale, "a": values["A"] * scale, "d": values["D"] * scale, "up": up, "down": down}
+        up, down = self._shape("AT", "A") or LINE, self._shape("DT", "D") or LINE
+        vi, vm, a, d = (values[word] * scale for word in ("VI", "VM", "A", "D"))
+        return Pace(vi, vm, a, d, up, down)
 
     def _shape(self, kind: str, rate: str) -> Shape | None:
         """Make a shape of AT and AJ, or DT and DJ; None where the middle of the ramp would be too steep."""
         values = self._memory.values
         if (number := values.get(kind, LINEAR)) == LINEAR:
-            return STRAIGHT
+            return LINE
         shape = Shape(int(number), int(values.get(f"{rate}J", 0)))
         return shape if values[rate] * self._memory.scale * shape.peak <= STEEPEST else None
 

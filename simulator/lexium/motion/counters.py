@@ -15,11 +15,12 @@ from math import floor, inf, nextafter
 
 from multidrop.dialects.mcode.manual.errors import ErrorNumber as E
 from multidrop.simulator.lexium.motion.inputs import MINUS, PLUS, Inputs
-from multidrop.simulator.lexium.motion.rotor import TOUCH, Rotor
+from multidrop.simulator.lexium.motion.rotor import Rotor
 from multidrop.simulator.lexium.state.errors import Fault
 from multidrop.simulator.lexium.state.expressions import wrap
 from multidrop.simulator.lexium.state.interpreter import Core
 from multidrop.simulator.lexium.state.memory import Memory, Trip
+from multidrop.simulator.world import TOUCH
 
 TURNOVER = 2**32
 """From one end of a counter to the same again."""
@@ -90,17 +91,13 @@ class Counters:
     def passing(self, place: float, t: float, direction: float = 0.0) -> float:
         """The first time from t on at which P passes a place, in a direction if one is given; infinite: never."""
         profile, shift = self._rotor.path if self._memory.counting else (self._rotor.command, 0.0)
-        if profile.end <= t:
-            return inf
-        found = profile.crossing(place - shift, t, direction)
-        return inf if found is None else found
+        return profile.crossing(place - shift, t, direction) if profile.end > t else inf
 
     def reaching_steps(self, steps: int, t: float) -> float:
         """The first time from t on at which C1 reads so many steps, on either side of here; infinite: never."""
         command, raw = self._rotor.command, steps - self._offsets["C1"]
         raw += TURNOVER * floor((self.raw("C1", t) - raw) / TURNOVER)
-        found = [command.crossing(place, t) for place in (raw, raw + TURNOVER)] if command.end > t else []
-        return min((each for each in found if each is not None), default=inf)
+        return min(command.crossing(place, t) for place in (raw, raw + TURNOVER)) if command.end > t else inf
 
     def stator_shift(self, t: float) -> float:
         """By how much the command is ahead of the counter that P is, steps."""

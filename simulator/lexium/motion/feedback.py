@@ -27,9 +27,10 @@ from multidrop.dialects.mcode.manual.errors import ErrorNumber as E
 from multidrop.simulator.kinematics import halt, meeting
 from multidrop.simulator.lexium.motion.axis import CORRECTION, MOVES, TORQUE, Axis
 from multidrop.simulator.lexium.motion.counters import Limits, Trips
-from multidrop.simulator.lexium.motion.rotor import FOLLOWING, STANDING, TOUCH
+from multidrop.simulator.lexium.motion.rotor import FOLLOWING, STANDING
 from multidrop.simulator.lexium.state.errors import Event, Fault, nothing, when
 from multidrop.simulator.lexium.state.interpreter import Core
+from multidrop.simulator.world import TOUCH
 
 NEAR = 1e-3
 """Steps that are rounding where a distance is compared."""
@@ -104,8 +105,7 @@ class Encoder:
         if self._stalled or axis.rotor.state == FOLLOWING or not axis.commanded(t):
             return inf
         even = axis.rotor.position(t) + axis.aligned
-        found = [axis.profile.crossing(even + direction * self._stall_at, t, direction) for direction in (1, -1)]
-        return min((each for each in found if each is not None), default=inf)
+        return min(axis.profile.crossing(even + direction * self._stall_at, t, direction) for direction in (1, -1))
 
     def _stall(self, t: float) -> None:
         self._stalled = True
@@ -354,15 +354,14 @@ class Hmt:
         if self.closed and self._rotor.state != FOLLOWING:
             levels = (self._memory.bound, float(self._values["LG"]), float(self._values["LD"]))
             found += [(self._lags_at(limit, t), nothing) for limit in levels]
-            turned = self._axis.profile.turning(-self._axis.direction(t), t)
-            found.append((inf if turned is None else turned, nothing))
+            found.append((self._axis.profile.turning(-self._axis.direction(t), t), nothing))
         return min(found, key=when)
 
     def _lags_at(self, limit: float, t: float) -> float:
         """When the command gets a distance away from the rotor, either way, if it is not as far away now."""
         rotor, command = self._rotor, self._axis.profile
         lag, (own, _) = rotor.lag(t), rotor.path
-        times = []
+        times = [inf]
         for direction in (1.0, -1.0):
             if lag * direction >= limit - TOUCH:
                 continue
@@ -370,7 +369,7 @@ class Hmt:
                 times.append(command.crossing(own.position(t) + rotor.slip + direction * limit, t, direction))
             else:
                 times.append(meeting(own, command, -rotor.slip - direction * limit, t))
-        return min((each for each in times if each is not None), default=inf)
+        return min(times)
 
     def _watch(self, t: float) -> None:
         """Report lead and lag that have reached their limits, and see the rotor stand at its bounds."""
@@ -388,7 +387,6 @@ class Hmt:
         self._active = rotor.state != FOLLOWING and (active or self._active)
 
     def _note_held(self, held: bool, t: float) -> None:
-        """Note since when the rotor is held."""
         self._held_since = min(self._held_since, t) if held else inf
 
     def _report(self, code: int, bit: int, holds: bool, t: float) -> None:

@@ -15,13 +15,13 @@ from collections.abc import Callable
 from math import inf
 
 from multidrop.dialects.mcode.manual.errors import ErrorNumber as E
-from multidrop.simulator.kinematics import Shape, slew
+from multidrop.simulator.kinematics import Pace, slew
 from multidrop.simulator.lexium.motion.axis import HOMING, TORQUE, Axis
 from multidrop.simulator.lexium.motion.counters import DIRECTIONS, ERRORS, Limits
 from multidrop.simulator.lexium.motion.inputs import HOME, Inputs
-from multidrop.simulator.lexium.motion.rotor import TOUCH
 from multidrop.simulator.lexium.state.errors import Event, Fault
 from multidrop.simulator.lexium.state.interpreter import Core
+from multidrop.simulator.world import TOUCH
 
 SEEK, BRAKE, TURN, APPROACH = "seek", "brake", "turn", "approach"
 TYPES = {1: (-1, 1), 2: (-1, -1), 3: (1, -1), 4: (1, 1)}
@@ -55,24 +55,25 @@ class Homing:
             raise Fault(E.HOMING_OR_MOVING)
         seek, approach = TYPES[kind]
         begun = word == "HM" and self._at_switch()
-        met = set() if begun else self._blocked(seek, t)
-        direction = -seek if met else seek
-        self._axis.allow(t, approach if begun else direction)
-        self._axis.check_ramps()
-        self._word, self._directions, self._met = word, (seek, approach), met
-        self._timeline.replan()
+        self._set_out(word, (seek, approach), set(), 0 if begun else seek, t)
         if begun:
             self._approach(t)
-        else:
-            self._seek(direction, t)
+
+    def _set_out(self, word: str, directions: tuple[int, int], met: set[int], direction: int, t: float) -> None:
+        """Seek in a direction, 0 where it has found already, or turn round at once. Raises Fault (82 to 85, 94, 96)."""
+        blocked = direction and self._values["LM"] in TURNS_ROUND and self._limits.refuse(t, direction)
+        if blocked and met:
+            raise Fault(E.NO_HOME_SWITCH)
+        there = -direction if blocked else direction
+        self._axis.allow(t, there or directions[1])
+        self._axis.check_ramps()
+        self._word, self._directions, self._met = word, directions, {*met, direction} if blocked else set(met)
+        self._timeline.replan()
+        if there:
+            self._seek(there, t)
 
     def _at_switch(self) -> bool:
         return bool(self._inputs.wants(HOME))
-
-    def _blocked(self, direction: int, t: float) -> set[int]:
-        """The limit that would turn it round, if that is active to begin with."""
-        blocked = self._values["LM"] in TURNS_ROUND and self._limits.refuse(t, direction)
-        return {direction} if blocked else set()
 
     def again(self) -> Callable[[float], None] | None:
         """Return a closure that goes on with the homing that is under way (PS, RS); None if there is none."""
@@ -84,20 +85,11 @@ class Homing:
 
         def go_on(t: float) -> None:
             found = approaches or (word == "HM" and self._at_switch())
-            hit = set() if found else self._blocked(direction, t)
-            if hit and met:
-                raise Fault(E.NO_HOME_SWITCH)
-            there = -direction if hit else direction
-            self._axis.allow(t, directions[1] if found else there)
-            self._axis.check_ramps()
-            self._word, self._directions, self._met = word, directions, met | hit
-            self._timeline.replan()
+            self._set_out(word, directions, met, 0 if found else direction, t)
             if braked:
                 self._leave(t)
             elif found:
                 self._approach(t)
-            else:
-                self._seek(there, t)
 
         return go_on
 
@@ -105,7 +97,6 @@ class Homing:
         self.phase = ""
 
     def home(self, active: bool, t: float) -> None:
-        """Act on the home switch, which has closed or opened."""
         if self._word != "HM":
             return
         if self.phase == SEEK and active:
@@ -114,7 +105,6 @@ class Homing:
             self._finish(t)
 
     def pass_mark(self, t: float) -> None:
-        """Act on the mark, at which the rotor is."""
         if self.phase == SEEK:
             self._brake(BRAKE, t)
         elif self.phase == APPROACH:
@@ -172,9 +162,7 @@ class Homing:
     def _approach(self, t: float) -> None:
         self.phase = APPROACH
         here, direction, vi = self._axis.position(t), self._directions[1], self._values["VI"] * self._memory.scale
-        still = Shape()
-        profile = slew(t, here, 0.0, direction * vi, vi=vi, a=1.0, d=1.0, up=still, down=still)
-        self._axis.begin(HOMING, profile, t)
+        self._axis.begin(HOMING, slew(t, here, 0.0, direction * vi, Pace(vi, vi, 1.0, 1.0)), t)
         self._set_mark(direction, t)
 
     def _set_mark(self, direction: int, t: float) -> None:
@@ -201,8 +189,7 @@ class Homing:
         if beyond > 0:
             self._see_mark(rotor.position(t))
         profile, shift = rotor.path
-        found = profile.crossing(self._mark - shift, t, self._toward)
-        return inf if found is None else found
+        return profile.crossing(self._mark - shift, t, self._toward)
 
     def _finish(self, t: float) -> None:
         """Stop: a switch is left by a whole step, a mark is hit."""

@@ -10,7 +10,6 @@ than a program can see. A point of an MDrivePlus that is an output reads as what
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from math import inf
 
 from multidrop.dialects.mcode.manual.errors import ErrorNumber as E
 from multidrop.simulator.lexium.motion.rotor import Rotor
@@ -134,11 +133,7 @@ class Inputs:
 
     def next_change(self, t: float) -> float:
         """The next time after `t` at which a level or a filtered state changes by itself; infinite if none does."""
-        times = [inf]
-        scheduled = self._world.next_change(t)
-        if scheduled is not None:
-            times.append(scheduled)
-        types = self.types
+        times, types = [self._world.next_change(t)], self.types
         if any([types[n][0] in SWITCHES for n in self.numbers]):
             times.append(self._rotor.next_switch(t))
         for n, since in self._since.items():

@@ -21,7 +21,7 @@ from math import exp, inf, log
 
 from multidrop.dialects.mcode.manual.errors import JOG_IN_CLOCK_MODE
 from multidrop.dialects.mcode.manual.errors import ErrorNumber as E
-from multidrop.simulator.kinematics import move
+from multidrop.simulator.kinematics import Pace, move
 from multidrop.simulator.lexium.motion.axis import HOMING, SLEW, Axis
 from multidrop.simulator.lexium.motion.counters import DIRECTIONS, Counters, Limits, Trips
 from multidrop.simulator.lexium.motion.feedback import VARIABLE, Encoder, Hmt, Torque
@@ -169,7 +169,7 @@ class Motor:
             self.hmt.next(t),
             (axis.profile.end if axis.arriving else inf, self._arrive),
             (self.homing.mark_at(t), self.homing.pass_mark),
-            (inf if axis.mark is None else axis.mark, self._pass_mark),
+            (axis.mark, self._pass_mark),
             self.encoder.next(t),
             self.heat.next(t),
             key=when,
@@ -194,9 +194,7 @@ class Motor:
             self._timeline.replan()
             self.trips.displaced(before, self.counters.place(t), t)
             self.encoder.look(t)
-
-    def look_at_limits(self) -> None:
-        """See which limit switches are active; a clock knows no limits (MDrivePlus 5-13)."""
+        # See which limit switches are active; a clock knows no limits (MDrivePlus 5-13).
         switches = self.limits.switches
         switches.clear()
         if not self._memory.values.get("CM"):
@@ -224,7 +222,15 @@ class Motor:
         thread, t = self._core.thread, self._timeline.now
         if not thread.running:
             raise Fault(E.NO_PROGRAM_RUNNING)
-        thread.pause(self._pause(t) if not thread.paused and self.status.moving(t) else None)
+        again: Callable[[float], None] | None = None
+        if not thread.paused and self.status.moving(t):
+            if self.torque.halt():
+                again = self.torque.go_on
+            elif (again := self.homing.again()) is None:
+                again = self.axis.pause(t)
+            else:
+                self.axis.slow_to(0, t)
+        thread.pause(again)
 
     def resume_program(self) -> None:
         """Carry out RS. Raises Fault (40, 41, and the motion's own where it may not begin again)."""
@@ -234,16 +240,6 @@ class Motor:
         again = thread.go_on(t)
         if again is not None:
             again(t)
-
-    def _pause(self, t: float) -> Callable[[float], None]:
-        """Slow down and stop; return what takes up the same motion again."""
-        if self.torque.halt():
-            return self.torque.go_on
-        homing = self.homing.again()
-        if homing is None:
-            return self.axis.pause(t)
-        self.axis.slow_to(0, t)
-        return homing
 
     def slew(self, velocity: int, t: float) -> None:
         """Carry out SL; 0 stops torque mode too."""
@@ -262,7 +258,7 @@ class Motor:
         self._tested_from = self.rotor.position(t)
         top, rate = values["VM"] * memory.scale, values["A"] * memory.scale
         target = here + memory.steps_per_turn / 2
-        axis.begin(TEST, move(t, here, 0.0, target, vi=vi, vm=top, a=rate, d=rate), t)
+        axis.begin(TEST, move(t, here, 0.0, target, Pace(vi, top, rate, rate)), t)
         self._timeline.replan()
 
     def update_jog(self) -> None:
@@ -349,5 +345,4 @@ class Motor:
             self._announce()
 
     def _announce(self) -> None:
-        """Send the drive's name: a motion that asks for that has ended."""
         self._core.printer.emit(self._memory.name + CRLF)

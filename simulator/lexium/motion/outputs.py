@@ -82,7 +82,7 @@ class Outputs:
             raise Fault(E.NOT_USER_OUTPUT)
         self.driven[n] = value
 
-    def write_all(self, value: int, group: Sequence[int]) -> None:
+    def write_all(self, group: Sequence[int], value: int) -> None:
         """Carry out OT, OL, OH; only points of type 16 change. Raises Fault (9) if a Lexium has none of them."""
         free = [(place, n) for place, n in enumerate(group) if self.types[n][0] == GENERAL]
         if not (free or self._points.shared):

@@ -16,15 +16,10 @@ from __future__ import annotations
 
 from math import copysign, floor, inf
 
-from multidrop.simulator.kinematics import Profile, halt, meeting, move, slew
+from multidrop.simulator.kinematics import Pace, Profile, halt, meeting, move, slew
 from multidrop.simulator.lexium.state.errors import Event, nothing, when
 from multidrop.simulator.lexium.state.interpreter import Core
-from multidrop.simulator.world import REVOLUTION, World
-
-TOUCH = 1e-6
-"""Steps that are rounding."""
-AFTER = (0.0, 1e-12, 1e-9, 1e-6)
-"""Seconds after which a switch that is passed is seen changed, whatever rounding does."""
+from multidrop.simulator.world import AFTER, REVOLUTION, TOUCH, World
 
 
 class WorldFrame:
@@ -57,20 +52,18 @@ class WorldFrame:
             return inf
         physical = profile if self._rate == 1.0 else profile.scaled(self._rate)
         found = self._world.next_switch(physical, t, self._origin + self._rate * shift)
-        if found is None:
-            return inf
-        if physical is profile and not (self._origin or shift):
+        if found == inf or (physical is profile and not (self._origin or shift)):
             return found
-        before = self._switches(profile, shift, t)
-        seen = (found + later for later in AFTER if self._switches(profile, shift, found + later) != before)
-        return next(seen, found + AFTER[-1])
 
-    def _switches(self, profile: Profile, shift: float, t: float) -> tuple[bool, bool, bool]:
-        return self._world.switches(self.physical(profile.position(t) + shift))
+        def switches(t: float) -> tuple[bool, bool, bool]:
+            return self._world.switches(self.physical(profile.position(t) + shift))
+
+        before = switches(t)
+        return next((found + later for later in AFTER if switches(found + later) != before), found + AFTER[-1])
 
     def index_ahead(self, here: float, direction: float, offset: float = 0.0) -> float:
         """The next place beyond `here` that is `offset` (steps of 1/51200 turn) from an index mark."""
-        zero = (self._world.index - self._origin) / self._rate + offset * self.turn / REVOLUTION
+        zero = (0.0 - self._origin) / self._rate + offset * self.turn / REVOLUTION
         turns = (here - zero) / self.turn
         return zero + self.turn * (floor(turns + TOUCH) + 1 if direction > 0 else -floor(-turns + TOUCH) - 1)
 
@@ -102,7 +95,7 @@ class Rotor:
 
     def __init__(self, core: Core) -> None:
         self.values, self.world, self.frame = core.values, core.world, WorldFrame(core.world)
-        self._torque = core.world.torque
+        self._torque, self._timeline = core.world.torque, core.timeline
         self.command: Profile = halt(0.0, 0.0)
         self.closed = False
         self.state = FOLLOWING
@@ -201,10 +194,12 @@ class Rotor:
         if steps:
             self._push(self.frame.pushed(steps, self.position(t)), t, driven)
         locked = coasts or self.world.locked(t)
-        if locked and self._cause != HAND:
-            self._stand(HAND, t)
-        elif not locked and self._cause == HAND:
-            self.leave(t)
+        if locked != (self._cause == HAND):
+            self._timeline.replan()
+            if locked:
+                self._stand(HAND, t)
+            else:
+                self.leave(t)
         return bool(steps)
 
     def leave(self, t: float) -> None:
@@ -219,8 +214,16 @@ class Rotor:
 
     def next(self, t: float) -> Event:
         """When it next goes over to another profile, and what does that."""
-        pulled = self._pulled_out_at(t), lambda at: self._stand(PULL_OUT, at)
-        return min(self._hit(t), self._free(t), pulled, (self.world.next_lock(t), nothing), key=when)
+        pulled = inf
+        if self.state == FOLLOWING and self.values.get("AS") != TORQUE_MODE:
+            pulled = self._torque.fails_at(self.command, t, self._current, self.frame.turn)
+        return min(
+            self._hit(t),
+            self._free(t),
+            (pulled, lambda at: self._stand(PULL_OUT, at)),
+            (self.world.next_lock(t), nothing),
+            key=when,
+        )
 
     def caught_up_at(self) -> float:
         """When it will be where the command is; infinite while it rests in lag, or while that is unknown."""
@@ -249,16 +252,11 @@ class Rotor:
             found = profile.turning(direction, t)
         else:
             found = profile.crossing(place - shift, t, direction)
-        return (inf if found is None else found), lambda at: self._stand(WALL, at)
+        return found, lambda at: self._stand(WALL, at)
 
     @property
     def _current(self) -> float:
         return float(self.values["RC"]) / 100
-
-    def _pulled_out_at(self, t: float) -> float:
-        if self.state != FOLLOWING or self.values.get("AS") == TORQUE_MODE:
-            return inf
-        return self._torque.fails_at(self.command, t, self._current, self.frame.turn)
 
     def _stand(self, cause: str, t: float) -> None:
         here = self.position(t)
@@ -282,13 +280,9 @@ class Rotor:
         if self._cause != WALL or wall is None:
             return inf, nothing
         place, direction = wall
-        if not self.closed:
-            found = self.command.turning(-direction, t)
-        elif (self.command.position(t) - self.slip - place) * direction > TOUCH:
-            found = self.command.crossing(place + self.slip, t, -direction)
-        else:
-            found = self.command.turning(-direction, t)
-        return (inf if found is None else found), self.leave
+        if self.closed and (self.command.position(t) - self.slip - place) * direction > TOUCH:
+            return self.command.crossing(place + self.slip, t, -direction), self.leave
+        return self.command.turning(-direction, t), self.leave
 
     def _in_step_at(self, t: float) -> float:
         """When a rotor that was pulled out turns again; with hMT once the current is enough for the load."""
@@ -297,25 +291,23 @@ class Rotor:
             return inf
         if not command.moving(t):
             return t
-        turning = command.turning(-command.direction(t), t)
-        return command.end if turning is None else turning
+        return min(command.turning(-command.direction(t), t), command.end)
 
     def _catch(self, here: float, velocity: float, t: float) -> None:
         """Make up what is missing, as MU says (8.3): to the target, or after a command that leads away from it."""
         command = self.command
         if command.end < inf and command.velocity(t) * (command.target - command.position(t)) >= 0:
             top = self._make_up_speed(float(self.values["VM"]) if command.end > t else 0.0)
-            self._own = move(
-                t, here, velocity, command.target - self.slip, vi=MAKE_UP_VI, vm=top, a=MAKE_UP_RATE, d=MAKE_UP_RATE
-            )
+            pace = Pace(MAKE_UP_VI, top, MAKE_UP_RATE, MAKE_UP_RATE)
+            self._own = move(t, here, velocity, command.target - self.slip, pace)
         else:
             speed = float(self.values["VM"]) if command.end < inf else abs(command.segments[-1].velocity)
             direction = copysign(1.0, command.position(t) - self.slip - here)
-            top = self._make_up_speed(speed)
-            self._own = slew(t, here, velocity, direction * top, vi=MAKE_UP_VI, a=MAKE_UP_RATE, d=MAKE_UP_RATE)
+            pace = Pace(MAKE_UP_VI, self._make_up_speed(speed), MAKE_UP_RATE, MAKE_UP_RATE)
+            self._own = slew(t, here, velocity, direction * pace.vm, pace)
         self.state, self._cause = CATCHING, ""
         met = meeting(self._own, command, -self.slip, t)
-        self._meets = self._own.end if met is None else met
+        self._meets = self._own.end if met == inf else met
 
     def _make_up_speed(self, speed: float) -> float:
         """How fast MU lets it be, beside a command of that speed."""

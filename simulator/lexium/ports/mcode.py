@@ -46,13 +46,12 @@ from typing import NamedTuple
 
 from multidrop.dialects.mcode.manual.errors import ErrorNumber
 from multidrop.simulator.lexium.device import MCodeDevice
+from multidrop.simulator.lexium.state.errors import TRANSMIT_BUFFER
 from multidrop.simulator.wire import BITS_A_BYTE, Transmission
 
 CRLF = b"\r\n"
 ACK, NAK = b"\x06", b"\x15"
 LINE_BUFFER = 64
-TRANSMIT_BUFFER = 256
-"""Bytes that wait to be sent when a program's next print is lost (the manual names the error, not the size)."""
 
 
 class Mode(NamedTuple):
@@ -73,11 +72,6 @@ class Line:
     def __init__(self, mode: Mode, name: bytes = b"", mine: bool = True, replies: bool = True) -> None:
         self.mode, self.name, self.mine, self.replies = mode, name, mine, replies
         self.text = bytearray()
-
-    @property
-    def room(self) -> int:
-        """The number of bytes that still fit."""
-        return LINE_BUFFER - len(self.name) - len(self.text)
 
 
 class Outcome(NamedTuple):
@@ -118,21 +112,17 @@ def compose(mode: Mode, text: bytes, outcome: Outcome, prompt: str) -> bytes:
     data = bytes(out) + outcome.tail.encode("latin-1", "replace")
     if mode.echo == 2:
         return data
-    answer = _head(mode, outcome) + data
-    if mode.echo == 3:
-        return text + answer
-    return answer + prompt.encode() if mode.echo == 0 else answer
-
-
-def _head(mode: Mode, outcome: Outcome) -> bytes:
-    """Choose CR LF, ACK or NAK; nothing where a running program leaves it out."""
     if not mode.checksum:
         # With a program running a print is not preceded by CR LF; a command keeps its only sign of acceptance.
         absent = mode.echo == 1 and outcome.busy and bool(outcome.lines or outcome.tail)
-        return b"" if absent else CRLF
-    if outcome.damaged or outcome.flagged or not outcome.good:
-        return NAK
-    return b"" if mode.checksum == 2 and outcome.busy else ACK
+        answer = data if absent else CRLF + data
+    elif outcome.damaged or outcome.flagged or not outcome.good:
+        answer = NAK + data
+    else:
+        answer = data if mode.checksum == 2 and outcome.busy else ACK + data
+    if mode.echo == 3:
+        return text + answer
+    return answer + prompt.encode() if mode.echo == 0 else answer
 
 
 class Replier:
@@ -180,7 +170,7 @@ class Replier:
         if self._serial and memory.checksum != before:
             mode = mode._replace(checksum=memory.checksum)
         if line.replies:
-            prompt = self._prompt(outcome) if mode.echo == 0 else ""
+            prompt = self.prompt(outcome) if mode.echo == 0 else ""
             self.send(now, compose(mode, bytes(line.text), outcome, prompt))
 
     def collect(self, now: float) -> None:
@@ -196,15 +186,10 @@ class Replier:
         if lost:
             self._device.fail(ErrorNumber.TRANSMIT_BUFFER_FULL, now)
 
-    def program_ended(self, now: float) -> None:
-        """Send the prompt that follows a program, in EM=0."""
-        if self._memory.echo_mode == 0:
-            self.send(now, CRLF + self._prompt().encode())
-
     def escaped(self, now: float) -> None:
         echo = self._memory.echo_mode
         if echo == 0:
-            self.send(now, b"#" + CRLF + self._prompt().encode())
+            self.send(now, b"#" + CRLF + self.prompt().encode())
         elif echo != 2:
             self.send(now, CRLF)
 
@@ -233,7 +218,7 @@ class Replier:
         self._begun += rest
         return bytes(out + rest)
 
-    def _prompt(self, outcome: Outcome | None = None) -> str:
+    def prompt(self, outcome: Outcome | None = None) -> str:
         """EM=0's prompt; in program mode the address that the next stored line gets, and two spaces."""
         at = self._device.programming
         if at is not None:
@@ -294,20 +279,23 @@ class MCodePort:
         return False
 
     def completes(self, data: bytes) -> bool:
-        """See `wire.Port`: CR and LF."""
         return ENDS.search(data) is not None
 
     def urgent(self, data: bytes) -> bool:
-        """See `wire.Port`: ESC, ^C and ^E."""
         return STOPS.search(data) is not None
 
     def receive(self, data: bytes, now: float) -> None:
-        """Take bytes whose last bit arrived at `now`."""
         if not self.quiet(now):
             self._settle(now)
         at = 0
         while at < len(data) and self._bridges.powered:
-            at = self._take(data, at, now)
+            plain = PLAIN.match(data, at) if self._line is not None else None
+            if self._line is not None and plain is not None:  # the text of a line up to the next key
+                at, self._before = plain.end(), data[plain.end() - 1]
+                self._on_text(self._line, plain[0], now)
+            else:
+                self._on_byte(data[at], now)
+                at += 1
         self._running = self._thread.running
         self._replier.collect(self._last)
 
@@ -349,8 +337,8 @@ class MCodePort:
         """See what the device has become by itself, or by `/sim`: without power, at its program's end."""
         self._notice_power()
         self._replier.collect(self._last)
-        if self._running and not self._thread.running:
-            self._replier.program_ended(at)
+        if self._running and not self._thread.running and self._memory.echo_mode == 0:
+            self._replier.send(at, CRLF + self._replier.prompt().encode())
         self._running = self._thread.running
 
     def _notice_power(self) -> None:
@@ -360,7 +348,6 @@ class MCodePort:
             self._forget()
 
     def _forget(self) -> None:
-        """Begin as a port does at power-up."""
         self._line: Line | None = None
         self._waiting: list[Line] = []
         self._overheard.clear()
@@ -369,15 +356,6 @@ class MCodePort:
         self._key = ""
 
     # -- bytes --------------------------------------------------------------------------------------
-
-    def _take(self, data: bytes, at: int, now: float) -> int:
-        """Take one byte, or the text of a line up to the next key; return the place of the next byte."""
-        if self._line is not None and (plain := PLAIN.match(data, at)) is not None:
-            self._before = data[plain.end() - 1]
-            self._on_text(self._line, plain[0], now)
-            return plain.end()
-        self._on_byte(data[at], now)
-        return at + 1
 
     def _on_byte(self, byte: int, now: float) -> None:
         before, self._before = self._before, byte
@@ -439,7 +417,7 @@ class MCodePort:
     def _on_text(self, line: Line, text: bytes, now: float) -> None:
         if not line.mine:
             return
-        fits = text[: line.room]
+        fits = text[: LINE_BUFFER - len(line.name) - len(line.text)]
         line.text += fits
         if line.replies:
             self._replier.echo(line.mode, fits, now)

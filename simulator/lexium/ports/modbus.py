@@ -89,14 +89,22 @@ class Registers:
         rows = _rows(start, len(words))
         if not all(row.writable for row in rows):
             raise Refusal(ILLEGAL_ADDRESS)
-        for line in [_line(row, value) for row, value in _values(start, rows, words)]:
-            if callable(line):
-                line(self, now)
-            else:
-                self.carry_out(line, now)
+        values = _values(start, rows, words)
+        for (row, value), line in [(each, _line(*each)) for each in values]:
+            self.carry_out(line, now)
+            if row.name == "TS":  # a divider, whose speed can be beyond the range of MCode: no line can set it
+                self._torque.set_speed(round(OSCILLATOR / (value + 2)) if value else 0)
 
     def _words(self, row: Register, now: float) -> list[int]:
-        value = READERS[row.name](self, now) if row.name in READERS else self.number(row.name, now)
+        match row.name:
+            case "O1" | "O2" | "O3":
+                value = int(self.coils(int(row.name[1:]) - 1, 1, now)[0])
+            case "IT":
+                value = self.number("IT 1", now)
+            case "TA":
+                value = self._trip(now)
+            case _:
+                value = self.number(row.name, now)
         if row.name in SHOWN:
             value = SHOWN[row.name](value)
         return [value >> 16 * place & 0xFFFF for place in range(row.count)]
@@ -153,12 +161,7 @@ class Registers:
             name, text = "IS", f"={POINT_OF[name]},{kind},{active}".removesuffix(",")
         self.carry_out(f"{name}{text}" if text.startswith("=") else f"{name} {text}", now)
 
-    # What no line gives.
-
-    def set_torque_speed(self, speed: int) -> None:
-        self._torque.set_speed(speed)
-
-    def trip(self, now: float) -> int:
+    def _trip(self, now: float) -> int:
         """Read TA: its mask, and the address of its subroutine in the high word."""
         self.carry_out("PR TA", now)
         trip = self._trips.defined.get(HMT)
@@ -215,78 +218,38 @@ def _values(start: int, rows: Sequence[Register], words: Sequence[int]) -> list[
     return list(zip(rows, words, strict=True))
 
 
-Hand = Callable[[Registers, float], None]
-
-
-def _line(row: Register, value: int) -> str | Hand:
+def _line(row: Register, value: int) -> str:
     """Translate a write to a line of the drive. Raises Refusal (3) for a value that the register refuses."""
     if not row.allows(value):
         raise Refusal(ILLEGAL_VALUE)
     name = row.name
-    if name in WRITERS:
-        return WRITERS[name](name, value)
+    match name:
+        case "S" | "IP" | "CF":
+            return name
+        case "SC":
+            return "SC 1"
+        case "TS":
+            return "PR TS"
+        case "ER" if value:
+            raise Refusal(ILLEGAL_VALUE)
+        case "IC" | "DC":
+            stepped = AT.get(value)
+            if stepped is None or stepped.address != value:
+                raise Refusal(ILLEGAL_VALUE)
+            return f"{name} {stepped.name}"
+        case "OT":
+            return f"OT={value & 7}"
+        case "TA":
+            mask, place = value & 0xFFFF, value >> 16 & 0xFFFF
+            if mask not in MASKS:
+                raise Refusal(ILLEGAL_VALUE)
+            return f"TA={mask},{place}"
     return f"{name} {value}" if name in ORDERS else f"{name}={value}"
-
-
-def _bare(name: str, value: int) -> str:
-    return name
-
-
-def _clear(name: str, value: int) -> str:
-    if value:
-        raise Refusal(ILLEGAL_VALUE)
-    return f"{name}=0"
-
-
-def _stepped(name: str, value: int) -> str:
-    row = AT.get(value)
-    if row is None or row.address != value:
-        raise Refusal(ILLEGAL_VALUE)
-    return f"{name} {row.name}"
-
-
-def _trip(name: str, value: int) -> str:
-    mask, place = value & 0xFFFF, value >> 16 & 0xFFFF
-    if mask not in MASKS:
-        raise Refusal(ILLEGAL_VALUE)
-    return f"{name}={mask},{place}"
-
-
-def _divider(name: str, value: int) -> Hand:
-    """Set the speed of a divider, which can be beyond the range of MCode: no line can set it."""
-
-    def write(registers: Registers, now: float) -> None:
-        registers.carry_out("PR TS", now)
-        registers.set_torque_speed(round(OSCILLATOR / (value + 2)) if value else 0)
-
-    return write
-
-
-def _output(n: int) -> Callable[[Registers, float], int]:
-    return lambda registers, now: int(registers.coils(n - 1, 1, now)[0])
 
 
 ORDERS = frozenset({"MA", "MR", "SL", "HM", "HI"})
 """Instructions with a value."""
 
-WRITERS: Mapping[str, Callable[[str, int], str | Hand]] = {
-    **dict.fromkeys(("S", "IP", "CF"), _bare),
-    "SC": lambda name, value: "SC 1",
-    "ER": _clear,
-    "IC": _stepped,
-    "DC": _stepped,
-    "OT": lambda name, value: f"OT={value & 7}",
-    "TA": _trip,
-    "TS": _divider,
-}
-"""What is more than an assignment."""
-
-READERS: Mapping[str, Callable[[Registers, float], int]] = {
-    **{f"O{n}": _output(n) for n in range(1, OUTPUTS + 1)},
-    "IT": lambda registers, now: registers.number("IT 1", now),
-    "TA": lambda registers, now: registers.trip(now),
-}
-"""What is more than PR."""
 READ_ALSO = frozenset({"O1", "O2", "O3"})
 """Write only by name, but a note of 4.2.2 has them read."""
 
@@ -315,8 +278,6 @@ CONFORMITY = 0x83
 """All objects at once, and each alone."""
 OBJECTS = 7
 BASIC, INDIVIDUAL = 3, 4
-
-Function = Callable[["ModbusPort", bytes, float], bytes]
 
 
 class ModbusPort:
@@ -356,48 +317,51 @@ class ModbusPort:
         return bytes(out)
 
     def _answer(self, pdu: bytes, now: float) -> bytes:
-        function = FUNCTIONS.get(pdu[0])
         try:
-            if function is None:
-                raise Refusal(ILLEGAL_FUNCTION)
-            return pdu[:1] + function(self, pdu[1:], now)
+            return pdu[:1] + self._carry_out(pdu[0], pdu[1:], now)
         except Refusal as refusal:
             return bytes((pdu[0] | EXCEPTION, refusal.code))
 
-    # The functions: what follows the function code, both ways.
+    def _carry_out(self, function: int, body: bytes, now: float) -> bytes:
+        """Carry out a function; return what follows its code. Raises Refusal."""
+        registers = self._registers
+        match function:
+            case 1:
+                return _bits(registers.coils(*_pair(body), now))
+            case 2:
+                return _bits(registers.inputs(*_pair(body), now))
+            case 3:
+                words = registers.read(*_pair(body), now)
+                return pack(f">B{len(words)}H", 2 * len(words), *words)
+            case 5:
+                address, value = _pair(body)
+                if value not in (ON, OFF):
+                    raise Refusal(ILLEGAL_VALUE)
+                registers.write_coil(address, value == ON, now)
+                return body
+            case 16:
+                if len(body) < 5:
+                    raise Refusal(ILLEGAL_VALUE)
+                start, count, size = unpack(">HHB", body[:5])
+                if not 1 <= count <= MOST_REGISTERS or size != 2 * count or len(body) != 5 + size:
+                    raise Refusal(ILLEGAL_VALUE)
+                registers.write(start, unpack(f">{count}H", body[5:]), now)
+                return body[:4]
+            case 43:
+                return self._identify(body, now)
+            case 65:
+                if len(body) != 4:
+                    raise Refusal(ILLEGAL_VALUE)
+                text = registers.read_named(_mnemonic(body), now).encode("latin-1")
+                return bytes((len(text),)) + text
+            case 66:
+                if len(body) < 5 or len(body) != 5 + body[4]:
+                    raise Refusal(ILLEGAL_VALUE)
+                registers.write_named(_mnemonic(body[:4]), body[5:], now)
+                return body[4:5] + body[:4]
+        raise Refusal(ILLEGAL_FUNCTION)
 
-    def read_coils(self, body: bytes, now: float) -> bytes:
-        """Function 1."""
-        return _bits(self._registers.coils(*_pair(body), now))
-
-    def read_inputs(self, body: bytes, now: float) -> bytes:
-        """Function 2."""
-        return _bits(self._registers.inputs(*_pair(body), now))
-
-    def read_registers(self, body: bytes, now: float) -> bytes:
-        """Function 3."""
-        words = self._registers.read(*_pair(body), now)
-        return pack(f">B{len(words)}H", 2 * len(words), *words)
-
-    def write_coil(self, body: bytes, now: float) -> bytes:
-        """Function 5."""
-        address, value = _pair(body)
-        if value not in (ON, OFF):
-            raise Refusal(ILLEGAL_VALUE)
-        self._registers.write_coil(address, value == ON, now)
-        return body
-
-    def write_registers(self, body: bytes, now: float) -> bytes:
-        """Function 16."""
-        if len(body) < 5:
-            raise Refusal(ILLEGAL_VALUE)
-        start, count, size = unpack(">HHB", body[:5])
-        if not 1 <= count <= MOST_REGISTERS or size != 2 * count or len(body) != 5 + size:
-            raise Refusal(ILLEGAL_VALUE)
-        self._registers.write(start, unpack(f">{count}H", body[5:]), now)
-        return body[:4]
-
-    def identify(self, body: bytes, now: float) -> bytes:
+    def _identify(self, body: bytes, now: float) -> bytes:
         """Function 43/14."""
         if body[:1] != bytes((DEVICE_ID,)):
             raise Refusal(ILLEGAL_FUNCTION if body else ILLEGAL_VALUE)
@@ -411,28 +375,12 @@ class ModbusPort:
         else:
             last = BASIC if code == 1 else OBJECTS
             wanted = range(first if first < last else 0, last)
-        values = [(number, self._object(number, now)) for number in wanted]
-        listed = b"".join(bytes((number, len(value))) + value for number, value in values)
-        return bytes((DEVICE_ID, code, CONFORMITY, 0, 0, len(values))) + listed
-
-    def _object(self, number: int, now: float) -> bytes:
-        words = {1: "PN", 5: "SN", 6: "VR"}
-        text = self._registers.text(words[number], now) if number in words else IDENTITY[number]
-        return text.encode("ascii")
-
-    def read_named(self, body: bytes, now: float) -> bytes:
-        """Function 65."""
-        if len(body) != 4:
-            raise Refusal(ILLEGAL_VALUE)
-        text = self._registers.read_named(_mnemonic(body), now).encode("latin-1")
-        return bytes((len(text),)) + text
-
-    def write_named(self, body: bytes, now: float) -> bytes:
-        """Function 66."""
-        if len(body) < 5 or len(body) != 5 + body[4]:
-            raise Refusal(ILLEGAL_VALUE)
-        self._registers.write_named(_mnemonic(body[:4]), body[5:], now)
-        return body[4:5] + body[:4]
+        listed = b""
+        for number in wanted:
+            given = PRINTED.get(number)
+            value = (self._registers.text(given, now) if given else IDENTITY[number]).encode("ascii")
+            listed += bytes((number, len(value))) + value
+        return bytes((DEVICE_ID, code, CONFORMITY, 0, 0, len(wanted))) + listed
 
 
 def _pair(body: bytes) -> tuple[int, int]:
@@ -453,22 +401,12 @@ def _mnemonic(raw: bytes) -> str:
     return raw.decode("latin-1").lstrip(" ")[::-1]
 
 
-FUNCTIONS: Mapping[int, Function] = {
-    1: ModbusPort.read_coils,
-    2: ModbusPort.read_inputs,
-    3: ModbusPort.read_registers,
-    5: ModbusPort.write_coil,
-    16: ModbusPort.write_registers,
-    43: ModbusPort.identify,
-    65: ModbusPort.read_named,
-    66: ModbusPort.write_named,
-}
-"""By function code."""
-
 IDENTITY: Mapping[int, str] = {
     0: "SEM USA",
     2: "4.0.0.0",
     3: "www.motion.schneider-electric.com",
     4: "Lexium MDrive Ethernet",
 }
-"""The objects that are the same in every drive; 1, 5 and 6 are its part number, serial number and firmware."""
+"""The objects that are the same in every drive."""
+PRINTED: Mapping[int, str] = {1: "PN", 5: "SN", 6: "VR"}
+"""Those that a drive prints: its part number, serial number and firmware."""

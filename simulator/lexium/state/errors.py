@@ -9,6 +9,8 @@ from collections.abc import Callable, Mapping, MutableMapping
 from dataclasses import dataclass
 from operator import itemgetter
 
+from multidrop.simulator.wire import BITS_A_BYTE
+
 Event = tuple[float, Callable[[float], None]]
 """When something happens, s, and what carries it out then."""
 when = itemgetter(0)
@@ -34,8 +36,8 @@ class Timeline:
 
 
 CRLF = "\r\n"
-BITS_A_BYTE, TRANSMIT_BUFFER = 10, 256
-"""The transmitter of a drive: bits on the wire for a byte, bytes that wait to be sent (not in the manual)."""
+TRANSMIT_BUFFER = 256
+"""Bytes that wait to be sent when the next print waits, or is lost (the manual names the error, not the size)."""
 
 
 class Printer:
@@ -59,7 +61,6 @@ class Printer:
         self._answer, self.immediate = [], True
 
     def end_answer(self) -> str:
-        """End it; return what it printed."""
         self.immediate = False
         return "".join(self._answer)
 

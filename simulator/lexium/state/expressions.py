@@ -89,33 +89,6 @@ def is_floating(expression: Expression) -> bool:
     return is_floating(expression.left) or is_floating(expression.right)
 
 
-def compile_value(expression: Expression, lookup: Lookup, floating: bool = False) -> Read:
-    """Return a closure that reads the expression, or raises Fault. `floating`: the result goes to an F register.
-
-    Raises Fault (24) where a comparison is in it: only conditions hold one.
-    """
-    return _Compiler(lookup).value(_without_comparison(expression), floating)
-
-
-def compile_whole(expression: Expression, lookup: Lookup) -> Read:
-    """Return a closure for a drive without floating point, where `F1` is a name. Raises Fault (24)."""
-    return _Compiler(lookup, floating_point=False).value(_without_comparison(expression))
-
-
-def compile_condition(condition: Expression, lookup: Lookup, floating: bool = True) -> Callable[[], bool]:
-    """Return a closure that evaluates a condition, or raises Fault. `floating`: the drive has floating point.
-
-    A condition without a comparison holds while its value is not 0.
-    """
-    return _Compiler(lookup, floating).condition(condition)
-
-
-def _without_comparison(expression: Expression) -> Expression:
-    if compares(expression):
-        raise Fault(E.ILLEGAL_DATA)
-    return expression
-
-
 def _calls(expression: Expression) -> bool:
     """Return whether a function is in it."""
     if isinstance(expression, Unary):
@@ -124,11 +97,23 @@ def _calls(expression: Expression) -> bool:
 
 
 @dataclass(frozen=True)
-class _Compiler:
-    """Expressions of one drive. Each side of a comparison is carried out by itself, in double precision or not."""
+class Compiler:
+    """Expressions of one drive as closures, or Fault; without `floating_point` it has none, and `F1` is a name.
+
+    Each side of a comparison is carried out by itself, in double precision or not.
+    """
 
     lookup: Lookup
     floating_point: bool = True
+
+    def expression(self, expression: Expression, floating: bool = False) -> Read:
+        """Return a closure that reads an expression. `floating`: the result goes to an F register.
+
+        Raises Fault (24) where a comparison is in it: only conditions hold one.
+        """
+        if compares(expression):
+            raise Fault(E.ILLEGAL_DATA)
+        return self.value(expression, floating)
 
     def value(self, expression: Expression, floating: bool = False) -> Read:
         if not self.floating_point and _calls(expression):
@@ -136,6 +121,7 @@ class _Compiler:
         return self.compile(expression, self.floating_point and (floating or is_floating(expression)))
 
     def condition(self, condition: Expression) -> Callable[[], bool]:
+        """Return a closure that evaluates a condition; one without a comparison holds while its value is not 0."""
         if not isinstance(condition, Compare):
             condition = Compare("<>", condition, Number(0))
         left, right = self.value(condition.left), self.value(condition.right)

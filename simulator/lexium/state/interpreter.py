@@ -47,7 +47,7 @@ class Frame:
 
 
 class Thread:
-    """The one program that a drive can run. `next_at` is when line `pc` is due.
+    """The one program that a drive can run. `next_at` is when line `pc` is due, `executed` counts lines.
 
     `live`: lines are executed. It is asleep while `paused`, `waiting` (H for motion), `ending` (E after the motion), or
     stepped without a key. `handling` is the depth of the stack in the subroutine of OE, 0 outside.
@@ -57,6 +57,7 @@ class Thread:
         self._timeline = timeline
         self.running = self.paused = self.waiting = self.ending = False
         self.live = False
+        self.executed = 0
         self.mode = NORMAL
         self.steps = 0
         self.next_at = inf
@@ -233,10 +234,7 @@ class ProgramMode:
 
 
 class Interpreter:
-    """Runs the program of one drive.
-
-    `period` is the time of a line, `handler` the target of OE, `executed` counts lines.
-    """
+    """Runs the program of one drive. `period` is the time of a line, `handler` the target of OE."""
 
     def __init__(self, core: Core, period: float, compile_line: Callable[[Statement], Action]) -> None:
         self._memory, self._program, self._timeline = core.memory, core.program, core.timeline
@@ -244,7 +242,6 @@ class Interpreter:
         self.period = period
         self.linked = LinkedProgram(core.program, compile_line, core.thread.finish)
         self.handler: Argument | None = None
-        self.executed = 0
         self._break: tuple[int, int] | None = None
         self._passes = 0
         self._executing = False
@@ -340,7 +337,7 @@ class Interpreter:
                 actions[pc]()
             except Fault as fault:
                 self._on_fault(fault)
-        self.executed += count
+        thread.executed += count
 
     def _run_shown(self, until: float) -> None:
         """Execute line by line, each printed before it is executed (EX modes 1 and 2), and with break points."""
@@ -356,7 +353,7 @@ class Interpreter:
             thread.pc = pc + 1
             thread.next_at = timeline.now + self.period
             thread.steps -= thread.mode == STEPPED
-            self.executed += 1
+            thread.executed += 1
             try:
                 linked.actions[pc]()
             except Fault as fault:

@@ -207,14 +207,6 @@ class Memory:
             raise Fault(E.OUT_OF_RANGE)
         return number
 
-    def write(self, row: Mnemonic, value: Value) -> None:
-        """Write a variable whose range depends on EE, or that takes certain numbers only. Raises Fault (21)."""
-        if not isinstance(row.default, float):
-            value = whole(value)
-        if not row.accepts(value, self.counting):
-            raise Fault(E.OUT_OF_RANGE)
-        self.values[row.name] = value
-
     # Names that a user gives, and IV.
 
     def await_input(self, name: str) -> None:

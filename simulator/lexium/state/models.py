@@ -11,9 +11,8 @@ from collections.abc import Mapping
 from types import MappingProxyType
 from typing import NamedTuple
 
-INPUT_TYPES = frozenset({0, 1, 2, 3, 4, 5, 6, 7, 8, 11})
-OUTPUT_TYPES = frozenset({16, 17, 18, 19, 20, 23})
-ANALOG_TYPES = frozenset({9, 10})
+from multidrop.dialects.files import rows
+
 STEP_DIRECTION, QUADRATURE, UP_DOWN = "step and direction", "quadrature", "up and down"
 
 Types = Mapping[int, frozenset[int]]
@@ -46,61 +45,34 @@ class Points(NamedTuple):
     live_zero: int = 3200
 
 
-def _lexium_outputs() -> Types:
-    everywhere = OUTPUT_TYPES | {21, 24, 25, 29}
-    return {1: everywhere | {26}, 2: everywhere | {27}, 3: everywhere | {28}}
+def _points(product: str, like: Points) -> Points:
+    """The points of a product in `points.csv`: the types that each takes, and its set-up from the factory."""
+    table = {int(row["point"]): row for row in rows(__file__, "points.csv") if row["product"] == product}
+
+    def types(column: str) -> Types:
+        return {n: frozenset(map(int, row[column].split())) for n, row in table.items() if row[column]}
+
+    fresh = {n: tuple(map(int, row["fresh"].split())) for n, row in table.items()}
+    return like._replace(input_types=types("inputs"), output_types=types("outputs"), fresh=fresh)
 
 
-LEXIUM_POINTS = Points(
-    input_types={
-        1: INPUT_TYPES | {12},
-        2: INPUT_TYPES,
-        3: INPUT_TYPES | {13, 14, 15},
-        4: INPUT_TYPES | {13, 14, 15},
-        5: ANALOG_TYPES,
-        6: frozenset({0}),
-    },
-    output_types=_lexium_outputs(),
-    fresh={1: (0, 0), 2: (0, 0), 3: (0, 0), 4: (0, 0), 5: (9, 0), 6: (0, 0)},
-    clocks=(3, 4),
-    clock_types={13: STEP_DIRECTION, 14: QUADRATURE, 15: UP_DOWN},
-)
-MODULE_POINTS = LEXIUM_POINTS._replace(
-    input_types={n: types for n, types in LEXIUM_POINTS.input_types.items() if n != 5}
-)
-
+_CLOCKS = {13: STEP_DIRECTION, 14: QUADRATURE, 15: UP_DOWN}
+LEXIUM_POINTS = _points("lexium", Points(clocks=(3, 4), clock_types=_CLOCKS))
+MODULE_POINTS = _points("module", LEXIUM_POINTS)
 _BASE, _EXPANDED = (1, 2, 3, 4), (9, 10, 11, 12)
-MDRIVE_POINTS = Points(
-    outputs=_BASE,
-    input_types={**dict.fromkeys(_BASE, INPUT_TYPES), 5: ANALOG_TYPES},
-    output_types=dict.fromkeys(_BASE, OUTPUT_TYPES),
-    fresh={**dict.fromkeys(_BASE, (0, 0, 0)), 5: (9, 0)},
-    shared=True,
-    follow="CM",
-    capture=60,
-    analog=1023,
-    live_zero=800,
+MDRIVE_POINTS = _points(
+    "mdrive", Points(outputs=_BASE, shared=True, follow="CM", capture=60, analog=1023, live_zero=800)
 )
-EXPANDED_POINTS = MDRIVE_POINTS._replace(
-    inputs=(*_BASE, *_EXPANDED, 7, 8, 13),
-    outputs=(*_BASE, *_EXPANDED, 7, 8, 13),
-    input_types={
-        **MDRIVE_POINTS.input_types,
-        **dict.fromkeys(_EXPANDED, INPUT_TYPES),
-        **dict.fromkeys((7, 8), frozenset({33, 34, 35})),
-        13: frozenset({60}),
-    },
-    output_types={
-        **MDRIVE_POINTS.output_types,
-        **dict.fromkeys(_EXPANDED, OUTPUT_TYPES),
-        **dict.fromkeys((7, 8), frozenset({49, 50, 51})),
-        13: frozenset({61}),
-    },
-    fresh={**MDRIVE_POINTS.fresh, **dict.fromkeys(_EXPANDED, (0, 0, 0)), 7: (33, 0), 8: (33, 0), 13: (60, 0, 0)},
-    sources=True,
-    clocks=(7, 8),
-    clock_types={33: STEP_DIRECTION, 34: QUADRATURE, 35: UP_DOWN},
-    high=_EXPANDED,
+EXPANDED_POINTS = _points(
+    "expanded",
+    MDRIVE_POINTS._replace(
+        inputs=(*_BASE, *_EXPANDED, 7, 8, 13),
+        outputs=(*_BASE, *_EXPANDED, 7, 8, 13),
+        sources=True,
+        clocks=(7, 8),
+        clock_types={33: STEP_DIRECTION, 34: QUADRATURE, 35: UP_DOWN},
+        high=_EXPANDED,
+    ),
 )
 
 

@@ -46,7 +46,6 @@ class Program:
         return self._declared
 
     def copy(self) -> Program:
-        """An independent copy, as for NVM."""
         return Program(dict(self.lines), dict(self.labels), list(self.order), self.product)
 
     def load(self, other: Program) -> None:

@@ -56,7 +56,7 @@ async def test_nothing_but_step_and_continue_presses_a_key(tmp_path: Path) -> No
         await asyncio.sleep(0.5)
         it.world("plug line")
         await asyncio.sleep(5)
-        assert taken.keys == [] and it.device("line:!").stepping and taken.executed == 0
+        assert taken.keys == [] and it.device("line:!").thread.stepping and taken.executed == 0
 
 
 @pytest.mark.wide
@@ -149,7 +149,7 @@ async def test_a_latched_session_steps_for_a_person_only(tmp_path: Path) -> None
         with pytest.raises(Stopped):
             await it.session.run("/step G1", By.SCRIPT)
         await run(it, "/step G1", "/step")
-        assert it.device("line:!").stepping
+        assert it.device("line:!").thread.stepping
 
 
 async def test_a_program_that_begins_by_itself_after_a_stop_is_sent_no_key(tmp_path: Path) -> None:

@@ -24,7 +24,7 @@ from multidrop.shell.twin_fit.work import _keep, fit
 from multidrop.simulator import cells
 from multidrop.simulator.cell.spec import WorldSpec
 from multidrop.simulator.family import Effort
-from multidrop.simulator.kinematics import move
+from multidrop.simulator.kinematics import Pace, move
 from multidrop.simulator.torque import MOTORS, Torque
 from tests.support.cell_session import CellSession, bus, drive, party, pmx
 from tests.support.twin_cell import run
@@ -46,7 +46,7 @@ def measured(hidden: WorldSpec, states: Sequence[tuple[float, float, float]], no
         lag = asin(torque.needed(speed, rate) / (0.9 * torque.available(speed))) * 2 / pi
         counts = round(lag / GRAIN + rng.gauss(0, noise) + direction * origin + rng.uniform(-0.5, 0.5))
         points.append(Point(counts * GRAIN, speed, rate, 0.9, GRAIN, direction))
-    profile = move(0.0, 0.0, 0.0, 20.0, vi=0.0, vm=8.0, a=20.0, d=20.0)
+    profile = move(0.0, 0.0, 0.0, 20.0, Pace(vi=0.0, vm=8.0, a=20.0, d=20.0))
     return Evidence(points, [Effort(profile, 1.0, current=0.9, measured=True)], seen=True)
 
 

@@ -347,11 +347,11 @@ def test_a_program_that_resets_its_drive_by_an_active_input_does_so_until_that_i
     program = f"PG 1\nLB SU\nIS=1,11,{level}\nPR I1\nPG"
     device = drive(program=program, inputs=[[0.5, 1, level], [1.0, 1, 1 - level]])
     device.advance(0.75)
-    assert device.boots > 10
+    assert device.power_unit.boots > 10
     device.advance(2)
-    before = device.boots
+    before = device.power_unit.boots
     device.advance(3)
-    assert (device.boots, device.running) == (before, False)
+    assert (device.power_unit.boots, device.running) == (before, False)
     assert say(device, "PR IS")[0] == f"IS = 1, 11, {level}"
 
 
@@ -383,7 +383,7 @@ def test_a_switch_to_ground_runs_the_program_at_address_1_each_time():
 def test_a_reset_input_that_is_high_already_resets_when_it_is_set_up_so():
     device = drive("R1=5", inputs=((0.0, 1, 1),))
     device.advance(0.1)
-    assert say(device, "IS=1,11,1", "PR R1") == ["0"] and device.boots == 1
+    assert say(device, "IS=1,11,1", "PR R1") == ["0"] and device.power_unit.boots == 1
     device = drive("R1=5", inputs=((0.0, 1, 0),))
     device.advance(0.1)
-    assert say(device, "IS=1,11,1", "PR R1") == ["5"] and device.boots == 0
+    assert say(device, "IS=1,11,1", "PR R1") == ["5"] and device.power_unit.boots == 0

@@ -195,7 +195,7 @@ def test_traced_and_stepped_programs_show_their_lines():
     device.execute("EX G1,1", 0.0)
     assert output(device, 1.0) == "6  IC R1|9  PR R1|1|12  E|"
     device.execute("EX G1,2", 1.0)
-    assert output(device, 2.0) == "" and device.stepping
+    assert output(device, 2.0) == "" and device.thread.stepping
     device.step(" ", 2.0)
     assert output(device, 3.0) == "6  IC R1|"
     device.step("\r", 3.0)

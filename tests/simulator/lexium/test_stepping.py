@@ -29,9 +29,9 @@ def test_a_traced_program_breaks_when_it_has_come_to_a_place_often_enough():
     rows = addresses()
     device = drive("BP G2,3", "EX G1,1")
     assert printed(device, 1.0) == [rows[0], *rows[1:3] * 2]
-    assert device.stepping and device.execute("PR R1", 1.0).lines == ("2",)
+    assert device.thread.stepping and device.execute("PR R1", 1.0).lines == ("2",)
     device.step(" ", 1.0)
-    assert printed(device, 2.0) == [rows[1]] and device.stepping
+    assert printed(device, 2.0) == [rows[1]] and device.thread.stepping
     device.step("\r", 2.0)
     assert printed(device, 3.0) == ["5"] and not device.running
 
@@ -39,7 +39,7 @@ def test_a_traced_program_breaks_when_it_has_come_to_a_place_often_enough():
 def test_a_stepped_program_runs_silently_up_to_its_break_point():
     rows = addresses()
     device = drive("BP G2,2", "EX G1,2")
-    assert printed(device, 1.0) == [] and device.stepping
+    assert printed(device, 1.0) == [] and device.thread.stepping
     assert device.execute("PR R1", 1.0).lines == ("1",)
     device.step("\r", 1.0)
     assert printed(device, 2.0) == [] and device.execute("PR R1", 2.0).lines == ("3",)
@@ -59,7 +59,7 @@ def test_bp_alone_breaks_a_running_program_where_it_is():
     device.execute("EX G1", 0.0)
     assert not device.execute("BP", 0.5).refused
     before = device.execute("PR R1", 0.6).lines
-    assert device.stepping and device.execute("PR R1", 5.0).lines == before
+    assert device.thread.stepping and device.execute("PR R1", 5.0).lines == before
 
 
 def test_bp_0_takes_it_away_and_wrong_ones_are_refused():
@@ -73,7 +73,7 @@ def test_escape_ends_a_stepped_program():
     device = drive("EX G1,2")
     device.step(" ", 0.1)
     device.escape(0.2)
-    assert not device.running and not device.stepping
+    assert not device.running and not device.thread.stepping
 
 
 def test_an_end_ends_a_paused_program_at_once():
