@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from datetime import datetime
 from functools import partial
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 from multidrop.dialects import Diagnostic
 from multidrop.dialects.units import Takes
@@ -53,8 +53,8 @@ class Value(NamedTuple):
         return self.fields["value"]
 
 
-class Outlet(Protocol):
-    """A way out of this program: a broker, or a server."""
+class Outlet:
+    """A way out of this program: a broker, or a server. One that is asked for values is told nothing."""
 
     text: str
     """The URL, as it is in use."""
@@ -73,6 +73,7 @@ class Outlet(Protocol):
 
     async def end(self) -> str:
         """End; return a summary for a person, which may be empty."""
+        return ""
 
 
 def error_of(conditions: Iterable[Conditions]) -> Fields:
