@@ -197,7 +197,14 @@ class Connection:
                     ended()
 
         client = Careful(paho.CallbackAPIVersion.VERSION2, client_id=self._name, reconnect_on_failure=False)
-        _log_in(client, self._target, self._settings)
+        user, secret = self._target.user or self._settings.username, self._settings.secret()
+        if secret and not user:
+            raise Diagnostic("mqtt.password needs mqtt.username", hint="or --to mqtt://USER@BROKER/PREFIX")
+        if max(len(user.encode()), len(secret.encode())) > LONGEST:
+            raise Diagnostic(f"the login is too long; MQTT has room for {LONGEST} bytes")
+        if user:
+            client.username_pw_set(user, secret or None)
+        client.tls_set_context(_context(self._settings) if self._target.encrypted else _Plain())
         if self._will is not None:
             client.will_set(self._will.topic, self._will.text, 1, retain=True)
         if self._take is not None:
@@ -317,17 +324,6 @@ def _reason(where: str, error: OSError | UnicodeError) -> str:
 def _leave(client: Client) -> None:
     client.disconnect()
     client.loop_stop()
-
-
-def _log_in(client: Client, target: Target, settings: MqttSettings) -> None:
-    user, secret = target.user or settings.username, settings.secret()
-    if secret and not user:
-        raise Diagnostic("mqtt.password needs mqtt.username", hint="or --to mqtt://USER@BROKER/PREFIX")
-    if max(len(user.encode()), len(secret.encode())) > LONGEST:
-        raise Diagnostic(f"the login is too long; MQTT has room for {LONGEST} bytes")
-    if user:
-        client.username_pw_set(user, secret or None)
-    client.tls_set_context(_context(settings) if target.encrypted else _Plain())  # type: ignore[arg-type]
 
 
 class _Guarded:
