@@ -315,8 +315,9 @@ class Units:
     def _check_referenced(self, drives: Sequence[Drive], axis: str) -> None:
         for each in drives:
             if not self.referenced(each, axis):
-                name = self.name(each, axis)
-                hint = f"home it, or /units here {name} 0 {axis_unit(self.of(each, axis))} where it is"
+                name, found = self.name(each, axis), self.of(each, axis)
+                unit = found.scale.unit.name if found is not None else "mm"
+                hint = f"home it, or /units here {name} 0 {unit} where it is"
                 raise Diagnostic(f"the position of {name} is not referenced; nothing was sent", "", hint)
 
     async def _check(
@@ -431,10 +432,6 @@ class Units:
         drive.state.referenced(axis)
         self.workspace.changed()
         return found
-
-
-def axis_unit(axis: Axis | None) -> str:
-    return axis.scale.unit.name if axis is not None else "mm"
 
 
 def _names(drive: Drive) -> set[str]:

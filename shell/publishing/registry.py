@@ -85,10 +85,6 @@ def error_of(conditions: Iterable[Conditions]) -> Fields:
     return {"value": found.error, "text": text, "axis": found.axis}
 
 
-def program_of(conditions: Iterable[Conditions]) -> str:
-    return next((each.program for each in conditions if each.program), "")
-
-
 DEFAULT = "2"
 """The usual rate, samples a second of each drive."""
 SLOWEST, FASTEST = 0.01, 50.0
@@ -150,7 +146,7 @@ class DriveValues:
         elif isinstance(event, Silent):
             self._say_state(event.at, SILENT)
         else:
-            self._program = program_of(event.conditions)
+            self._program = next((each.program for each in event.conditions if each.program), "")
             self._no_current = {each.axis: bool(each.no_current) for each in event.conditions}
             if known := self._said.get(("state", "")):
                 self._say_state(event.at, str(known["value"]) if known["value"] in (SILENT, LOST) else "")
