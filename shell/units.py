@@ -236,11 +236,7 @@ class Units:
 
         Raises Diagnostic for a quantity that the line or the axis cannot take, Refused in program mode.
         """
-        found = self._quantities(drive, text)
-        return await self._converted(drive, text, found) if found else Line(text)
-
-    def _quantities(self, drive: Drive, text: str) -> list[re.Match[str]]:
-        """The quantities of a line. Raises Diagnostic for one that is written wrongly."""
+        # A quantity that is written wrongly is refused before anything is converted.
         bare = _UNQUOTED.sub(lambda match: " " * len(match[0]), text)
         found = list(quantities(text))
         for match in _BRACES.finditer(bare):
@@ -253,7 +249,7 @@ class Units:
                 meant = text[: unit.start()] + written + text[unit.end() :]
                 if any(field.start == unit.start() for field in drive.family.units.fields(drive.state, meant)):
                     raise Diagnostic(f"{unit[0]} has a unit; nothing was sent", text.strip(), f"write {meant.strip()}")
-        return found
+        return await self._converted(drive, text, found) if found else Line(text)
 
     async def _converted(self, drive: Drive, text: str, found: Sequence[re.Match[str]]) -> Line:
         name = self.workspace.display_name(drive) or drive.shown

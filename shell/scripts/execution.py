@@ -217,7 +217,10 @@ class Execution:
             elif isinstance(node, Repeat):
                 await self._repeat(node, frame)
             elif isinstance(node, CallFile):
-                await self._call(node, frame)
+                given = await self._own(node.line, frame, self._given)
+                values = {**node.script.values, **given}
+                with _noted(node.line):
+                    await self.block(node.script.body, replace(frame, values=values, pace=None))
             elif isinstance(node, CallMacro):
                 await self._play(node, frame)
             else:
@@ -234,12 +237,6 @@ class Execution:
 
     async def _goes_on(self, line: ScriptLine, frame: Frame) -> bool:
         return await self._own(line, frame, self._condition) == (line.word == "/while")
-
-    async def _call(self, node: CallFile, frame: Frame) -> None:
-        given = await self._own(node.line, frame, self._given)
-        values = {**node.script.values, **given}
-        with _noted(node.line):
-            await self.block(node.script.body, replace(frame, values=values, pace=None))
 
     async def _play(self, node: CallMacro, frame: Frame) -> None:
         async def values(text: str, frame: Frame) -> tuple[Values, Mapping[str, str]]:

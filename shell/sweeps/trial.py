@@ -100,7 +100,12 @@ class Condition:
     def holds(self, outcome: Outcome) -> bool:
         """Whether the condition holds for a result. Raises Diagnostic for a calculation without a value."""
         left, right, within = self._sides(outcome)
-        return _compared(self.tree.sign, left, right, within)
+        if isinstance(left, tuple) and isinstance(right, tuple):
+            pairs = zip(left, right, strict=False)
+            equal = len(left) == len(right) and all(_alike(*pair, within) for pair in pairs)
+            return equal == (self.tree.sign == "==")
+        assert not isinstance(left, tuple) and not isinstance(right, tuple)
+        return compared(self.tree.sign, left, right, within)
 
     @property
     def has_margin(self) -> bool:
@@ -188,15 +193,6 @@ def _beside(tree: Comparison, left: Scalar, right: Scalar) -> tuple[Scalar, Scal
     if tree.right == Name(ENDED) and not isinstance(left, str):
         return left, int(right in BY_ITSELF)
     return left, right
-
-
-def _compared(sign: str, left: Side, right: Side, within: float) -> bool:
-    if isinstance(left, tuple) and isinstance(right, tuple):
-        pairs = zip(left, right, strict=False)
-        equal = len(left) == len(right) and all(_alike(*pair, within) for pair in pairs)
-        return equal == (sign == "==")
-    assert not isinstance(left, tuple) and not isinstance(right, tuple)
-    return compared(sign, left, right, within)
 
 
 def _alike(left: Scalar, right: Scalar, within: float) -> bool:
