@@ -19,7 +19,7 @@ from multidrop.shell.line_syntax import split_target
 from multidrop.shell.new_file import STANDARD_OUTPUT
 from multidrop.shell.params import file as files
 from multidrop.shell.params import replacement, work
-from multidrop.shell.params.work import Options, check_new, each, file_of, is_several, targets
+from multidrop.shell.params.work import Options, check_new, each, file_of, is_several, make_place, targets
 from multidrop.shell.programs import transfers
 from multidrop.shell.workspace import address_of
 from multidrop.simulator import cells
@@ -104,8 +104,7 @@ def upload(chosen: argparse.Namespace) -> int:
     async def save(session: Session, drive: Drive) -> None:
         lines = await program_listing.upload(session, drive, chosen.raw)
         file = file_of(session, drive, chosen.file, chosen.drive, drive.program_files.endings[0])
-        if is_several(chosen.drive):
-            Path(file).parent.mkdir(parents=True, exist_ok=True)
+        make_place(file, chosen.drive)
         program_listing.save_new(session, drive, file, lines)
 
     return _with_drive(chosen, save, unsolicited=chosen.file != STANDARD_OUTPUT)

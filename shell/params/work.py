@@ -15,6 +15,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from multidrop.dialects import Diagnostic, DriveError, NoAnswer, Refused, Stopped
+from multidrop.dialects.files import why
 from multidrop.dialects.text import counted
 from multidrop.dialects.values import (
     COMMUNICATION,
@@ -82,6 +83,16 @@ def file_of(workspace: Workspace, drive: Drive, name: str, target: str, ending: 
     return str(Path(name) / f"{own}{ending}")
 
 
+def make_place(file: str, target: str) -> None:
+    """Make the folder of the files of several drives. Raises Diagnostic where it cannot be made."""
+    folder = Path(file).parent
+    try:
+        if is_several(target):
+            make_folder(folder)
+    except OSError as problem:
+        raise Diagnostic(f"the folder cannot be made: {why(problem)}", str(folder), "name another one") from None
+
+
 def check_new(name: str, target: str) -> None:
     """Check where a backup goes, before anything is opened. Raises Diagnostic."""
     path = Path(name)
@@ -120,8 +131,7 @@ async def backup(workspace: Workspace, name: str, target: str) -> None:
 
     async def keep(drive: Drive) -> None:
         own = file_of(workspace, drive, name, target)
-        if is_several(target):
-            make_folder(Path(own).parent)
+        make_place(own, target)
         new_file.check(own, printed=True)
         found, who = await files.read(workspace, drive, "backup"), workspace.display_name(drive)
         text = files.formatted(files.identity(drive.state, drive.family.values.parameters.language), found)
