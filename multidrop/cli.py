@@ -158,18 +158,19 @@ def parse(given: Sequence[str]) -> argparse.Namespace:
 
 
 def run(chosen: argparse.Namespace) -> int:
-    """Run a parsed command; return the exit code. A Diagnostic is one line on standard error."""
+    """Run a parsed command; return the exit code. A Diagnostic, or a loss, is one line on standard error."""
     file, _, function = chosen.run_by.partition(".")
     command: Callable[[argparse.Namespace], int] = imported(f"multidrop.commands.{file}:{function}")
-    from multidrop.commands import fail
     from multidrop.dialects.errors import Diagnostic
+    from multidrop.shell.streams.stdout import fail
+    from multidrop.transports import TransportLost
 
     context = copy_context()
     if hasattr(chosen, "no_config"):
         context.run(imported("multidrop.commands.machine:ignore"))
     try:
         return context.run(command, chosen)
-    except Diagnostic as problem:
+    except (Diagnostic, TransportLost) as problem:
         return fail(problem)
 
 

@@ -45,7 +45,10 @@ def salvage(text: str, where: str, read: Callable[[dict[str, Any], str], T]) -> 
             told = sorted(problems, key=lambda each: int(each.where.rpartition(":")[2]) if each.where != where else 0)
             return read(document, where), tuple(told), dict(reversed([*_doubts(lost)]))
         except Diagnostic as problem:
-            path = _path(document, problem.message)
+            # The longest path of the document with which a message begins; that of the file itself is empty.
+            name = problem.message.removeprefix("no key ")
+            found = [path for path in _paths(document) if re.match(rf"{re.escape('.'.join(path))}(?![\w-])", name)]
+            path = max(found, key=len, default=())
             problems.append(placed(problem.message, text, where, problem.hint))
             lost.append((path, problems[-1]))
             _leave_out(document, path[:2] if path[2:] == ("url",) else path)
@@ -78,13 +81,6 @@ def _join(document: dict[str, Any], more: Mapping[str, Any]) -> None:
             _join(document[key], value)
         else:
             document.setdefault(key, value)
-
-
-def _path(document: Mapping[str, Any], message: str) -> Path:
-    """The longest path of the document with which a message begins; that of the file itself is empty."""
-    name = message.removeprefix("no key ")
-    found = [path for path in _paths(document) if re.match(rf"{re.escape('.'.join(path))}(?![\w-])", name)]
-    return max(found, key=len, default=())
 
 
 def _paths(document: Mapping[str, Any], above: Path = ()) -> Iterator[Path]:

@@ -69,16 +69,11 @@ class Tasks:
             task.cancel()
 
     def _others(self) -> list[asyncio.Task[Any]]:
-        current = _current()
+        try:
+            current = asyncio.current_task()
+        except RuntimeError:  # in a signal handler or a callback
+            current = None
         return [task for task in self._running if task is not current]
-
-
-def _current() -> asyncio.Task[Any] | None:
-    """The running task; None in a signal handler or a callback."""
-    try:
-        return asyncio.current_task()
-    except RuntimeError:
-        return None
 
 
 Callback = Callable[[SessionEvent], None]

@@ -112,15 +112,12 @@ class ByteView:
         if not self._piece:
             self._piece_at = event.at
         self._piece += event.data
-        self._show_lines(event.at)
-
-    def _show_lines(self, now: float) -> None:
-        """Show whole lines, and set the time at which the rest is shown."""
+        # Show whole lines, and set the time at which the rest is shown.
         ends = [found.end() for found in _END.finditer(self._piece)]
         lines = [self._piece[begin:end] for begin, end in zip([0, *ends], ends, strict=False)]
         if lines:
             self._show(self._piece_at, False, lines)
-            self._piece, self._piece_at = self._piece[ends[-1] :], now
+            self._piece, self._piece_at = self._piece[ends[-1] :], event.at
         if self._timer is not None:
             self._timer.cancel()
             self._timer = None

@@ -28,7 +28,23 @@ def without_secrets(text: str) -> str:
     """Replace secrets in text of any kind: `ssh://me:pw@host`, `password = "pw"`, `?token=pw`."""
     if not _MAY_HOLD.search(text):
         return text
-    return _without_values(_URL.sub(lambda found: url_without_secrets(found[0]), text))
+    text = _URL.sub(lambda found: url_without_secrets(found[0]), text)
+    # The values of keys that name a secret, in text that need not be TOML.
+    parts, at = [], 0
+    while (equals := text.find("=", at)) >= 0:
+        before = text[at:equals]
+        key = before[max(map(before.rfind, "\n{,")) + 1 :]
+        parts.append(text[at : equals + 1])
+        at = equals + 1
+        of_url = "://" in key  # the query of a URL, which is clean
+        if not of_url and not _is_secret(key):
+            continue
+        if value := (_WORD if of_url else _CLEAN).match(text, at):
+            parts.append(value[0])
+        elif value := _VALUE.match(text, at):
+            parts.append(f" {HIDDEN}" if key[-1:].isspace() else HIDDEN)
+        at = value.end() if value else at
+    return "".join((*parts, text[at:]))
 
 
 def url_without_secrets(url: str) -> str:
@@ -52,25 +68,6 @@ def url_without_secrets(url: str) -> str:
 def holds_password(url: str) -> bool:
     """True if a URL has a password, or may have one."""
     return ":" in url.partition("://")[2].rpartition("@")[0] and url_without_secrets(url) != url
-
-
-def _without_values(text: str) -> str:
-    """Replace the values of keys that name a secret, in text that need not be TOML."""
-    parts, at = [], 0
-    while (equals := text.find("=", at)) >= 0:
-        before = text[at:equals]
-        key = before[max(map(before.rfind, "\n{,")) + 1 :]
-        parts.append(text[at : equals + 1])
-        at = equals + 1
-        of_url = "://" in key  # the query of a URL, which is clean
-        if not of_url and not _is_secret(key):
-            continue
-        if value := (_WORD if of_url else _CLEAN).match(text, at):
-            parts.append(value[0])
-        elif value := _VALUE.match(text, at):
-            parts.append(f" {HIDDEN}" if key[-1:].isspace() else HIDDEN)
-        at = value.end() if value else at
-    return "".join((*parts, text[at:]))
 
 
 def _is_secret(key: str) -> bool:

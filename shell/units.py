@@ -236,11 +236,7 @@ class Units:
 
         Raises Diagnostic for a quantity that the line or the axis cannot take, Refused in program mode.
         """
-        found = self._quantities(drive, text)
-        return await self._converted(drive, text, found) if found else Line(text)
-
-    def _quantities(self, drive: Drive, text: str) -> list[re.Match[str]]:
-        """The quantities of a line. Raises Diagnostic for one that is written wrongly."""
+        # A quantity that is written wrongly is refused before anything is converted.
         bare = _UNQUOTED.sub(lambda match: " " * len(match[0]), text)
         found = list(quantities(text))
         for match in _BRACES.finditer(bare):
@@ -253,7 +249,7 @@ class Units:
                 meant = text[: unit.start()] + written + text[unit.end() :]
                 if any(field.start == unit.start() for field in drive.family.units.fields(drive.state, meant)):
                     raise Diagnostic(f"{unit[0]} has a unit; nothing was sent", text.strip(), f"write {meant.strip()}")
-        return found
+        return await self._converted(drive, text, found) if found else Line(text)
 
     async def _converted(self, drive: Drive, text: str, found: Sequence[re.Match[str]]) -> Line:
         name = self.workspace.display_name(drive) or drive.shown
@@ -315,8 +311,9 @@ class Units:
     def _check_referenced(self, drives: Sequence[Drive], axis: str) -> None:
         for each in drives:
             if not self.referenced(each, axis):
-                name = self.name(each, axis)
-                hint = f"home it, or /units here {name} 0 {axis_unit(self.of(each, axis))} where it is"
+                name, found = self.name(each, axis), self.of(each, axis)
+                unit = found.scale.unit.name if found is not None else "mm"
+                hint = f"home it, or /units here {name} 0 {unit} where it is"
                 raise Diagnostic(f"the position of {name} is not referenced; nothing was sent", "", hint)
 
     async def _check(
@@ -431,10 +428,6 @@ class Units:
         drive.state.referenced(axis)
         self.workspace.changed()
         return found
-
-
-def axis_unit(axis: Axis | None) -> str:
-    return axis.scale.unit.name if axis is not None else "mm"
 
 
 def _names(drive: Drive) -> set[str]:

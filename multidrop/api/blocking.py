@@ -67,7 +67,6 @@ class Reading(Generic[T]):
     @overload
     def __get__(self, found: Any, kind: type) -> T: ...
     def __get__(self, found: Any, kind: type) -> T | Reading[T]:
-        """Read it."""
         return self if found is None else found._call(lambda: self._method(found._awaited))
 
 
@@ -99,7 +98,6 @@ class Session:
     # Beginning and end
 
     def __enter__(self) -> Session:
-        """Return it."""
         return self
 
     def __exit__(
@@ -318,7 +316,6 @@ class Stream(Generic[T]):
         return self
 
     def __exit__(self, *_: object) -> None:
-        """Close it."""
         self.close()
 
     def close(self) -> None:
@@ -327,7 +324,6 @@ class Stream(Generic[T]):
             self._session._run_there(self._stream.close)
 
     def __iter__(self: Self) -> Self:
-        """Return it."""
         return self
 
     def __next__(self) -> T:

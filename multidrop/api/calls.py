@@ -212,7 +212,6 @@ class StopReport:
     text: str
 
     def __str__(self) -> str:
-        """Return the line."""
         return self.text
 
 

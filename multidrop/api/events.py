@@ -27,7 +27,6 @@ class Fault:
     text: str
 
     def __str__(self) -> str:
-        """Return the text."""
         return self.text
 
 
@@ -51,7 +50,6 @@ class Event:
     """Time of day, seconds since 1970."""
 
     def __str__(self) -> str:
-        """Return the line."""
         return f"{self.name}: {self.text}"
 
 

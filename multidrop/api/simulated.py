@@ -53,13 +53,11 @@ class SimulatedCell:
             return floor
 
     def __enter__(self) -> SimulatedCell:
-        """Return it."""
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, failure: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """Close it."""
         self.close()
 
     def close(self) -> None:

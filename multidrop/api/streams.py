@@ -53,11 +53,9 @@ class AsyncStream(ABC, Generic[T]):
         return self
 
     async def __aexit__(self, *_: object) -> None:
-        """Close it."""
         self.close()
 
     def __aiter__(self: Self) -> Self:
-        """Return it."""
         return self
 
     async def __anext__(self) -> T:

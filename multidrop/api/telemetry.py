@@ -60,23 +60,18 @@ class Samples(Sequence[Sample]):
     @overload
     def __getitem__(self, at: slice) -> Samples: ...
     def __getitem__(self, at: SupportsIndex | slice) -> Sample | Samples:
-        """Return one of them, or some."""
         return Samples(self._rows[at]) if isinstance(at, slice) else self._rows[at]
 
     def __len__(self) -> int:
-        """Return their number."""
         return len(self._rows)
 
     def __iter__(self) -> Iterator[Sample]:
-        """Iterate over them."""
         return iter(self._rows)
 
     def __eq__(self, other: object) -> bool:
-        """Return whether the others are the same."""
         return isinstance(other, Samples) and self._rows == other._rows
 
     def __hash__(self) -> int:
-        """Return a hash of all."""
         return hash(self._rows)
 
     def __repr__(self) -> str:

@@ -19,7 +19,7 @@ from multidrop.shell.line_syntax import split_target
 from multidrop.shell.new_file import STANDARD_OUTPUT
 from multidrop.shell.params import file as files
 from multidrop.shell.params import replacement, work
-from multidrop.shell.params.work import Options, check_new, each, file_of, is_several, targets
+from multidrop.shell.params.work import Options, check_new, each, file_of, is_several, make_place, targets
 from multidrop.shell.programs import transfers
 from multidrop.shell.workspace import address_of
 from multidrop.simulator import cells
@@ -104,8 +104,7 @@ def upload(chosen: argparse.Namespace) -> int:
     async def save(session: Session, drive: Drive) -> None:
         lines = await program_listing.upload(session, drive, chosen.raw)
         file = file_of(session, drive, chosen.file, chosen.drive, drive.program_files.endings[0])
-        if is_several(chosen.drive):
-            Path(file).parent.mkdir(parents=True, exist_ok=True)
+        make_place(file, chosen.drive)
         program_listing.save_new(session, drive, file, lines)
 
     return _with_drive(chosen, save, unsolicited=chosen.file != STANDARD_OUTPUT)
@@ -146,12 +145,11 @@ def _with_drive(
 
 def params_backup(chosen: argparse.Namespace) -> int:
     work.check_new(chosen.file, chosen.drive)
-    return runner.run(
-        [chosen.url],
-        lambda session: work.backup(session, chosen.file, chosen.drive),
-        unsolicited=False,
-        tried=chosen.drive.split(","),
-    )
+
+    async def keep(session: Session) -> None:
+        await work.backup(session, chosen.file, chosen.drive)
+
+    return runner.run([chosen.url], keep, unsolicited=False, tried=chosen.drive.split(","))
 
 
 def params_diff(chosen: argparse.Namespace) -> int:
@@ -161,10 +159,8 @@ def params_diff(chosen: argparse.Namespace) -> int:
         raise Diagnostic("params diff compares with one thing", hint=valid)
     if chosen.file and not work.is_several(chosen.drive):
         files.load(chosen.file)
-    differs = False
 
-    async def compare(session: Session) -> None:
-        nonlocal differs
+    async def compare(session: Session) -> int:
         other = None
         if chosen.against or chosen.other:
             bus, address = split_target(chosen.other)
@@ -172,10 +168,10 @@ def params_diff(chosen: argparse.Namespace) -> int:
                 bus = (await session.open(chosen.against))[0].name
             other = session.drive(bus, address or None)
         differs = await work.diff(session, chosen.drive, name=chosen.file, other=other, as_json=chosen.json)
+        return DIFFERS if differs else 0
 
     tried = [*chosen.drive.split(","), "" if chosen.against else chosen.other]
-    code = runner.run([chosen.url], compare, unsolicited=False, tried=tried)
-    return code or (DIFFERS if differs else 0)
+    return runner.run([chosen.url], compare, unsolicited=False, tried=tried)
 
 
 def _named(chosen: argparse.Namespace) -> frozenset[str]:
@@ -218,18 +214,15 @@ def certify(chosen: argparse.Namespace) -> int:
         certificate.load(chosen.compare)
     else:
         new_file.check(chosen.output, printed=True)
-    differs = False
 
-    async def work(session: Session) -> None:
-        nonlocal differs
+    async def work(session: Session) -> int:
         [drive] = targets(session, chosen.drive)
         if chosen.compare:
-            differs = await certificate.compare(session, drive, chosen.compare)
-        else:
-            await certificate.certify(session, drive, chosen.output)
+            return DIFFERS if await certificate.compare(session, drive, chosen.compare) else 0
+        await certificate.certify(session, drive, chosen.output)
+        return 0
 
-    code = runner.run([chosen.url], work, agreed=chosen.yes, unsolicited=False, tried=[chosen.drive])
-    return code or (DIFFERS if differs else 0)
+    return runner.run([chosen.url], work, agreed=chosen.yes, unsolicited=False, tried=[chosen.drive])
 
 
 def apply(chosen: argparse.Namespace) -> int:

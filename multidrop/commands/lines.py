@@ -9,7 +9,6 @@ from functools import partial
 from shlex import quote
 from typing import TYPE_CHECKING
 
-from multidrop.commands import fail, refused
 from multidrop.dialects import Diagnostic
 from multidrop.dialects.on_demand import importing
 
@@ -89,7 +88,7 @@ def run(chosen: argparse.Namespace) -> int:
         macros = MacroStore(settings.macros, settings.project_macros)
         script = read_script(chosen.script, dict(chosen.set), macros)
     except Diagnostic as problem:
-        return refused(report, problem)
+        return report.refused(problem)
     from multidrop.shell.batch import runner
     from multidrop.shell.line_syntax import targets
     from multidrop.shell.scripts.executor import run_script
@@ -119,13 +118,9 @@ def tui(chosen: argparse.Namespace) -> int:
         return _screen(chosen.urls, not chosen.no_reconnect, chosen.raw, chosen.twin, chosen.share)
     if chosen.urls or chosen.share or chosen.raw or chosen.twin:
         raise Diagnostic("a watcher opens nothing itself", "tui --join", "give --join alone, or with ssh://HOST")
-    from multidrop.transports import TransportLost
     from multidrop.tui.launch import join
 
-    try:
-        return join(chosen.join)
-    except TransportLost as problem:
-        return fail(problem)
+    return join(chosen.join)
 
 
 def _screen(urls: list[str], reconnect: bool = True, raw: bool = False, twin: bool = False, share: bool = False) -> int:

@@ -134,7 +134,11 @@ LONGEST = 200
 
 
 def report(chosen: argparse.Namespace) -> int:
-    text = report_text()
+    # All sections, without control characters and secrets.
+    parts = []
+    for title, lines in SECTIONS.items():
+        parts += [f"== {title}", *(f"  {visible(without_secrets(line), tabs=True)}" for line in lines()), ""]
+    text = "\n".join(parts).rstrip() + "\n"
     for line in text.splitlines():
         write(sys.stdout, line)
     if chosen.output == STANDARD_OUTPUT:
@@ -143,10 +147,7 @@ def report(chosen: argparse.Namespace) -> int:
     if not (chosen.output or asked):
         return 0
     path = Path(chosen.output or f"multidrop-report-{date.today().isoformat()}.txt")
-    return _keep(path, text, chosen.yes, asked)
-
-
-def _keep(path: Path, text: str, agreed: bool, asked: bool) -> int:
+    agreed = chosen.yes
     if not agreed and not asked:
         raise Diagnostic("not written: this is not a terminal", str(path), "read the report above, then add --yes")
     if not agreed:
@@ -168,14 +169,6 @@ def _keep(path: Path, text: str, agreed: bool, asked: bool) -> int:
         raise Diagnostic(f"cannot be written: {why(problem)}", str(path)) from None
     write(sys.stderr, f"the report is in {path}")
     return 0
-
-
-def report_text() -> str:
-    """All sections, without control characters and secrets."""
-    parts = []
-    for title, lines in SECTIONS.items():
-        parts += [f"== {title}", *(f"  {visible(without_secrets(line), tabs=True)}" for line in lines()), ""]
-    return "\n".join(parts).rstrip() + "\n"
 
 
 def _program() -> Iterator[str]:
@@ -222,7 +215,20 @@ def _terminal() -> Iterator[str]:
 def _configuration() -> Iterator[str]:
     path = configuration.config_file()
     yield str(path)
-    yield from _contents(path)
+    try:
+        with opened(path) as file:
+            text = bounded(file, str(path)).decode("utf-8", "backslashreplace")
+        lines = split_lines(toml_without_secrets(text))
+    except FileNotFoundError:
+        yield "no such file"
+    except OSError as problem:
+        yield f"problem: {why(problem)}"
+    except Diagnostic as problem:
+        yield f"problem: {problem}"
+    else:
+        yield from lines[:LONGEST]
+        if len(lines) > LONGEST:
+            yield f"... {len(lines) - LONGEST} more lines"
     try:
         yield from (f"problem: {problem}" for problem in configuration.load(lenient=True).problems)
     except Diagnostic as problem:
@@ -267,23 +273,6 @@ def _state() -> Iterator[str]:
             yield f"{path.stat().st_size:>10} {path.relative_to(folder)}"
     except OSError as problem:
         yield f"problem: {why(problem)}"
-
-
-def _contents(path: Path) -> Iterator[str]:
-    try:
-        with opened(path) as file:
-            text = bounded(file, str(path)).decode("utf-8", "backslashreplace")
-        lines = split_lines(toml_without_secrets(text))
-    except FileNotFoundError:
-        yield "no such file"
-    except OSError as problem:
-        yield f"problem: {why(problem)}"
-    except Diagnostic as problem:
-        yield f"problem: {problem}"
-    else:
-        yield from lines[:LONGEST]
-        if len(lines) > LONGEST:
-            yield f"... {len(lines) - LONGEST} more lines"
 
 
 SECTIONS: dict[str, Callable[[], Iterator[str]]] = {

@@ -8,7 +8,6 @@ import sys
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
-from multidrop.commands import fail, refused
 from multidrop.dialects import Diagnostic
 from multidrop.dialects.files import bounded, utf8, why
 from multidrop.macros import Macro, MacroStore, format_macro, missing
@@ -16,7 +15,7 @@ from multidrop.macros.store import begin_draft, finish_draft, listed
 from multidrop.shell import macro_changes
 from multidrop.shell.configuration import Settings
 from multidrop.shell.exit_codes import INTERRUPTED
-from multidrop.shell.streams.stdout import write
+from multidrop.shell.streams.stdout import fail, write
 
 if TYPE_CHECKING:
     from multidrop.shell.session import Session
@@ -58,7 +57,7 @@ def play(chosen: argparse.Namespace) -> int:
             write(sys.stderr, hides)
         read_macro(macro, values, store)
     except Diagnostic as problem:
-        return refused(report, problem)
+        return report.refused(problem)
     except KeyboardInterrupt:
         return INTERRUPTED
     from multidrop.shell.batch import runner

@@ -13,14 +13,13 @@ import time
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
-from multidrop.commands import fail
 from multidrop.dialects import Diagnostic
 from multidrop.dialects.families import program_language_of
 from multidrop.dialects.files import program_text_of
 from multidrop.dialects.program_files import errors
 from multidrop.dialects.text import counted
 from multidrop.shell.programs.checking import Checked, examine, rewrite
-from multidrop.shell.streams.stdout import reader_left, shortened, write
+from multidrop.shell.streams.stdout import fail, reader_left, shortened, write
 
 if TYPE_CHECKING:
     from multidrop.simulator.cell.spec import DriveSpec
@@ -136,23 +135,20 @@ def convert(chosen: argparse.Namespace) -> int:
     from multidrop.shell.programs import checking
     from multidrop.shell.streams.stdout import StatusLine
 
-    try:
-        new_file.check(chosen.output, printed=True)
-        converted = checking.convert(chosen.file, chosen.to, chosen.personality)
-        found, status = converted.found, StatusLine()
-        for each in found.refused:
-            write(sys.stderr, each.line_for(chosen.file))
-        if found.refused:
-            write(sys.stderr, f"{chosen.file}: nothing is written")
-            return WRONG
-        runs = []
-        for run in converted.differences(chosen.until):
-            runs.append(run)
-            status.show(f"{counted(len(runs), 'world')} run")
-        status.erase()
-        new_file.write(chosen.output, found.text, lambda line: write(sys.stdout, line))
-    except Diagnostic as problem:
-        return fail(problem)
+    new_file.check(chosen.output, printed=True)
+    converted = checking.convert(chosen.file, chosen.to, chosen.personality)
+    found, status = converted.found, StatusLine()
+    for each in found.refused:
+        write(sys.stderr, each.line_for(chosen.file))
+    if found.refused:
+        write(sys.stderr, f"{chosen.file}: nothing is written")
+        return WRONG
+    runs = []
+    for run in converted.differences(chosen.until):
+        runs.append(run)
+        status.show(f"{counted(len(runs), 'world')} run")
+    status.erase()
+    new_file.write(chosen.output, found.text, lambda line: write(sys.stdout, line))
     differ = [run for run in runs if run[1]]
     stream = sys.stderr if chosen.output == new_file.STANDARD_OUTPUT else sys.stdout
     lines = [f"{each.where(chosen.file)}: {each.what}; {each.hint}" for each in found.changes]

@@ -25,7 +25,6 @@ import multidrop
 from multidrop import script
 from multidrop.api.blocking import Session
 from multidrop.api.sessions import Notice
-from multidrop.commands import fail, refused
 from multidrop.dialects import Diagnostic, Stopped
 from multidrop.dialects.files import bytes_of
 from multidrop.shell.batch.report import Report
@@ -34,7 +33,7 @@ from multidrop.shell.exit_codes import INTERRUPTED, exit_code
 from multidrop.shell.prompt.keyboard import on_stop_key, terminal
 from multidrop.shell.scripts.model import Result, ScriptLine
 from multidrop.shell.signals import SIGNALS, early_ends
-from multidrop.shell.streams.stdout import lost_reader, why_interrupted, work_done, write
+from multidrop.shell.streams.stdout import fail, lost_reader, why_interrupted, work_done, write
 
 T = TypeVar("T")
 
@@ -160,7 +159,7 @@ def run(chosen: argparse.Namespace, report: Report) -> int:
         problem = error
     else:
         return report.finish(_Execution(chosen, report, code).run())
-    return refused(report, problem)
+    return report.refused(problem)
 
 
 class _Execution:

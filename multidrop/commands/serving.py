@@ -11,9 +11,8 @@ import signal
 import sys
 from types import FrameType
 
-from multidrop.commands import fail
 from multidrop.dialects import Diagnostic
-from multidrop.shell.streams.stdout import write
+from multidrop.shell.streams.stdout import fail, write
 
 FILES = {"bash": "multidrop.bash", "zsh": "_multidrop", "fish": "multidrop.fish", "powershell": "multidrop.ps1"}
 """The completion of each shell in `multidrop/shipped`, which `make shipped` writes."""
@@ -93,15 +92,6 @@ def plant(chosen: argparse.Namespace) -> int:
 
 def relay(chosen: argparse.Namespace) -> int:
     """Lend a port to the multidrop at the other end of standard input and output, until that is gone."""
-    from multidrop.transports import TransportLost
-
-    try:
-        return _relay(chosen)
-    except TransportLost as problem:
-        return fail(problem)
-
-
-def _relay(chosen: argparse.Namespace) -> int:
     if sys.platform == "win32":
         raise Diagnostic(
             "relay needs Linux or macOS", "multidrop relay", "open the port from a program on this machine"

@@ -16,7 +16,6 @@ from datetime import datetime
 from functools import partial
 from pathlib import Path
 
-from multidrop.commands import fail
 from multidrop.dialects import Diagnostic
 from multidrop.dialects.files import why
 from multidrop.dialects.text import counted
@@ -26,7 +25,7 @@ from multidrop.shell.batch.report import Case as JUnitCase
 from multidrop.shell.batch.report import JUnitFile, check_place
 from multidrop.shell.exit_codes import INTERRUPTED
 from multidrop.shell.signals import Interruption
-from multidrop.shell.streams.stdout import StatusLine, write
+from multidrop.shell.streams.stdout import StatusLine, fail, write
 from multidrop.shell.sweeps import plan as planning
 from multidrop.shell.sweeps import workers
 from multidrop.shell.sweeps.answers import Answer

@@ -54,7 +54,9 @@ class Documents:
         return self._open.get(uri)
 
     def open(self, uri: str, file: str, language_id: str, text: str, version: int | None) -> None:
-        self._grammars[uri] = ProgramGrammar(file, _language(language_id))
+        named = language_id.lower()  # where no editor calls a language so, the name of the file decides
+        language = next((name for name, files in program_languages().items() if named in files.ids), "")
+        self._grammars[uri] = ProgramGrammar(file, language)
         self._take(uri, text, version, 0.0)
 
     def change(self, uri: str, text: str, version: int | None) -> None:
@@ -107,12 +109,6 @@ class Documents:
             return []
         _ = document.text.names
         return list(document.text.problems)
-
-
-def _language(language_id: str) -> str:
-    """Return the family of a language by its name in editors; empty where the name of the file decides."""
-    named = language_id.lower()
-    return next((name for name, files in program_languages().items() if named in files.ids), "")
 
 
 _LIMITS: Mapping[str, tuple[int, ...]] = {

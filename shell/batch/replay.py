@@ -174,27 +174,21 @@ class Replay:
                 f"not replayed: {counted(self._found.unsent, 'line')} that the log has as not sent", outcome=True
             )
         if not self._simulated:
-            moving = self._announced()
+            session, moving = self._session, 0
+            for each in dict.fromkeys(self._targets.values()):
+                session.notify(f"drive {_name(each)}: {model(each)} on {each.link.transport.name}", outcome=True)
+            for step in self.steps:
+                if (drive := self._targets.get((step.bus, step.drive))) is None:
+                    continue
+                guarded = session.settings.guards.what(drive.family, drive.state, step.text)
+                if guarded or drive.codec.starts_motion(step.text):
+                    session.notify(
+                        f"{step.where}: {_name(drive)} {step.text}" + f" ({guarded})" * bool(guarded), outcome=True
+                    )
+                    moving += 1
             lines = counted(len(self.steps), "line is", "lines are")
-            await self._session.questions.confirm(f"{lines} sent; {moving} of them can start motion or ask first")
+            await session.questions.confirm(f"{lines} sent; {moving} of them can start motion or ask first")
         self._session.questions.agreed = True
-
-    def _announced(self) -> int:
-        """List the drives, and the lines that can start motion or need a yes; return the number of those."""
-        session = self._session
-        for each in dict.fromkeys(self._targets.values()):
-            session.notify(f"drive {_name(each)}: {model(each)} on {each.link.transport.name}", outcome=True)
-        number = 0
-        for step in self.steps:
-            if (drive := self._targets.get((step.bus, step.drive))) is None:
-                continue
-            guarded = session.settings.guards.what(drive.family, drive.state, step.text)
-            if guarded or drive.codec.starts_motion(step.text):
-                session.notify(
-                    f"{step.where}: {_name(drive)} {step.text}" + f" ({guarded})" * bool(guarded), outcome=True
-                )
-                number += 1
-        return number
 
     async def run(self, fast: bool, positions: bool) -> str:
         """Take the steps; return what differs, in words. Raises DriveError at a difference in an error."""

@@ -21,8 +21,8 @@ from multidrop.dialects.files import LARGEST_PROGRAM, bytes_of, why
 from multidrop.dialects.text import counted, visible
 from multidrop.macros.atomic import write_atomically
 from multidrop.shell import new_file
+from multidrop.shell.streams.stdout import fail, write
 from multidrop.shell.streams.stdout import report as described
-from multidrop.shell.streams.stdout import write
 
 if TYPE_CHECKING:
     from multidrop.shell.scripts.model import Ending, Result
@@ -166,10 +166,12 @@ class Report:
     def ended(self, ending: Ending) -> None:
         self._ending = ending
 
-    def wrong(self, problems: tuple[Diagnostic, ...]) -> None:
-        for each in problems:
+    def refused(self, failure: Diagnostic) -> int:
+        """Report a script that is not executed, with each of its errors; return the exit code."""
+        for each in getattr(failure, "problems", (failure,)):
             self._cases.append(Case(each.where or self._name, self._name, error=str(each)))
         self.finish(2)
+        return fail(failure)
 
     def finish(self, code: int) -> int:
         seconds = (datetime.now().astimezone() - self._begun).total_seconds()

@@ -24,10 +24,11 @@ from multidrop.shell.prompt.terminal_input import asker
 from multidrop.shell.session import Session
 from multidrop.shell.signals import early_ends
 from multidrop.shell.streams.event_printer import Printer
-from multidrop.shell.streams.stdout import finish, nonblocking, report, why_interrupted, work_done, write
+from multidrop.shell.streams.stdout import fail, finish, nonblocking, report, why_interrupted, work_done
 from multidrop.shell.workspace import Workspace
 
-Body = Callable[[Session], Awaitable[None]]
+Body = Callable[[Session], Awaitable[int | None]]
+"""The work; it returns the exit code of a good end, where that is not 0."""
 
 
 def run(
@@ -59,8 +60,7 @@ def run(
     try:
         found = configuration.load()
     except FAILURES as failure:
-        write(sys.stderr, *map(report, getattr(failure, "problems", (failure,))))
-        return exit_code(failure)
+        return fail(failure)
     try:
         create = partial(Session, found, lazy=lazy, reconnect=reconnect, raw=raw, tried=tried)
         make = partial(_session, create, agreed, beyond)
@@ -122,7 +122,7 @@ class _Host:
         self._session = session
         self._printer = printer
         self._code = code
-        self._work: asyncio.Task[None] | None = None
+        self._work: asyncio.Task[int | None] | None = None
         self.interrupted = False
 
     def interrupt(self) -> None:
@@ -135,7 +135,7 @@ class _Host:
         self._work = asyncio.create_task(self._session.tasks.run(self._whole(urls, body)))
         code, lines = 0, [""]
         try:
-            await self._work
+            code = await self._work or 0
         except FAILURES as failure:
             code, lines = exit_code(failure), [report(failure)]
         except asyncio.CancelledError:
@@ -156,10 +156,10 @@ class _Host:
                 self._printer.notify(each)
         return code
 
-    async def _whole(self, urls: Sequence[str], body: Body) -> None:
+    async def _whole(self, urls: Sequence[str], body: Body) -> int | None:
         async with self._session.automations.run():
             await self._session.open_all(urls)
-            await body(self._session)
+            return await body(self._session)
 
 
 async def until(workspace: Workspace, holds: Callable[[], object]) -> None:

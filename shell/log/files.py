@@ -139,19 +139,15 @@ def fresh(settings: Settings) -> Path:
     place = folder(settings)
     try:
         make_folder(place)
-        _make_room(place, settings.log.size * settings.log.files)
+        # Remove the oldest logs of the folder until the rest fits.
+        total = 0
+        for path in sorted((each for each in place.iterdir() if ENDING in each.name), key=_changed, reverse=True):
+            total += path.stat().st_size
+            if total > settings.log.size * settings.log.files:
+                path.unlink(missing_ok=True)
     except OSError as problem:
         raise Diagnostic(f"cannot be written: {why(problem)}", str(place)) from None
     return place / f"{datetime.now():%Y%m%d-%H%M%S}-{PROCESS}{ENDING}"
-
-
-def _make_room(place: Path, most: int) -> None:
-    """Remove the oldest logs of the folder until the rest fits."""
-    total = 0
-    for path in sorted((each for each in place.iterdir() if ENDING in each.name), key=_changed, reverse=True):
-        total += path.stat().st_size
-        if total > most:
-            path.unlink(missing_ok=True)
 
 
 def note(settings: Settings, path: Path) -> None:

@@ -105,7 +105,11 @@ class _Session:
         elif not self.marked:
             return
         elif entry.kind == "bus":
-            self._bus(entry)
+            self._report(entry.bus)
+            self._buses.add(entry.bus)
+            if entry.text == "closed":
+                self._buses.discard(entry.bus)
+                self._due.discard(entry.bus)
         elif entry.kind == "typed":
             yield from self._line_typed(entry)
         elif entry.kind == "stop":
@@ -119,18 +123,21 @@ class _Session:
         elif entry.kind == "sent":
             yield from self._sent(entry)
         elif entry.kind == "received":
-            self._received(entry)
+            if (
+                entry.drive
+                and self._asked.get(entry.bus) == entry.drive
+                or (not entry.drive and entry.bus in self._asked)
+            ):
+                self._replies[entry.bus, entry.drive] += 1
+                del self._asked[entry.bus]
+            for (bus, *_), typed in self._last.items():
+                typed.heard += entry.text * (bus == entry.bus)
+            for (bus, _), exchanges in self._exchanges.items():
+                exchanges[-1][1] += entry.text * (bus == entry.bus)
         elif entry.kind == "printed":
             yield from self._printed(entry)
         elif entry.kind in ("notice", "failed"):
             yield from self._said(entry)
-
-    def _bus(self, entry: Entry) -> None:
-        self._report(entry.bus)
-        self._buses.add(entry.bus)
-        if entry.text == "closed":
-            self._buses.discard(entry.bus)
-            self._due.discard(entry.bus)
 
     def _report(self, bus: str) -> None:
         """Something was said of a bus; empty: of all."""
@@ -180,15 +187,6 @@ class _Session:
         if typed.sent and not again:
             yield "twice", f"{entry.command!r} was sent {typed.sent + 1} times"
         typed.sent, typed.asked, typed.heard = typed.sent + 1, 0, ""
-
-    def _received(self, entry: Entry) -> None:
-        if entry.drive and self._asked.get(entry.bus) == entry.drive or (not entry.drive and entry.bus in self._asked):
-            self._replies[entry.bus, entry.drive] += 1
-            del self._asked[entry.bus]
-        for (bus, *_), typed in self._last.items():
-            typed.heard += entry.text * (bus == entry.bus)
-        for (bus, _), exchanges in self._exchanges.items():
-            exchanges[-1][1] += entry.text * (bus == entry.bus)
 
     def _printed(self, entry: Entry) -> Iterator[tuple[str, str]]:
         exchanges = self._exchanges.get((entry.bus, entry.drive))

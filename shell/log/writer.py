@@ -242,7 +242,15 @@ class Disk:
     def _write(self, data: bytes) -> int:
         rest = data
         if self._regular:
-            self._follow()
+            # Another session may have rotated it: then open the path again.
+            try:
+                found = os.stat(self._path)
+            except FileNotFoundError:
+                raise FileNotFoundError(errno.ENOENT, "the file is gone") from None
+            ours = os.fstat(self._descriptor)
+            if (found.st_dev, found.st_ino) != (ours.st_dev, ours.st_ino):
+                self._close()
+                self._descriptor = _opened(self._path)
             now = os.fstat(self._descriptor).st_size
             if now and now + len(data) > self._size:
                 rest, now = self._rotate() + data, 0
@@ -253,17 +261,6 @@ class Disk:
             except BlockingIOError:
                 raise OSError(errno.EAGAIN, "its reader does not take it") from None
         return len(data)
-
-    def _follow(self) -> None:
-        """Open the path again where another session has rotated it. Raises FileNotFoundError where it is gone."""
-        try:
-            found = os.stat(self._path)
-        except FileNotFoundError:
-            raise FileNotFoundError(errno.ENOENT, "the file is gone") from None
-        ours = os.fstat(self._descriptor)
-        if (found.st_dev, found.st_ino) != (ours.st_dev, ours.st_ino):
-            self._close()
-            self._descriptor = _opened(self._path)
 
     def _rotate(self) -> bytes:
         """Begin a new part; return its first bytes. A part that cannot be renamed now is so at a later write."""

@@ -15,6 +15,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from multidrop.dialects import Diagnostic, DriveError, NoAnswer, Refused, Stopped
+from multidrop.dialects.files import why
 from multidrop.dialects.text import counted
 from multidrop.dialects.values import (
     COMMUNICATION,
@@ -82,6 +83,16 @@ def file_of(workspace: Workspace, drive: Drive, name: str, target: str, ending: 
     return str(Path(name) / f"{own}{ending}")
 
 
+def make_place(file: str, target: str) -> None:
+    """Make the folder of the files of several drives. Raises Diagnostic where it cannot be made."""
+    folder = Path(file).parent
+    try:
+        if is_several(target):
+            make_folder(folder)
+    except OSError as problem:
+        raise Diagnostic(f"the folder cannot be made: {why(problem)}", str(folder), "name another one") from None
+
+
 def check_new(name: str, target: str) -> None:
     """Check where a backup goes, before anything is opened. Raises Diagnostic."""
     path = Path(name)
@@ -120,8 +131,7 @@ async def backup(workspace: Workspace, name: str, target: str) -> None:
 
     async def keep(drive: Drive) -> None:
         own = file_of(workspace, drive, name, target)
-        if is_several(target):
-            make_folder(Path(own).parent)
+        make_place(own, target)
         new_file.check(own, printed=True)
         found, who = await files.read(workspace, drive, "backup"), workspace.display_name(drive)
         text = files.formatted(files.identity(drive.state, drive.family.values.parameters.language), found)
@@ -167,7 +177,13 @@ async def diff(
     async def compare(drive: Drive) -> None:
         nonlocal differs
         file = files.load(file_of(workspace, drive, name, target)) if name else None
-        _check_language(workspace, drive, file, other)
+        # No setting has the same meaning in a file or a drive of another family.
+        language = drive.family.values.parameters.language
+        has = f"{workspace.display_name(drive)} has {language}; their settings cannot be compared"
+        if file is not None and file.language and file.language != language:
+            raise Diagnostic(f"has settings of {file.product or 'a drive'} in {file.language}, and {has}", file.path)
+        if other is not None and (theirs := other.family.values.parameters.language) != language:
+            raise Diagnostic(f"{workspace.display_name(other)} has {theirs}, and {has}")
         found, who = await files.read(workspace, drive, "reading"), workspace.display_name(drive)
         if file is not None and (aside := [name for name, _ in found.unread if name in file.named]):
             workspace.notify(f"{who}: not read, so not compared: {files.listed(aside)}", warning=True)
@@ -187,16 +203,6 @@ async def diff(
 
     await each(workspace, targets(workspace, target), compare)
     return differs
-
-
-def _check_language(workspace: Workspace, drive: Drive, file: files.SettingsFile | None, other: Drive | None) -> None:
-    """Raise Diagnostic for a file or a drive of another family: no setting has the same meaning there."""
-    own = drive.family.values.parameters.language
-    who = f"{workspace.display_name(drive)} has {own}; their settings cannot be compared"
-    if file is not None and file.language and file.language != own:
-        raise Diagnostic(f"has settings of {file.product or 'a drive'} in {file.language}, and {who}", file.path)
-    if other is not None and (theirs := other.family.values.parameters.language) != own:
-        raise Diagnostic(f"{workspace.display_name(other)} has {theirs}, and {who}")
 
 
 def differences(found: Readings, other: files.SettingsFile | Readings | None, who: str) -> list[Difference]:

@@ -17,7 +17,7 @@ from multidrop.shell.params.work import targets
 from multidrop.shell.plots.plot import begin
 from multidrop.shell.plots.request import PlotTarget, parse_rate, parse_series, parse_target, read_first
 from multidrop.shell.session import Session
-from multidrop.shell.streams.stdout import report, write
+from multidrop.shell.streams.stdout import write
 from multidrop.shell.workspace import address_of
 from multidrop.transports import TransportLost
 
@@ -28,12 +28,11 @@ STAMP = 24
 def run(
     url: str, drives: Sequence[str], *, to: str | None, serve: str | None, rate: str, reconnect: bool = True
 ) -> int:
-    """Plot until a signal, which ends it well; return the exit code. `reconnect`: a lost bus leaves a gap."""
-    try:
-        target, period = parse_target(to, serve), parse_rate(rate)
-    except Diagnostic as problem:
-        write(sys.stderr, report(problem))
-        return 2
+    """Plot until a signal, which ends it well; return the exit code. `reconnect`: a lost bus leaves a gap.
+
+    Raises Diagnostic for a wrong target or rate.
+    """
+    target, period = parse_target(to, serve), parse_rate(rate)
     return runner.run(
         [url], lambda workspace: _until_ended(workspace, target, drives, period), interrupted=0, reconnect=reconnect
     )

@@ -186,7 +186,15 @@ class Plot:
             await self._flush()
             await in_thread(self._sink.close, _timeout(self.target))
         except (SinkBroken, TimeoutError) as error:
-            await self._break(error)
+            reason = str(error) if isinstance(error, SinkBroken) else self._sink.why(error)
+            self.failure = f"plotting ended: {reason}"
+            self._batch = Batch()
+            self._sink.leave_behind()
+            for callback in self._on_failure:
+                callback(self.failure)
+            with contextlib.suppress(TimeoutError):
+                await in_thread(self._sink.abandon, ABANDON_TIMEOUT)
+            self._sink.let_go()
         finally:
             self.ended.set()
 
@@ -194,17 +202,6 @@ class Plot:
         batch, self._batch, self._epoch = self._batch, Batch(), self._at_zero()
         if batch:
             await in_thread(lambda: self._sink.send(batch), BATCH_TIMEOUT)
-
-    async def _break(self, error: SinkBroken | TimeoutError) -> None:
-        reason = str(error) if isinstance(error, SinkBroken) else self._sink.why(error)
-        self.failure = f"plotting ended: {reason}"
-        self._batch = Batch()
-        self._sink.leave_behind()
-        for callback in self._on_failure:
-            callback(self.failure)
-        with contextlib.suppress(TimeoutError):
-            await in_thread(self._sink.abandon, ABANDON_TIMEOUT)
-        self._sink.let_go()
 
 
 async def write(target: PlotTarget, batch: Batch) -> None:

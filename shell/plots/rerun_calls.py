@@ -275,7 +275,13 @@ class Sink:
                 )
                 self._columns((bus, "log"), texts, columns)
             for curve, gaps in batch.gaps.items():
-                self._send_gaps(curve, gaps)
+                for elapsed, wall in gaps:
+                    self._recording.set_time("elapsed", duration=elapsed)
+                    self._recording.set_time("time", timestamp=wall)
+                    self._recording.log(
+                        entity_path(self._rr, *curve.place), self._rr.Clear(recursive=False), strict=True
+                    )
+                self._recording.reset_time()
             for state, changes in batch.states.items():
                 columns = self._rr.StateChange.columns(state=[row[2] for row in changes])
                 self._columns(_place(state), changes, columns)
@@ -360,13 +366,6 @@ class Sink:
 
     def _layout(self) -> Any:
         return layout(self._paths, self._names)
-
-    def _send_gaps(self, curve: Curve, gaps: list[tuple[float, float]]) -> None:
-        for elapsed, wall in gaps:
-            self._recording.set_time("elapsed", duration=elapsed)
-            self._recording.set_time("time", timestamp=wall)
-            self._recording.log(entity_path(self._rr, *curve.place), self._rr.Clear(recursive=False), strict=True)
-        self._recording.reset_time()
 
     def _columns(self, place: tuple[str, ...], rows: Sequence[tuple[Any, ...]], values: Any) -> None:
         """Send the values of an entity; each row begins with its two times."""

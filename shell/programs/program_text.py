@@ -182,7 +182,12 @@ class ProgramText:
 
     def folds(self) -> Iterator[Fold]:
         """Yield what may be folded: blocks, and remarks in lines of their own."""
-        yield from _folds(self.outline)
+        waiting = [*reversed(self.outline)]  # they may be nested deeper than calls may
+        while waiting:
+            block = waiting.pop()
+            waiting += reversed(block.parts)
+            if block.last > block.place.line:
+                yield Fold(block.place.line, block.last)
         first: int | None = None
         for number, line in enumerate([*self.lines, ""]):
             parts = self.grammar.parts(line) if line.strip() else ()
@@ -205,12 +210,3 @@ class ProgramText:
                 end = min(len(commonprefix((old[::-1], new[::-1]))), min(len(old), len(new)) - start)
                 edits.append(Edit(Span(number, start, len(old) - end), new[start : len(new) - end]))
         return edits
-
-
-def _folds(blocks: Sequence[Block]) -> Iterator[Fold]:
-    waiting = [*reversed(blocks)]  # they may be nested deeper than calls may
-    while waiting:
-        block = waiting.pop()
-        waiting += reversed(block.parts)
-        if block.last > block.place.line:
-            yield Fold(block.place.line, block.last)

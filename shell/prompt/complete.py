@@ -43,8 +43,10 @@ class Completion:
 
 
 def complete(workspace: Workspace, text: str) -> list[Completion]:
-    head, word = _last_word(text)
+    begun = re.search(r"\S*$", text)
+    word = begun.group() if begun else ""
     start = len(text) - len(word)
+    head = text[:start]
     if not head.strip() and word.startswith("/"):
         found: Found = verbs(workspace)
     elif head.lstrip().startswith("/"):
@@ -90,12 +92,6 @@ def hint(workspace: Workspace, text: str) -> str:
         return ""
     language, product = spoken(workspace, parsed)
     return language.hint(parsed.text, product)
-
-
-def _last_word(text: str) -> tuple[str, str]:
-    found = re.search(r"\S*$", text)
-    word = found.group() if found else ""
-    return text[: len(text) - len(word)], word
 
 
 def names_of(workspace: Workspace, text: str) -> Drive | None:

@@ -39,7 +39,7 @@ from multidrop.shell.automation import outcome, settled, stop_key_trial
 from multidrop.shell.channel import Front
 from multidrop.shell.console import swallows
 from multidrop.shell.events import FAILURES, Progressed, SessionEvent, StateChanged
-from multidrop.shell.exit_codes import INTERRUPTED, exit_code
+from multidrop.shell.exit_codes import INTERRUPTED
 from multidrop.shell.log.writer import begin as begin_log
 from multidrop.shell.prompt.collector import at_rest, collected_at_rest
 from multidrop.shell.prompt.keyboard import Keyboard, on_signals, terminal
@@ -50,7 +50,7 @@ from multidrop.shell.prompt.view import LinesAbove, Pager, PlainOutput, SessionC
 from multidrop.shell.session import Session
 from multidrop.shell.signals import early_ends
 from multidrop.shell.streams.event_printer import Printer
-from multidrop.shell.streams.stdout import finish, nonblocking, report, write
+from multidrop.shell.streams.stdout import fail, finish, nonblocking, write
 
 STYLE = Style.from_dict(
     {"prompt": "ansicyan", "question": "ansiyellow", "stop": "ansired", "auto-suggestion": "ansibrightblack"}
@@ -78,8 +78,7 @@ def run(
     try:
         found = configuration.load(lenient=True)
     except FAILURES as failure:
-        write(sys.stderr, report(failure))
-        return exit_code(failure)
+        return fail(failure)
     write(sys.stderr, *map(str, found.problems))
     try:
         with early_ends():  # before the log has its thread
@@ -167,8 +166,7 @@ class Prompt:
             with LinesAbove(self._prompt.app).shown():
                 await self._read(urls)
         except FAILURES as failure:
-            write(sys.stderr, report(failure))
-            return exit_code(failure)
+            return fail(failure)
         return INTERRUPTED if self._interrupted else 0
 
     async def _work(self, urls: Sequence[str]) -> None:

@@ -197,12 +197,19 @@ class Connection:
                     ended()
 
         client = Careful(paho.CallbackAPIVersion.VERSION2, client_id=self._name, reconnect_on_failure=False)
-        _log_in(client, self._target, self._settings)
+        user, secret = self._target.user or self._settings.username, self._settings.secret()
+        if secret and not user:
+            raise Diagnostic("mqtt.password needs mqtt.username", hint="or --to mqtt://USER@BROKER/PREFIX")
+        if max(len(user.encode()), len(secret.encode())) > LONGEST:
+            raise Diagnostic(f"the login is too long; MQTT has room for {LONGEST} bytes")
+        if user:
+            client.username_pw_set(user, secret or None)
+        client.tls_set_context(_context(self._settings) if self._target.encrypted else _Plain())
         if self._will is not None:
             client.will_set(self._will.topic, self._will.text, 1, retain=True)
         if self._take is not None:
             client.on_message = lambda _client, _data, message: self._taken(message)
-            client.on_subscribe = lambda _client, _data, _number, reasons, _: self._call(self._subscribed, reasons)
+            client.on_subscribe = lambda _client, _data, _number, reasons, _: self._subscribed(reasons)
         client.on_socket_open = lambda _client, _data, opened: opened.guard(self._refuse)
         client.max_inflight_messages_set(WINDOW)
         client.on_connect = lambda client, _data, _flags, reason, _properties: self._connected(client, reason)
@@ -222,28 +229,24 @@ class Connection:
 
     def _connected(self, client: Client, reason: Any) -> None:
         """Read on, in paho's thread."""
-        if self._take is not None and not reason.is_failure:
-            client.subscribe(f"{self._target.prefix}/#")
-        else:
-            self._call(self._answered, reason)
-
-    def _answered(self, reason: Any) -> None:
-        if self._accepted.done():
-            return
         if reason.is_failure:
             hint = "see username and password under [mqtt]"
-            self._accepted.set_exception(
-                Unreachable(f"the broker at {self._where} refuses the login: {reason}; {hint}")
-            )
+            self._call(self._settle, f"the broker at {self._where} refuses the login: {reason}; {hint}")
+        elif self._take is not None:
+            client.subscribe(f"{self._target.prefix}/#")
         else:
-            self._accepted.set_result(None)
+            self._call(self._settle, "")
 
     def _subscribed(self, reasons: Sequence[Any]) -> None:
+        refused = f"the broker at {self._where} does not let us read; its access list has to allow it"
+        self._call(self._settle, refused if any(each.is_failure for each in reasons) else "")
+
+    def _settle(self, refusal: str) -> None:
+        """End the wait of `connect`; `refusal`: why it fails, empty where it does not."""
         if self._accepted.done():
             return
-        if any(each.is_failure for each in reasons):
-            hint = "its access list has to allow it"
-            self._accepted.set_exception(Unreachable(f"the broker at {self._where} does not let us read; {hint}"))
+        if refusal:
+            self._accepted.set_exception(Unreachable(refusal))
         else:
             self._accepted.set_result(None)
 
@@ -259,12 +262,9 @@ class Connection:
 
     def _ended(self) -> None:
         self.lost.set()
-        if self.refused and not self._accepted.done():
-            self._accepted.set_exception(Unreachable(self.refused))
-        if not self._accepted.done():
-            wants = "it may want cert and key under [mqtt]"
-            hint = wants if self._target.encrypted else "mqtts:// is the encrypted form of mqtt://"
-            self._accepted.set_exception(Unreachable(f"{self._where} hung up before the login; {hint}"))
+        wants = "it may want cert and key under [mqtt]"
+        hint = wants if self._target.encrypted else "mqtts:// is the encrypted form of mqtt://"
+        self._settle(self.refused or f"{self._where} hung up before the login; {hint}")
 
     def _acknowledged(self) -> None:
         """Note an acknowledgement, in paho's thread; wake the loop only where it waits for room."""
@@ -317,17 +317,6 @@ def _reason(where: str, error: OSError | UnicodeError) -> str:
 def _leave(client: Client) -> None:
     client.disconnect()
     client.loop_stop()
-
-
-def _log_in(client: Client, target: Target, settings: MqttSettings) -> None:
-    user, secret = target.user or settings.username, settings.secret()
-    if secret and not user:
-        raise Diagnostic("mqtt.password needs mqtt.username", hint="or --to mqtt://USER@BROKER/PREFIX")
-    if max(len(user.encode()), len(secret.encode())) > LONGEST:
-        raise Diagnostic(f"the login is too long; MQTT has room for {LONGEST} bytes")
-    if user:
-        client.username_pw_set(user, secret or None)
-    client.tls_set_context(_context(settings) if target.encrypted else _Plain())  # type: ignore[arg-type]
 
 
 class _Guarded:

@@ -21,7 +21,7 @@ from multidrop.shell.publishing.publisher import Publisher
 from multidrop.shell.publishing.registry import LOST, ONLINE, Outlet, Registry, parse_rate
 from multidrop.shell.secrets import url_without_secrets
 from multidrop.shell.session import Session
-from multidrop.shell.streams.stdout import report, write
+from multidrop.shell.streams.stdout import write
 from multidrop.shell.workspace import Workspace
 from multidrop.transports import TransportLost
 from multidrop.transports.sockets import exposed
@@ -38,20 +38,15 @@ def run(
     """Publish until a signal, which ends it well; return the exit code.
 
     `home_assistant`: describe the values for its discovery. `reconnect`: a lost line is tried again.
+    Raises Diagnostic for wrong targets, and where a library is missing.
     """
-    try:
-        targets, period = [*map(_parse, to)], parse_rate(rate)
-        if len({*targets}) < len(targets):
-            raise Diagnostic("given twice", "--to", "name each target once")
-        if home_assistant and not any(isinstance(each, Target) for each in targets):
-            raise Diagnostic(
-                "goes through a broker, and none is named", "--home-assistant", "--to mqtt://BROKER/PREFIX"
-            )
-        for each in targets:
-            (SERVERS[each.scheme] if isinstance(each, Listening) else broker).load()
-    except Diagnostic as problem:
-        write(sys.stderr, report(problem))
-        return 2
+    targets, period = [*map(_parse, to)], parse_rate(rate)
+    if len({*targets}) < len(targets):
+        raise Diagnostic("given twice", "--to", "name each target once")
+    if home_assistant and not any(isinstance(each, Target) for each in targets):
+        raise Diagnostic("goes through a broker, and none is named", "--home-assistant", "--to mqtt://BROKER/PREFIX")
+    for each in targets:
+        (SERVERS[each.scheme] if isinstance(each, Listening) else broker).load()
 
     async def body(session: Session) -> None:
         registry = Registry(session, period)

@@ -24,7 +24,7 @@ from multidrop.shell.events import Entered, Failed, Notified, OnBus, Printed, Se
 from multidrop.shell.log.files import Entry, line_of
 from multidrop.shell.publishing.broker import Message
 from multidrop.shell.publishing.publisher import Publisher
-from multidrop.shell.publishing.registry import BYE, ONLINE, Fields, Key, Registry, Value
+from multidrop.shell.publishing.registry import BYE, ONLINE, Fields, Key, Outlet, Registry, Value
 from multidrop.shell.streams.stdout import shortened
 
 RESERVED = "+#/%"
@@ -202,7 +202,7 @@ HEARTBEAT = 30.0
 """Seconds between two messages of each state: a broker may publish the will of an earlier process late."""
 
 
-class Feed:
+class Feed(Outlet):
     """Makes messages for a publisher of the values of a registry and the lines of a session's transcript."""
 
     def __init__(
@@ -219,9 +219,6 @@ class Feed:
         self._limits: defaultdict[str, LineLimit] = defaultdict(LineLimit)
         self._leave: Callable[[], None] = lambda: None
         self._task: asyncio.Task[None] | None = None
-
-    async def listen(self) -> None:
-        """Take nothing: the broker has the port."""
 
     async def begin(self) -> None:
         await self._publisher.begin()

@@ -17,7 +17,7 @@ from multidrop.dialects import Diagnostic
 from multidrop.dialects.on_demand import imported, importing
 from multidrop.shell.publishing.feed import escape
 from multidrop.shell.publishing.listening import Listening
-from multidrop.shell.publishing.registry import Key, Registry, Value
+from multidrop.shell.publishing.registry import Key, Outlet, Registry, Value
 from multidrop.transports import Unreachable
 from multidrop.transports.sockets import explain
 
@@ -38,28 +38,9 @@ VARIABLES = {
     "error": (("Error", "value", "Int64"), ("ErrorText", "text", "String")),
 }
 """The variables of each value: name, field, and type."""
-SERVICES = (
-    "CreateSession",
-    "ActivateSession",
-    "CloseSession",
-    "CloseSecureChannel",
-    "GetEndpoints",
-    "FindServers",
-    "Read",
-    "Write",
-    "Browse",
-    "TranslateBrowsePathsToNodeIds",
-    "CreateSubscription",
-    "ModifySubscription",
-    "DeleteSubscriptions",
-    "CreateMonitoredItems",
-    "ModifyMonitoredItems",
-    "DeleteMonitoredItems",
-    "SetMonitoringMode",
-    "SetPublishingMode",
-    "Publish",
-    "Republish",
-)
+SERVICES = """CreateSession ActivateSession CloseSession CloseSecureChannel GetEndpoints FindServers Read Write Browse
+TranslateBrowsePathsToNodeIds CreateSubscription ModifySubscription DeleteSubscriptions CreateMonitoredItems
+ModifyMonitoredItems DeleteMonitoredItems SetMonitoringMode SetPublishingMode Publish Republish"""
 """The services for clients; a write is answered by each node, and none of them can be written."""
 
 
@@ -67,7 +48,7 @@ def _now() -> datetime:
     return datetime.now(UTC)
 
 
-class UaServer:
+class UaServer(Outlet):
     """The server."""
 
     def __init__(self, registry: Registry, place: Listening) -> None:
@@ -107,7 +88,9 @@ class UaServer:
         from asyncua import Server, ua
         from asyncua.crypto.permission_rules import PermissionRuleset
 
-        allowed = {ua.NodeId(getattr(ua.ObjectIds, f"{each}Request_Encoding_DefaultBinary")) for each in SERVICES}
+        allowed = {
+            ua.NodeId(getattr(ua.ObjectIds, f"{each}Request_Encoding_DefaultBinary")) for each in SERVICES.split()
+        }
 
         class Reading(PermissionRuleset):  # type: ignore[misc]
             """The services for clients, whoever they say they are."""
@@ -136,9 +119,6 @@ class UaServer:
             self._server = None
             raise Unreachable(f"--to {self.text}: cannot listen there: {explain(error)}; give another one") from None
         self._task = asyncio.get_running_loop().create_task(self._write_changes())
-
-    async def begin(self) -> None:
-        """Do nothing more: it answers already."""
 
     def line(self, bus: str, word: str) -> None:
         self._note(Key(bus, "", "line"))
@@ -174,15 +154,13 @@ class UaServer:
                     word = self._registry.words[key.bus]
                     await self._write((escape(key.bus), "State"), "String", word, _now(), True)
                 else:
-                    await self._write_value(key, self._registry.values[key])
+                    value = self._registry.values[key]
+                    path = (escape(key.bus), escape(key.address), *((escape(key.axis),) if key.axis else ()))
+                    current = key.what in ("state", "error") or self._registry.current(key)
+                    for name, field, kind in VARIABLES[key.what]:
+                        if field in value.fields:
+                            await self._write((*path, name), kind, value.fields[field], value.time, current)
                 await asyncio.sleep(0)  # the library does not leave the loop to others
-
-    async def _write_value(self, key: Key, value: Value) -> None:
-        path = (escape(key.bus), escape(key.address), *((escape(key.axis),) if key.axis else ()))
-        current = key.what in ("state", "error") or self._registry.current(key)
-        for name, field, kind in VARIABLES[key.what]:
-            if field in value.fields:
-                await self._write((*path, name), kind, value.fields[field], value.time, current)
 
     async def _write(self, path: tuple[str, ...], kind: str, value: object, time: Any, current: bool) -> None:
         """Write a variable, which is made with its first value."""

@@ -10,7 +10,7 @@ from multidrop.dialects import Diagnostic
 from multidrop.dialects.on_demand import importing
 from multidrop.shell.publishing.feed import escape
 from multidrop.shell.publishing.listening import Listening
-from multidrop.shell.publishing.registry import ONLINE, STATES, Key, Registry, Value
+from multidrop.shell.publishing.registry import ONLINE, STATES, Outlet, Registry
 
 if TYPE_CHECKING:
     from prometheus_client.core import GaugeMetricFamily
@@ -32,7 +32,7 @@ GAUGES = {
 }
 
 
-class Endpoint:
+class Endpoint(Outlet):
     """The server. Its answers are made in the event loop, of what the registry has."""
 
     def __init__(self, registry: Registry, place: Listening) -> None:
@@ -60,15 +60,6 @@ class Endpoint:
         self._place, listener = await self._place.taken(self._registry.warn)
         self.text = self._place.text
         self._server = await asyncio.start_server(self._serve, sock=listener, limit=LONGEST)
-
-    async def begin(self) -> None:
-        """Do nothing more: it answers already."""
-
-    def line(self, bus: str, word: str) -> None:
-        """Do nothing: the registry is read when it is asked for."""
-
-    def value(self, key: Key, value: Value) -> None:
-        """Do nothing: the registry is read when it is asked for."""
 
     async def end(self) -> str:
         if self._server is not None:

@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from datetime import datetime
 from functools import partial
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 from multidrop.dialects import Diagnostic
 from multidrop.dialects.units import Takes
@@ -53,8 +53,8 @@ class Value(NamedTuple):
         return self.fields["value"]
 
 
-class Outlet(Protocol):
-    """A way out of this program: a broker, or a server."""
+class Outlet:
+    """A way out of this program: a broker, or a server. One that is asked for values is told nothing."""
 
     text: str
     """The URL, as it is in use."""
@@ -73,6 +73,7 @@ class Outlet(Protocol):
 
     async def end(self) -> str:
         """End; return a summary for a person, which may be empty."""
+        return ""
 
 
 def error_of(conditions: Iterable[Conditions]) -> Fields:
@@ -82,10 +83,6 @@ def error_of(conditions: Iterable[Conditions]) -> Fields:
         return {"value": 0, "text": ""}
     text = "set; to read its number would clear it" if found.error == UNREAD else found.error_text
     return {"value": found.error, "text": text, "axis": found.axis}
-
-
-def program_of(conditions: Iterable[Conditions]) -> str:
-    return next((each.program for each in conditions if each.program), "")
 
 
 DEFAULT = "2"
@@ -149,7 +146,7 @@ class DriveValues:
         elif isinstance(event, Silent):
             self._say_state(event.at, SILENT)
         else:
-            self._program = program_of(event.conditions)
+            self._program = next((each.program for each in event.conditions if each.program), "")
             self._no_current = {each.axis: bool(each.no_current) for each in event.conditions}
             if known := self._said.get(("state", "")):
                 self._say_state(event.at, str(known["value"]) if known["value"] in (SILENT, LOST) else "")

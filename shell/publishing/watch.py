@@ -18,7 +18,7 @@ from multidrop.shell.prompt.keyboard import on_signals
 from multidrop.shell.publishing.broker import Connection, Target, fresh_name, load, parse_target
 from multidrop.shell.publishing.plant import LONGEST, TOPIC, Plant, Row
 from multidrop.shell.publishing.publisher import again, connected, over
-from multidrop.shell.streams.stdout import finish, nonblocking, report, write
+from multidrop.shell.streams.stdout import fail, finish, nonblocking, write
 from multidrop.transports import Unreachable
 
 INBOX = 5000
@@ -122,8 +122,7 @@ async def _run(url: str, as_json: bool) -> int:
                 await watch.end()
             return exit_code(Unreachable(watch.left)) if watch.left else 0
         except FAILURES as failure:
-            write(sys.stderr, report(failure))
-            return exit_code(failure)
+            return fail(failure)
         finally:
             await finish(streams, over.is_set)
 

@@ -211,20 +211,20 @@ class Execution:
             self.current = self.current if self.is_over else node.line
             if frame.playing is not None and frame.playing.progress is not None and node.line.step:
                 frame.playing.progress.begins(node.line.step, _shown(node.line.text, frame))
-            await self._node(node, frame)
-
-    async def _node(self, node: Node, frame: Frame) -> None:
-        if isinstance(node, If):
-            holds = await self._own(node.line, frame, self._condition)
-            await self.block(node.body if holds else node.otherwise, frame)
-        elif isinstance(node, Repeat):
-            await self._repeat(node, frame)
-        elif isinstance(node, CallFile):
-            await self._call(node, frame)
-        elif isinstance(node, CallMacro):
-            await self._play(node, frame)
-        else:
-            await self._step(node.line, frame)
+            if isinstance(node, If):
+                holds = await self._own(node.line, frame, self._condition)
+                await self.block(node.body if holds else node.otherwise, frame)
+            elif isinstance(node, Repeat):
+                await self._repeat(node, frame)
+            elif isinstance(node, CallFile):
+                given = await self._own(node.line, frame, self._given)
+                values = {**node.script.values, **given}
+                with _noted(node.line):
+                    await self.block(node.script.body, replace(frame, values=values, pace=None))
+            elif isinstance(node, CallMacro):
+                await self._play(node, frame)
+            else:
+                await self._step(node.line, frame)
 
     async def _repeat(self, node: Repeat, frame: Frame) -> None:
         """Execute a block a number of times, or as its condition says before each round."""
@@ -237,12 +237,6 @@ class Execution:
 
     async def _goes_on(self, line: ScriptLine, frame: Frame) -> bool:
         return await self._own(line, frame, self._condition) == (line.word == "/while")
-
-    async def _call(self, node: CallFile, frame: Frame) -> None:
-        given = await self._own(node.line, frame, self._given)
-        values = {**node.script.values, **given}
-        with _noted(node.line):
-            await self.block(node.script.body, replace(frame, values=values, pace=None))
 
     async def _play(self, node: CallMacro, frame: Frame) -> None:
         async def values(text: str, frame: Frame) -> tuple[Values, Mapping[str, str]]:
@@ -319,16 +313,13 @@ class Execution:
             if self._heard.target is not None and self._heard.target[0] and not refused_here:
                 self.addressed.setdefault(self._heard.target)
             if counts or error:
-                self._report(line, frame, reported.sent, begun, error, failed_check)
-
-    def _report(self, line: ScriptLine, frame: Frame, sent: str, begun: float, error: str, failed_check: bool) -> None:
-        bus, drive = self._heard.target or ("", "")
-        now, at = self.session.now(), self.session.wall(begun)
-        number = frame.playing.round if frame.playing is not None else 0
-        printed = self._heard.printed()
-        result = Result(line, sent, at, now - begun, printed, bus, drive, error, failed_check, number)
-        self.recent.append(result)
-        self._executed(result)
+                bus, drive = self._heard.target or ("", "")
+                now, at = self.session.now(), self.session.wall(begun)
+                number = frame.playing.round if frame.playing is not None else 0
+                printed = self._heard.printed()
+                result = Result(line, reported.sent, at, now - begun, printed, bus, drive, error, failed_check, number)
+                self.recent.append(result)
+                self._executed(result)
 
     # The verbs of scripts
 

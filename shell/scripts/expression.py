@@ -298,15 +298,12 @@ class _Parser:
             sign = self._take().text
             right = self._level(level + 1)
             if level == _COMPARISON:
-                return self._comparison(sign, tree, right)
+                if not (sign in EQUAL and self._takes(("+-",))):
+                    return Comparison(sign, tree, right)
+                self._take()
+                return Comparison(sign, tree, right, self._level(_COMPARISON + 1))
             tree = Binary(sign, tree, right)
         return tree
-
-    def _comparison(self, sign: str, left: Expression, right: Expression) -> Comparison:
-        if not (sign in EQUAL and self._takes(("+-",))):
-            return Comparison(sign, left, right)
-        self._take()
-        return Comparison(sign, left, right, self._level(_COMPARISON + 1))
 
     def _operand(self) -> Expression:
         self._depth += 1

@@ -218,22 +218,19 @@ class _Checker:
 
     def _node(self, line: ScriptLine) -> Node:
         if line.word in ("/if", *LOOPS):
-            return self._nested(line)
+            self._try(line, partial(self._steering, line))
+            self._depth += 1
+            if self._depth > DEEPEST:
+                raise WrongScript([*self.problems, Diagnostic(f"blocks are nested deeper than {DEEPEST}", line.where)])
+            node = self._if(line) if line.word == "/if" else self._repeat(line)
+            self._depth -= 1
+            return node
         if line.word == "/call":
             return self._try(line, lambda text: self._call(line, text)) or Step(line)
         if line.word == "/play":
             return self._try(line, lambda text: self._play(line, text)) or Step(line)
         self._try(line, partial(self._check, line))
         return Step(line)
-
-    def _nested(self, line: ScriptLine) -> Node:
-        self._try(line, partial(self._steering, line))
-        self._depth += 1
-        if self._depth > DEEPEST:
-            raise WrongScript([*self.problems, Diagnostic(f"blocks are nested deeper than {DEEPEST}", line.where)])
-        node = self._if(line) if line.word == "/if" else self._repeat(line)
-        self._depth -= 1
-        return node
 
     def _steering(self, line: ScriptLine, text: str) -> None:
         """Check the expression of a block; also the number of an `/repeat`, where that is known beforehand."""

@@ -22,7 +22,6 @@ from multidrop.shell.connect.opening import OpenedPort, open_port
 from multidrop.shell.connect.reconnect import FIRST, LONGEST, limit_of
 from multidrop.shell.connect.urls import listening, parse
 from multidrop.shell.events import FAILURES
-from multidrop.shell.exit_codes import exit_code
 from multidrop.shell.prompt.keyboard import on_signals, on_stop_key
 from multidrop.shell.sharing.stop_bytes import StopBytes, stop_bytes
 from multidrop.shell.sharing.writer_turns import (
@@ -38,7 +37,7 @@ from multidrop.shell.sharing.writer_turns import (
     Stop,
     Write,
 )
-from multidrop.shell.streams.stdout import finish, nonblocking, report, write
+from multidrop.shell.streams.stdout import fail, finish, nonblocking, write
 from multidrop.transports import PortControl, TransportLost
 from multidrop.transports.sockets import explain, exposed, host_port, set_socket_options
 from multidrop.transports.telnet import Control, Setting
@@ -332,8 +331,7 @@ async def _run(url: str, address: str, as_json: bool) -> int:
             await _share(url, address, as_json, over)
             return 0
         except FAILURES as failure:
-            write(sys.stderr, report(failure))
-            return exit_code(failure)
+            return fail(failure)
         finally:
             await finish(streams, over.is_set)
 

@@ -21,7 +21,7 @@ from shutil import get_terminal_size
 from typing import TextIO
 
 from multidrop.dialects.text import visible
-from multidrop.shell.exit_codes import INTERRUPTED, READER_GONE
+from multidrop.shell.exit_codes import INTERRUPTED, READER_GONE, exit_code
 from multidrop.shell.streams import output_streams
 from multidrop.shell.streams.output_streams import Outlet
 
@@ -71,6 +71,12 @@ def write(stream: TextIO, *lines: str, spare: bool = False, styled: bool = False
         stream.flush()
     except (OSError, ValueError) as problem:  # ValueError: the stream was closed
         lose(stream, problem)
+
+
+def fail(failure: BaseException) -> int:
+    """Print one line about a failure, or about each of its problems; return its exit code."""
+    write(sys.stderr, *map(report, getattr(failure, "problems", (failure,))))
+    return exit_code(failure)
 
 
 def flush_printed() -> None:

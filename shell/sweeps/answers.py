@@ -102,7 +102,13 @@ class Answer:
             for number, result in sorted(results.items())
         ]
         self._axes = [Axis(name, self._texts(at, plan)) for at, name in enumerate(self._names)]
-        self._pair = self._two([key.part == SEED for key in plan.job.keys])
+        # The two keys that matter most, as they are written: those whose values differ most in what passes.
+        spread = {}
+        for index, axis in enumerate(self._axes):
+            shares = [each.passed / each.cases for each in self._tallies(index, axis).values()]
+            if len(axis.at) > 1 and plan.job.keys[index].part != SEED:
+                spread[index] = max(shares) - min(shares)
+        self._pair = sorted(sorted(spread, key=lambda index: -spread[index])[:2])
 
     def _texts(self, index: int, plan: Plan) -> dict[str, str]:
         texts: Iterable[str] = dict.fromkeys(texts[index] for texts, *_ in self._cases)
@@ -115,15 +121,6 @@ class Answer:
         for texts, ok, margins in self._cases:
             found.setdefault(axis.at[texts[index]], Tally()).take(ok, margins)
         return found
-
-    def _two(self, seeds: Sequence[bool]) -> list[int]:
-        """The two keys that matter most, as they are written: those whose values differ most in what passes."""
-        spread = {}
-        for index, axis in enumerate(self._axes):
-            shares = [each.passed / each.cases for each in self._tallies(index, axis).values()]
-            if len(axis.at) > 1 and not seeds[index]:
-                spread[index] = max(shares) - min(shares)
-        return sorted(sorted(spread, key=lambda index: -spread[index])[:2])
 
     def rows(self) -> Iterator[str]:
         """A line for each value of each key: the share that passed, and the smallest margin."""

@@ -163,7 +163,12 @@ def make(asked: Asked) -> Plan:
     parsed = [(*_parsed(key, names), _values(key, text, asked)) for key, text in asked.vary]
     chosen = bare if asked.cell is None else _chosen(asked.cell, allow, {drive for drive, _, _ in parsed} - {""})
     keys = tuple(key for _, key, _ in parsed)
-    _check_keys(keys)
+    seen: dict[tuple[str, str, str], str] = {}
+    for each in keys:
+        where_it_is = (each.part, each.axis, each.name)
+        if where_it_is in seen:
+            raise Diagnostic("is varied twice", f"--vary {each.text}", f"see --vary {seen[where_it_is]}")
+        seen[where_it_is] = each.text
     for named, key, _ in parsed:
         if named and named not in _names(chosen):
             name = names[named].spec.name
@@ -212,15 +217,6 @@ def _chosen(cell: str, allow: Sequence[Path], named: set[str]) -> Placed:
     candidates = cells.matching(cell, allow)
     chosen = [each for each in candidates if named.intersection(_names(each))]
     return chosen[0] if len(candidates) > 1 and len(chosen) == 1 else cells.placed(cell, allow)
-
-
-def _check_keys(keys: Sequence[Key]) -> None:
-    seen: dict[tuple[str, str, str], str] = {}
-    for each in keys:
-        place = (each.part, each.axis, each.name)
-        if place in seen:
-            raise Diagnostic("is varied twice", f"--vary {each.text}", f"see --vary {seen[place]}")
-        seen[place] = each.text
 
 
 def _check(plan: Plan) -> None:

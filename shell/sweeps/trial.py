@@ -100,7 +100,12 @@ class Condition:
     def holds(self, outcome: Outcome) -> bool:
         """Whether the condition holds for a result. Raises Diagnostic for a calculation without a value."""
         left, right, within = self._sides(outcome)
-        return _compared(self.tree.sign, left, right, within)
+        if isinstance(left, tuple) and isinstance(right, tuple):
+            pairs = zip(left, right, strict=False)
+            equal = len(left) == len(right) and all(_alike(*pair, within) for pair in pairs)
+            return equal == (self.tree.sign == "==")
+        assert not isinstance(left, tuple) and not isinstance(right, tuple)
+        return compared(self.tree.sign, left, right, within)
 
     @property
     def has_margin(self) -> bool:
@@ -152,22 +157,18 @@ def parse_condition(text: str, example: Outcome) -> Condition:
             raise Diagnostic(f"{each.shown} is not a result", f"--expect {text}", f"valid: {', '.join(NAMES)}")
     if not any(isinstance(each, Name) and each.name in NAMES for each in found):
         raise Diagnostic("is not about a result", f"--expect {text}", f"valid: {', '.join(NAMES)}")
-    _check_lists(text, tree, example)
-    return Condition(text, tree)
-
-
-def _check_lists(text: str, tree: Comparison, example: Outcome) -> None:
-    """Refuse a list in a calculation, beside a number, or in an order. Raises Diagnostic."""
-    sides = [_is_list(each, example) for each in (tree.left, tree.right)]
-    no_lists = [tree.within, *(each for each in (tree.left, tree.right) if not _is_list(each, example))]
+    # A list is refused in a calculation, beside a number, and in an order.
+    sides = [_is_list(side, example) for side in (tree.left, tree.right)]
+    no_lists = [tree.within, *(side for side in (tree.left, tree.right) if not _is_list(side, example))]
     inner = [each for part in no_lists for each in unknowns(part) if _is_list(each, example)]
     mixed, ordered = any(sides) != all(sides), any(sides) and tree.sign not in EQUAL
     if inner or mixed or ordered:
         hint = 'as in errors == [], errors == [86], prints == ["done"]'
         raise Diagnostic("compares a list, which has == and != with a list only", f"--expect {text}", hint)
-    for each in unknowns(tree):
+    for each in found:
         if isinstance(each, Word):
             _items(each.text)
+    return Condition(text, tree)
 
 
 def _is_list(tree: Expression, example: Outcome) -> bool:
@@ -192,15 +193,6 @@ def _beside(tree: Comparison, left: Scalar, right: Scalar) -> tuple[Scalar, Scal
     if tree.right == Name(ENDED) and not isinstance(left, str):
         return left, int(right in BY_ITSELF)
     return left, right
-
-
-def _compared(sign: str, left: Side, right: Side, within: float) -> bool:
-    if isinstance(left, tuple) and isinstance(right, tuple):
-        pairs = zip(left, right, strict=False)
-        equal = len(left) == len(right) and all(_alike(*pair, within) for pair in pairs)
-        return equal == (sign == "==")
-    assert not isinstance(left, tuple) and not isinstance(right, tuple)
-    return compared(sign, left, right, within)
 
 
 def _alike(left: Scalar, right: Scalar, within: float) -> bool:
@@ -282,11 +274,6 @@ class Bench:
         """The names of what is kept of a run: margins, and the result."""
         return (*(f"{MARGIN}{each.text}" for each in self.measured), *KEPT)
 
-    def _cells(self, outcome: Outcome) -> tuple[str, ...]:
-        margins = [each.margin(outcome) for each in self.measured]
-        kept = [getattr(outcome, name) for name in KEPT]
-        return (*margins, *(json.dumps(each) if isinstance(each, tuple) else str(each) for each in kept))
-
     def loaded(self, values: Sequence[Value | None]) -> ProgramRun:
         """Load the program into a drive with these values. Raises Diagnostic."""
         table = self.drive
@@ -300,7 +287,9 @@ class Bench:
         job, cells = self.job, ("",) * len(self.columns)
         try:
             outcome = outcome_of(self.loaded(values).run(job.run, UNTIL if job.until is None else job.until))
-            cells = self._cells(outcome)
+            margins = [each.margin(outcome) for each in self.measured]
+            kept = [getattr(outcome, name) for name in KEPT]
+            cells = (*margins, *(json.dumps(each) if isinstance(each, tuple) else str(each) for each in kept))
             if job.until is None and outcome.ended == "until":
                 what = f"still running after {UNTIL:g} s; --until SECONDS sets another limit"
                 return Result(number, CUT, what, cells)

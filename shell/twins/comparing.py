@@ -88,7 +88,12 @@ def _likely(pairs: Sequence[Pair], limits: Sequence[str]) -> Iterator[str]:
     if unmoved(pairs):  # a drive that reports velocity 0 was pushed
         yield from (UNSEEN, SETTINGS) if any(each.velocity for each in pairs) else (SLIP, PUSHED, UNSEEN)
     elif _left_behind([(each.position, each.predicted) for each in pairs]):
-        yield from _obstacles(pairs, limits)
+        # The causes of a drive at rest: where it never began to move, its load comes before a stall.
+        if limits:
+            yield f"{AT_LIMIT} ({', '.join(limits)})"
+        never = len({each.position for each in pairs}) == 1
+        yield from (LOAD, STALL) if never else (STALL, LOAD)
+        yield AT_LIMIT if not limits else SETTINGS
     elif _fell_short(pairs):
         yield from (STALL, LOAD, SLIP, AT_LIMIT, SETTINGS)
     elif _slipped(pairs):
@@ -136,15 +141,6 @@ def _slipped(pairs: Sequence[Pair]) -> bool:
         if abs(after.difference - before.difference) > explained + JITTER:
             return True
     return False
-
-
-def _obstacles(pairs: Sequence[Pair], limits: Sequence[str]) -> Iterator[str]:
-    """The causes of a drive at rest: where it never began to move, its load comes before a stall."""
-    if limits:
-        yield f"{AT_LIMIT} ({', '.join(limits)})"
-    never = len({each.position for each in pairs}) == 1
-    yield from (LOAD, STALL) if never else (STALL, LOAD)
-    yield AT_LIMIT if not limits else SETTINGS
 
 
 def _lost_speed(pairs: Sequence[Pair]) -> bool:

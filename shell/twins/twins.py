@@ -76,7 +76,11 @@ class Twins:
         finally:
             if self._buses.get(bus) is twins and not twins.drives:
                 self._end(bus)
-            self._report_gaps(bus, gaps)
+            # Each gap is reported once; drives with an equal gap share a line.
+            for gap, names in gaps.items():
+                if fresh := [each for each in names if (each, gap) not in self._said]:
+                    self._said |= {(each, gap) for each in fresh}
+                    self._workspace.notify(f"twin of {', '.join(fresh)}: {gap}", bus=bus.name, outcome=True)
         for other in failures[1:]:
             self._workspace.notify(f"{bus.name}: no twin: {other}", bus=bus.name, warning=True)
         if failures:
@@ -99,13 +103,6 @@ class Twins:
     def _end(self, bus: Bus) -> None:
         if (twins := self._buses.pop(bus, None)) is not None:
             twins.close()
-
-    def _report_gaps(self, bus: Bus, gaps: dict[str, list[str]]) -> None:
-        """Report the gaps of twins, each once; drives with an equal gap share a line."""
-        for gap, names in gaps.items():
-            if fresh := [each for each in names if (each, gap) not in self._said]:
-                self._said |= {(each, gap) for each in fresh}
-                self._workspace.notify(f"twin of {', '.join(fresh)}: {gap}", bus=bus.name, outcome=True)
 
     async def _start(self, twins: BusTwins, drive: Drive) -> tuple[str, ...]:
         """Read a drive, and run a twin beside it; return the gaps of the twin."""

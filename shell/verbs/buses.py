@@ -159,9 +159,19 @@ async def raw(call: Call) -> None:
             await call.session.open(url, raw=True)
             call.session.select("", next(name for name in call.session.buses if name not in before))
         case ["baud", number]:
-            await _set_baud(call, number)
+            line, baud = _raw(call), whole(number, 1, HIGHEST_BAUD)
+            if baud is None:
+                raise call.wrong(f"no baud rate {number}")
+            await _set(line, f"the baud rate {baud}", lambda: line.control().set_baud(baud))
+            line.bus.set_baud(baud)
+            call.session.notify(f"{line.bus.name}: {baud} baud")
         case [("dtr" | "rts") as pin, word]:
-            await _set_pin(call, pin, word)
+            line = _raw(call)
+            if word not in SWITCH:
+                raise call.wrong()
+            control = line.control()
+            await _set(line, pin.upper(), lambda: (control.set_dtr if pin == "dtr" else control.set_rts)(SWITCH[word]))
+            call.session.notify(f"{line.bus.name}: {pin.upper()} {word}")
         case ["break", *length]:
             await _send_break(call, length[0] if length else str(BREAK))
         case ["end", word]:
@@ -178,24 +188,6 @@ async def raw(call: Call) -> None:
             call.session.notify(f"{line.bus.name}: bytes are shown as {word}")
         case _:
             raise call.wrong()
-
-
-async def _set_baud(call: Call, text: str) -> None:
-    line, baud = _raw(call), whole(text, 1, HIGHEST_BAUD)
-    if baud is None:
-        raise call.wrong(f"no baud rate {text}")
-    await _set(line, f"the baud rate {baud}", lambda: line.control().set_baud(baud))
-    line.bus.set_baud(baud)
-    call.session.notify(f"{line.bus.name}: {baud} baud")
-
-
-async def _set_pin(call: Call, pin: str, word: str) -> None:
-    line = _raw(call)
-    if word not in SWITCH:
-        raise call.wrong()
-    control = line.control()
-    await _set(line, pin.upper(), lambda: (control.set_dtr if pin == "dtr" else control.set_rts)(SWITCH[word]))
-    call.session.notify(f"{line.bus.name}: {pin.upper()} {word}")
 
 
 async def _send_break(call: Call, text: str) -> None:

@@ -117,22 +117,18 @@ async def record(call: Call) -> None:
     elif words[0] == "stop":
         await _keep(call, waits=len(words) == 2)
     else:
-        _begin(call, words[0], replacing=len(words) == 2)
+        name = words[0]
+        check_name(name, "/record")
+        before = workspace.macros.contents(name)
+        if before is not None and len(words) == 1:
+            hint = f"use another name; /record {name} --replace replaces it"
+            raise Diagnostic(f"macro {name} exists already", "/record", hint)
+        if before is not None:
+            workspace.macros.load(name)  # what cannot be read is never replaced
+        time = workspace.wall(workspace.now()).isoformat(" ", "seconds")
+        workspace.recorder.start(name, workspace.now(), before, time)
+        workspace.notify(f"recording {name}; /record stop ends it")
     workspace.changed()
-
-
-def _begin(call: Call, name: str, replacing: bool) -> None:
-    workspace = call.session
-    check_name(name, "/record")
-    before = workspace.macros.contents(name)
-    if before is not None and not replacing:
-        hint = f"use another name; /record {name} --replace replaces it"
-        raise Diagnostic(f"macro {name} exists already", "/record", hint)
-    if before is not None:
-        workspace.macros.load(name)  # what cannot be read is never replaced
-    time = workspace.wall(workspace.now()).isoformat(" ", "seconds")
-    workspace.recorder.start(name, workspace.now(), before, time)
-    workspace.notify(f"recording {name}; /record stop ends it")
 
 
 async def _keep(call: Call, waits: bool) -> None:

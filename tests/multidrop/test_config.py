@@ -162,3 +162,11 @@ def test_a_command_goes_on_without_the_file_and_names_what_is_not_in_force(file,
         assert '"left"' not in shown.out and len(shown.err.splitlines()) == 1
         assert "the guards on EX" in shown.err and "the names of a" in shown.err
     assert main(["config", "show"]) == 2
+
+
+@pytest.mark.parametrize("given", [["share", "sim:#press", "--rfc2217", "0"], ["plant", "mqtt://127.0.0.1/plant"]])
+def test_a_command_that_serves_names_each_error_of_the_file_and_the_way_on(given, file, capsys):
+    file.write_text("[log]\nfiles = 0\n[screen]\nsigns = 5\n")
+    assert main([*given, "--json"]) == 2
+    said = capsys.readouterr().err
+    assert f"{file}:2: log.files" in said and f"{file}:4: screen.signs" in said and "--no-config" in said

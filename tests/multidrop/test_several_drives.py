@@ -55,6 +55,13 @@ def test_commands_that_read_take_several_drives(run, tmp_path):
     assert done.returncode == 2 and "is not a folder" in done.stderr and done.stderr.count("\n") == 1
 
 
+def test_a_folder_that_cannot_be_made_is_said_for_each_drive(run):
+    for given in (("params", "backup", URL), ("program", "upload", "sim:#press")):
+        done = run(*given, "f.mxt/kept", "--drive", "all")
+        assert done.returncode == 2 and "Traceback" not in done.stderr
+        assert "the folder cannot be made" in done.stderr and "drives failed" in done.stderr
+
+
 def test_a_restore_to_several_drives_takes_files_that_name_their_own_drive(run, tmp_path):
     run("params", "backup", URL, "kept", "--drive", "all")
     text = (tmp_path / "kept" / "a.toml").read_text().replace("VM = 768000", "VM = 700000")

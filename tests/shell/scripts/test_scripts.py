@@ -203,7 +203,7 @@ def test_a_report_replaces_nothing_but_a_report(name, tmp_path):
     report = Report("s.txt", junit=str(tmp_path / name))
     with pytest.raises(Diagnostic, match="is no") as caught:
         report.begin()
-    report.wrong((caught.value,))  # the end of the command does not write there, either
+    report.refused(caught.value)  # the end of the command does not write there, either
     assert (tmp_path / "script.txt").read_text() == "MR 100"
 
 
