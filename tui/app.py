@@ -435,5 +435,5 @@ class MultidropApp(App[int]):
 
 def bindings() -> list[BindingType]:
     """The keys of all screens that can be set, those of the app first; no page has one of its own."""
-    screens: list[type[Framed]] = [MainScreen, Page]
+    screens: list[type[Framed]] = [Framed, MainScreen, Page]
     return [*MultidropApp.BINDINGS, *(each for screen in screens for each in screen.BINDINGS)]

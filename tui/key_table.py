@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from typing import NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 from textual.binding import Binding, BindingType
 
@@ -136,6 +136,18 @@ def bound(name: str) -> list[BindingType]:
                 about = key.about.replace("{}", function.rpartition("-")[2])
                 made.append(Binding(spelled, action, about, show=False, priority=first, id=function or None))
     return made
+
+
+class Keyed:
+    """A screen or a part of one, whose keys are those of its sheet, before any that it adds."""
+
+    SHEET: ClassVar[str]
+    BINDINGS: ClassVar[list[BindingType]]
+
+    def __init_subclass__(cls, **named: Any) -> None:
+        if "SHEET" in cls.__dict__:
+            cls.BINDINGS = [*bound(cls.SHEET), *cls.__dict__.get("BINDINGS", ())]
+        super().__init_subclass__(**named)
 
 
 def all_groups(name: str) -> dict[str, list[Key]]:

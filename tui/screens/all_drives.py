@@ -5,13 +5,11 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Awaitable, Sequence
 from dataclasses import replace
-from typing import ClassVar, NamedTuple
+from typing import NamedTuple
 
-from textual.binding import BindingType
 
 from multidrop.dialects.text import visible
 from multidrop.shell.roles import Series
-from multidrop.tui.key_table import bound
 from multidrop.tui.panels.drive import SIGN, alarm_words, program_words, trouble_of
 from multidrop.tui.panels.drives import STATE, short_words, spark
 from multidrop.tui.panels.facts import selected_rows
@@ -145,7 +143,6 @@ class AllDrives(ListPage):
     """All drives. Enter selects one; what is typed filters."""
 
     SHEET = "drives"
-    BINDINGS: ClassVar[list[BindingType]] = bound("drives")
     WANTS = frozenset({"motion", "conditions"})
     PARTS = {"heading": None, "filter": None, "columns": None, "drives": "1fr", "chosen": 0}
     FIELD, LIST = "filter", "drives"

@@ -20,7 +20,6 @@ from textual.binding import Binding, BindingType
 
 from multidrop.dialects.text import counted
 from multidrop.dialects.values import BY, DISABLE, ENABLE, HIGH, HOME_MINUS, HOME_PLUS, LOW, STOP, TO, Control, Controls
-from multidrop.tui.key_table import bound
 from multidrop.tui.panels.drive import drive_rows, unit_of
 from multidrop.tui.panels.view import Glance, View, name_of
 from multidrop.tui.readout import READ, Readout, State
@@ -104,11 +103,9 @@ LINE = 22
 class ControlsPage(AskingPage):
     """Controls of the selected drive."""
 
-    AUTO_FOCUS = ""
     SHEET = "controls"
     BINDINGS: ClassVar[list[BindingType]] = [
-        *bound("controls"),
-        *(Binding(each, "drop", show=False) for each in ascii_letters + digits if each not in "lmbhed"),
+        Binding(each, "drop", show=False) for each in ascii_letters + digits if each not in "lmbhed"
     ]
     WANTS = frozenset({"motion", "conditions"})
     PARTS = {"heading": None, "drive": "auto", "controls": "1fr", "number": None, "said": None}

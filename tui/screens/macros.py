@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Sequence
-from typing import ClassVar, NamedTuple
+from typing import NamedTuple
 
-from textual.binding import BindingType
 
 from multidrop.dialects import Diagnostic
 from multidrop.macros import Macro, MacroStore
 from multidrop.shell.playing import Playing
-from multidrop.tui.key_table import bound
 from multidrop.tui.panels.view import View
 from multidrop.tui.screens.dialogs import Ask, Confirm
 from multidrop.tui.screens.page import Host, ListPage
@@ -106,7 +104,6 @@ class MacrosPage(ListPage):
     """The macros. Enter plays the chosen one that is shown, or the one whose whole name was typed."""
 
     SHEET = "macros"
-    BINDINGS: ClassVar[list[BindingType]] = bound("macros")
     FIELD, LIST = "filter", "macros"
     WANTS = frozenset({"motion"})
     PARTS = {"heading": None, "filter": None, "macros": "1fr", "steps": None, "news": NEWS + 1}

@@ -13,7 +13,7 @@ from textual.containers import Horizontal, Vertical
 from textual.geometry import Size
 
 from multidrop.shell.roles import Filter
-from multidrop.tui.key_table import NONE, bound
+from multidrop.tui.key_table import NONE
 from multidrop.tui.panels.table import CONDITIONS, LAYOUTS, MOTION, PANELS, Place, Shown, fitting, side_width
 from multidrop.tui.screen_model import Record
 from multidrop.tui.screens.page import Framed
@@ -100,14 +100,10 @@ class MainScreen(Framed):
     PLAYS = True
     SHEET = "main"
     BINDINGS: ClassVar[list[BindingType]] = [
-        *bound("screen"),
-        *bound("main"),
-        *(
-            Binding(
-                f"{NONE}panel-{each.name}", f"act.panel('{each.name}')", f"panel: {each.about}", id=f"panel-{each.name}"
-            )
-            for each in PANELS
-        ),
+        Binding(
+            f"{NONE}panel-{each.name}", f"act.panel('{each.name}')", f"panel: {each.about}", id=f"panel-{each.name}"
+        )
+        for each in PANELS
     ]
 
     def __init__(

@@ -11,7 +11,6 @@ from dataclasses import dataclass
 from typing import ClassVar, NamedTuple
 
 from textual.app import ComposeResult
-from textual.binding import BindingType
 from textual.containers import Vertical
 from textual.screen import Screen
 
@@ -20,7 +19,7 @@ from multidrop.dialects.on_demand import imported
 from multidrop.shell.line_syntax import Place
 from multidrop.shell.session import Session
 from multidrop.tui.frame_scheduler import Frames
-from multidrop.tui.key_table import bound
+from multidrop.tui.key_table import Keyed
 from multidrop.tui.keymap import FunctionKeys
 from multidrop.tui.outbox import Outbox
 from multidrop.tui.panels.view import View
@@ -34,13 +33,12 @@ from multidrop.tui.widgets.bars import Banner, Footer, TopLine
 from multidrop.tui.widgets.lines import Lines, Link, Row, Span, T, in_view
 
 
-class Framed(Screen[None]):
+class Framed(Keyed, Screen[None]):
     """A screen with a top line and a footer, which the presenter paints."""
 
     PLAYS: ClassVar[bool] = False
     """True if function keys play macros on this screen."""
-    SHEET: ClassVar[str]
-    """Its keys, in `tui.key_table`."""
+    SHEET: ClassVar[str] = "screen"
 
     def __init__(self) -> None:
         super().__init__()
@@ -101,7 +99,8 @@ class Begun(NamedTuple):
 class Page(Framed):
     """The base of all pages. `content` makes the widgets, `show` paints them when something has happened."""
 
-    BINDINGS: ClassVar[list[BindingType]] = [*bound("screen"), *bound("page")]
+    AUTO_FOCUS: ClassVar[str | None] = ""
+    SHEET = "page"
     WANTS: ClassVar[frozenset[str]] = frozenset()
     """The readings that it needs while it is shown, in the words of `tui.panels.table`."""
 
@@ -197,6 +196,7 @@ class AskingPage(Page):
 class ListPage(AskingPage):
     """A page of rows to choose from: typing narrows them, arrows and the wheel choose, Enter and a click take one."""
 
+    AUTO_FOCUS = None
     LIST: ClassVar[str] = ""
     """The name of the rows among the parts."""
 

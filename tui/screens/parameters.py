@@ -9,9 +9,8 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any
 
-from textual.binding import BindingType
 
 from multidrop.dialects import Diagnostic
 from multidrop.dialects.values import (
@@ -28,7 +27,6 @@ from multidrop.dialects.values import (
 from multidrop.drives.drive import Drive
 from multidrop.shell import setting_units
 from multidrop.shell.params import file as files
-from multidrop.tui.key_table import bound
 from multidrop.tui.panels.table import column_rows, panel
 from multidrop.tui.panels.view import Glance, View, name_of
 from multidrop.tui.screens.page import Begun, Host, ListPage
@@ -242,7 +240,6 @@ class ParametersPage(ListPage):
     """All settings of the selected drive."""
 
     SHEET = "parameters"
-    BINDINGS: ClassVar[list[BindingType]] = bound("parameters")
     WANTS = frozenset({"motion"})
     PARTS = {"heading": None, "asked": None, "columns": None, "table": "1fr", "meaning": None, "said": None}
     FIELD, LIST = "asked", "table"

@@ -6,9 +6,6 @@ A person sets a trigger, reads the cursors, and saves what is visible.
 from __future__ import annotations
 
 from math import isfinite
-from typing import ClassVar
-
-from textual.binding import BindingType
 
 from multidrop.dialects import Diagnostic
 from multidrop.shell.plots.plot import write
@@ -17,7 +14,6 @@ from multidrop.shell.plots.rerun_calls import Batch, Curve
 from multidrop.shell.roles import DIFFERENCE
 from multidrop.tui.curves.chart import Look
 from multidrop.tui.curves.trigger import Setting, State
-from multidrop.tui.key_table import bound
 from multidrop.tui.panels.plot import columns_of, plot_rows, plot_title
 from multidrop.tui.panels.plotted import PLOTTED, Line, groups, role_of
 from multidrop.tui.panels.view import View
@@ -167,9 +163,7 @@ def samples_of(view: View, width: int) -> Batch:
 class PlotPage(AskingPage):
     """Plots. Keys change how a person looks at them; what is plotted changes by lines that a person could type."""
 
-    AUTO_FOCUS = ""
     SHEET = "plot"
-    BINDINGS: ClassVar[list[BindingType]] = bound("plot")
     WANTS = frozenset({"motion", "plot", "samples"})
     PARTS = {"heading": None, "charts": "1fr", "below": None, "asked": None}
     FIELD = "asked"

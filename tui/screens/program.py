@@ -12,10 +12,8 @@ import asyncio
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
-from typing import ClassVar
 
 from textual.app import ComposeResult
-from textual.binding import BindingType
 from textual.containers import Horizontal, Vertical
 
 from multidrop.dialects import Diagnostic
@@ -24,7 +22,6 @@ from multidrop.shell.programs.checking import ending_of
 from multidrop.shell.programs.edited_file import ChangedMeanwhile
 from multidrop.shell.programs.program_text import ProgramGrammar
 from multidrop.tui.editor import ConfigurationGrammar, Editor, Grammar, grammar_of
-from multidrop.tui.key_table import bound
 from multidrop.tui.panels.program import SIGNS, index_of, spot_of, state_words
 from multidrop.tui.panels.table import column_rows, panel, side_width
 from multidrop.tui.panels.view import View
@@ -66,7 +63,6 @@ class ProgramPage(Page):
 
     AUTO_FOCUS = "#editor"
     SHEET = "program"
-    BINDINGS: ClassVar[list[BindingType]] = bound("program")
     WANTS = frozenset({"motion", "conditions"})
 
     def __init__(self, host: Host) -> None:

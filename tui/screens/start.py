@@ -7,11 +7,9 @@ top narrows the list, and takes a URL. Enter opens what is highlighted.
 from __future__ import annotations
 
 from collections.abc import Awaitable, Callable, Sequence
-from typing import ClassVar
 
 from rich.text import Text
 from textual.app import App, ComposeResult
-from textual.binding import BindingType
 from textual.containers import Vertical
 from textual.widgets import Static
 from textual.widgets.option_list import Option
@@ -20,7 +18,7 @@ from multidrop.dialects.text import visible
 from multidrop.shell.events import FAILURES
 from multidrop.shell.session import Session
 from multidrop.tui.assist import EDIT, Assist, StartEntry
-from multidrop.tui.key_table import bound, hint
+from multidrop.tui.key_table import hint
 from multidrop.tui.screens.dialogs import Field, Hint, Options, Over
 from multidrop.tui.terminal.keyboard import Keyboard
 from multidrop.tui.widgets.bars import Banner
@@ -50,7 +48,6 @@ class Start(Over[None]):
     """
 
     SHEET = "start"
-    BINDINGS: ClassVar[list[BindingType]] = bound("start")
 
     def __init__(self, connect: Connect, assist: Assist, keyboard: Keyboard, *, only: bool, trouble: str = "") -> None:
         super().__init__()

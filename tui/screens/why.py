@@ -9,14 +9,10 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from operator import attrgetter
-from typing import ClassVar
-
-from textual.binding import BindingType
 
 from multidrop.dialects import Diagnostic
 from multidrop.drives.drive import Drive
 from multidrop.shell.roles import Series
-from multidrop.tui.key_table import bound
 from multidrop.tui.panels.drive import LIMITS, drive_rows
 from multidrop.tui.panels.drives import spark
 from multidrop.tui.panels.plot import plot_rows
@@ -45,9 +41,7 @@ MARKS = frozenset({">", "»", "", "x"})
 class WhyPage(AskingPage):
     """Why the selected drive is in trouble."""
 
-    AUTO_FOCUS = ""
     SHEET = "why"
-    BINDINGS: ClassVar[list[BindingType]] = bound("why")
     WANTS = frozenset({"motion", "conditions"})
     PARTS = {"heading": None, "why": "1fr", "helps": HELPS + 1}
 
