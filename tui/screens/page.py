@@ -153,6 +153,8 @@ class AskingPage(Page):
         super().__init__(host)
         self.field = Field(self.typed, edited=self.edited, id=self.FIELD or None)
         self.said: Span = ("", "dim")
+        self.asked: Begun | None = None
+        """What the line to type in is shown for."""
 
     def content(self) -> ComposeResult:
         """Make the parts with the line in its place."""
@@ -170,14 +172,16 @@ class AskingPage(Page):
     def edited(self, text: str) -> None:
         """Take each change of it."""
 
-    def ask_for(self, text: str, placeholder: str = "") -> None:
+    def ask_for(self, kind: str, text: str, placeholder: str, name: str = "") -> None:
         """Show the line to type in, with a text in it."""
+        self.asked = self.begin(kind, name)
         self.field.value, self.field.placeholder = text, placeholder
         self.field.display = True
         self.set_focus(self.field)
 
     def end_asking(self) -> None:
         """Empty and hide the line to type in."""
+        self.asked = None
         self.field.value = ""
         self.field.display = False
         self.set_focus(None)
@@ -191,6 +195,45 @@ class AskingPage(Page):
     def overtaken(self, begun: Begun) -> bool:
         """True if a stop, or another drive, came since something was begun."""
         return begun[1:3] != (self.host.session.stops, self.host.session.place)
+
+
+OVERTAKEN = "nothing was sent: a stop or another drive came in between"
+
+
+class SendingPage(AskingPage):
+    """A page that shows lines before Enter sends them."""
+
+    def __init__(self, host: Host) -> None:
+        super().__init__(host)
+        self.begun: Begun | None = None
+        """The lines that Enter would send."""
+        self.painted = False
+        """They were shown, and no key waited then that was typed before."""
+
+    def offer(self, kind: str, lines: tuple[str, ...]) -> None:
+        """Let Enter send lines, once they were shown."""
+        self.begun, self.painted = self.begin(kind, lines=lines), False
+
+    def were_painted(self) -> None:
+        """Note that the lines that Enter would send are shown now."""
+        self.painted = self.begun is not None and (self.painted or self.host.keyboard.idle)
+
+    def accepted(self) -> Begun | None:
+        """Return what Enter sends; None for an Enter that was typed before the lines were seen, or came too late."""
+        begun = self.begun
+        if begun is None or not self.painted:
+            return None
+        self.begun = None
+        if self.overtaken(begun):
+            self.say(OVERTAKEN)
+            return None
+        return begun
+
+    def send(self, lines: Sequence[str]) -> None:
+        """Send lines in their order, each once the one before it is answered."""
+        for line in lines:
+            self.host.outbox.type(line)
+        self.say(f"sent: {', '.join(lines)}", "dim")
 
 
 class ListPage(AskingPage):
@@ -217,6 +260,7 @@ class ListPage(AskingPage):
 
     def end_asking(self) -> None:
         """Narrow again with what was typed for that."""
+        self.asked = None
         self.field.value, self.field.placeholder = self.words, "type to narrow"
         self.field.cursor_position = len(self.words)
         self.set_focus(self.field)

@@ -29,7 +29,7 @@ from multidrop.shell import setting_units
 from multidrop.shell.params import file as files
 from multidrop.tui.panels.table import column_rows, panel
 from multidrop.tui.panels.view import Glance, View, name_of
-from multidrop.tui.screens.page import Begun, Host, ListPage
+from multidrop.tui.screens.page import Host, ListPage, SendingPage
 from multidrop.tui.text import age, fit
 from multidrop.tui.widgets.lines import Row, Span, spread
 
@@ -236,7 +236,7 @@ ASKS = {
 }
 
 
-class ParametersPage(ListPage):
+class ParametersPage(ListPage, SendingPage):
     """All settings of the selected drive."""
 
     SHEET = "parameters"
@@ -247,10 +247,6 @@ class ParametersPage(ListPage):
     def __init__(self, host: Host) -> None:
         super().__init__(host)
         self._table = SettingsTable()
-        self._asked: Begun | None = None
-        self._pending: Begun | None = None
-        self._painted = False
-        """The pending lines were shown."""
         self._asked_for = False
         """The settings were asked for, as nobody had read them."""
         self._reading = False
@@ -276,7 +272,7 @@ class ParametersPage(ListPage):
         if place != self._place:
             self._place, self._table, self._asked_for = place, SettingsTable(), False
             self._close("")
-        begun = [each for each in (self._asked, self._pending) if each is not None]
+        begun = [each for each in (self.asked, self.begun) if each is not None]
         if any(each.stops != view.session.stops for each in begun):
             self._close("stopped; nothing was sent")
         if view.model.trouble:
@@ -303,7 +299,7 @@ class ParametersPage(ListPage):
         self.lines("columns").put([self._table.columns(width)])
         self.lines("meaning").put([((f" {fit(self._table.about(drive), width - 2)}", "dim"),)])
         self.lines("said").put([((f" {fit(self.said[0], width - 2)}", self.said[1]),)])
-        self._painted = self._pending is not None
+        self.painted = self.begun is not None
 
     def _settings(self) -> Readings | None:
         return self._glance.readout.settings if self._glance is not None else None
@@ -324,16 +320,16 @@ class ParametersPage(ListPage):
     # Keys
 
     def choose(self, at: int) -> None:
-        if self._pending is None and self._asked is None:
+        if self.begun is None and self.asked is None:
             self._table.at = at
 
     def action_step(self, by: int) -> None:
-        if self._pending is None and self._asked is None:
+        if self.begun is None and self.asked is None:
             self._table.step(by)
 
     async def action_clicked(self, at: int) -> None:
         """Choose a setting and edit it. A click sends nothing."""
-        if self._pending is None and self._asked is None:
+        if self.begun is None and self.asked is None:
             self.choose(at)
             self.action_enter()
 
@@ -370,25 +366,17 @@ class ParametersPage(ListPage):
         self.field.value = "" if self.field.value == VARIABLES else VARIABLES
 
     def action_ask(self, kind: str, name: str = "", value: str = "") -> None:
-        self._pending = None
-        self._asked = self.begin(kind, name)
-        self.ask_for(value, ASKS[kind])
+        self.begun = None
+        self.ask_for(kind, value, ASKS[kind], name)
         self.field.select_all()
         self.say(f"{name}: {ASKS[kind]}" if name else ASKS[kind], "dim")
 
     def action_enter(self) -> None:
         """Edit the chosen setting, or send what is pending."""
-        pending = self._pending
-        if pending is not None and not self._painted:
-            return  # an Enter that was typed before the lines were seen
-        self._pending = None
-        if pending is not None and self.overtaken(pending):
-            self.say("nothing was sent: a stop or another drive came in between")
-        elif pending is not None:
-            for line in pending.lines:
-                self.host.outbox.type(line)
-            self._reading = True
-            self.say(f"sent: {', '.join(pending.lines)}", "dim")
+        if self.begun is not None:
+            if (begun := self.accepted()) is not None:
+                self._reading = True
+                self.send(begun.lines)
         elif (row := self._table.chosen) is not None:
             self.action_ask(EDIT, row.reading.name, row.value.strip('[]"'))
 
@@ -401,8 +389,8 @@ class ParametersPage(ListPage):
 
     def action_leave(self) -> None:
         """Leave the field or the pending lines, then the page."""
-        if self._asked is not None or self._pending is not None:
-            self._close("nothing was sent" if self._asked is None or self._asked.kind == EDIT else "")
+        if self.asked is not None or self.begun is not None:
+            self._close("nothing was sent" if self.asked is None or self.asked.kind == EDIT else "")
             return
         super().action_leave()
 
@@ -410,13 +398,13 @@ class ParametersPage(ListPage):
 
     def edited(self, text: str) -> None:
         """Narrow while the words are typed; lines that wait for Enter are dropped."""
-        if self._asked is None and text != self._table.words:
+        if self.asked is None and text != self._table.words:
             self._table.words, self._table.at = text, 0
-            if self._pending is not None:
+            if self.begun is not None:
                 self._close("nothing was sent")
 
     def typed(self, text: str) -> None:
-        asked = self._asked
+        asked = self.asked
         if asked is None:
             self.action_enter()
             return
@@ -453,11 +441,11 @@ class ParametersPage(ListPage):
             raise Diagnostic("the settings of the drive are not read", name, "/params read reads them")
         planned: Edit = edit(drive.family.values.parameters, drive.state, present, name, parsed(text))
         self._close("")
-        self._pending, self._painted = self.begin(EDIT, lines=planned.lines), False
+        self.offer(EDIT, planned.lines)
         warning = f" - {planned.warning}" if planned.warning else ""
         self.say(f"Enter sends {', '.join(planned.lines)}{warning}   Esc: nothing")
 
     def _close(self, said: str) -> None:
-        self._asked, self._pending = None, None
+        self.begun = None
         self.end_asking()
         self.say(said, "strong" if said else "dim")

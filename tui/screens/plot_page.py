@@ -18,7 +18,7 @@ from multidrop.tui.panels.plot import columns_of, plot_rows, plot_title
 from multidrop.tui.panels.plotted import PLOTTED, Line, groups, role_of
 from multidrop.tui.panels.view import View
 from multidrop.tui.polling import plotted
-from multidrop.tui.screens.page import AskingPage, Begun, Host
+from multidrop.tui.screens.page import AskingPage, Host
 from multidrop.tui.widgets.lines import Row, Span, width_of
 
 PORT = 9876
@@ -171,7 +171,6 @@ class PlotPage(AskingPage):
     def __init__(self, host: Host) -> None:
         super().__init__(host)
         self._columns = 1
-        self._asked: Begun | None = None
 
     @property
     def _look(self) -> Look:
@@ -183,7 +182,7 @@ class PlotPage(AskingPage):
         return View(self.host.session, self.host.model, [], self.host.session.now(), True)
 
     def show(self, view: View) -> None:
-        if self._asked is not None and self.overtaken(self._asked):
+        if self.asked is not None and self.overtaken(self.asked):
             self._close("a stop or another drive came in between: it was not used")
         self._look.follow(view.model.traces, view.now)
         charts = self.lines("charts")
@@ -232,9 +231,8 @@ class PlotPage(AskingPage):
 
     # What is typed: a trigger, or the name of a file
 
-    def action_trigger(self) -> None:
-        self._asked = self.begin("trigger")
-        self.ask_for(typed_trigger(self._view), FORM)
+    def action_trigger(self, kind: str = "trigger") -> None:
+        self.ask_for(kind, typed_trigger(self._view), FORM)
         self.say(f"trigger: {FORM}; SHARE of the picture comes before the edge", "dim")
 
     def action_single(self) -> None:
@@ -242,17 +240,15 @@ class PlotPage(AskingPage):
         trigger = self._look.trigger
         if trigger.setting is not None:
             self._look.arm(trigger.setting, True, self.host.model.traces)
-            return
-        self.action_trigger()
-        self._asked = self.begin("single")
+        else:
+            self.action_trigger("single")
 
     def action_save(self) -> None:
-        self._asked = self.begin("save")
-        self.ask_for("", "FILE.csv or FILE.rrd")
+        self.ask_for("save", "", "FILE.csv or FILE.rrd")
         self.say("save what is visible: FILE.csv or FILE.rrd", "dim")
 
     def typed(self, text: str) -> None:
-        asked, view = self._asked, self._view
+        asked, view = self.asked, self._view
         if asked is None or self.overtaken(asked):
             self._close("it was not used")
             return
@@ -281,7 +277,6 @@ class PlotPage(AskingPage):
         self.host.frames.wake()
 
     def _close(self, said: str) -> None:
-        self._asked = None
         self.end_asking()
         self.say(said, "dim")
 
@@ -365,7 +360,7 @@ class PlotPage(AskingPage):
     def action_leave(self) -> None:
         """Close the line; remove the cursors and go on; then leave. A trigger stays."""
         look = self._look
-        if self._asked is not None:
+        if self.asked is not None:
             self._close("")
             return
         if look.cursor is not None or (look.paused_at is not None and not look.trigger.stands):

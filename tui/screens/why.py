@@ -19,7 +19,7 @@ from multidrop.tui.panels.plot import plot_rows
 from multidrop.tui.panels.program import listing_rows, spot_of, state_words
 from multidrop.tui.panels.view import NOT_REFERENCED, Glance, View, name_of
 from multidrop.tui.readout import Readout
-from multidrop.tui.screens.page import AskingPage, Begun, Host
+from multidrop.tui.screens.page import OVERTAKEN, SendingPage
 from multidrop.tui.screens.program_rows import news_rows, rule
 from multidrop.tui.text import at_words
 from multidrop.tui.widgets.lines import Row, spread, width_of
@@ -38,25 +38,18 @@ MARKS = frozenset({">", "»", "", "x"})
 """Marks of the lines of a drive, of their replies and of their failures."""
 
 
-class WhyPage(AskingPage):
+class WhyPage(SendingPage):
     """Why the selected drive is in trouble."""
 
     SHEET = "why"
     WANTS = frozenset({"motion", "conditions"})
     PARTS = {"heading": None, "why": "1fr", "helps": HELPS + 1}
 
-    def __init__(self, host: Host) -> None:
-        super().__init__(host)
-        self._begun: Begun | None = None
-        """The line that Enter would send."""
-        self._painted = False
-        """That line was shown, and no key waited then that was typed before."""
-
     def show(self, view: View) -> None:
         """Paint the facts, the curves beside or below them, and the keys that help."""
-        if self._begun is not None and self.overtaken(self._begun):
-            self._begun = None
-            self.say("nothing was sent: a stop or another drive came in between")
+        if self.begun is not None and self.overtaken(self.begun):
+            self.begun = None
+            self.say(OVERTAKEN)
         drive, glance, width = view.session.selected, view.chosen, self.size.width
         name = f"{view.session.selected_bus}:{name_of(glance)}" if glance is not None else "no drive: ^O chooses one"
         text, role = glance.sign(view.now) if glance is not None else ("", "dim")
@@ -68,7 +61,7 @@ class WhyPage(AskingPage):
             helps = helping(glance, drive)
             said: Row = ((f" {self.said[0]}", self.said[1]),) if self.said[0] else rule("what helps", width)
             self.lines("helps").put([said, *(((f" {key:<4}", "key"), (text, "text")) for key, text in helps)])
-        self._painted = self._begun is not None and (self._painted or self.host.keyboard.idle)
+        self.were_painted()
 
     def _rows(self, view: View, glance: Glance, drive: Drive) -> list[Row]:
         width, height = self.lines("why").size
@@ -127,29 +120,22 @@ class WhyPage(AskingPage):
         """Show the line that reads or clears the error; Enter sends it."""
         drive = self.host.session.selected
         lines = error_lines(drive, self.host.model.bus("").readout(drive.address).axes) if drive is not None else ()
-        self._begun = self.begin("error", lines=lines) if lines else None
-        self._painted = False
+        self.begun = None
+        if lines:
+            self.offer("error", lines)
         what = f"Enter sends {lines[0]}: {CLEARS}   Esc: nothing" if lines else "no error is set that a line reads"
         self.say(what)
 
     def action_go(self) -> None:
-        """Send the line that was begun."""
-        begun = self._begun
-        if begun is None or not self._painted:
-            return  # an Enter that was typed before the line was seen
-        self._begun = None
-        if self.overtaken(begun):
-            self.say("nothing was sent: a stop or another drive came in between")
-            return
-        self.host.outbox.type(begun.lines[0])
-        self.say(f"sent: {begun.lines[0]}", "dim")
+        if (begun := self.accepted()) is not None:
+            self.send(begun.lines)
 
     def action_leave(self) -> None:
         """Drop the line that waits for Enter, else leave the page."""
-        if self._begun is None:
+        if self.begun is None:
             super().action_leave()
             return
-        self._begun = None
+        self.begun = None
         self.say("nothing was sent")
 
 
