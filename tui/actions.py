@@ -14,7 +14,7 @@ from textual.widgets import Input, TextArea
 
 from multidrop.tui.assist import Assist
 from multidrop.tui.keymap import Keymap
-from multidrop.tui.palette import PADDING, PALETTE, Command, Recent, Switches, all_commands, commands_like, entries
+from multidrop.tui.palette import LATELY, PADDING, PALETTE, Command, all_commands, commands_like, entries, ordered
 from multidrop.tui.palette import found as help_on
 from multidrop.tui.panels.view import glances_of
 from multidrop.tui.polling import Polling
@@ -46,7 +46,8 @@ class Parts(Host):
     opener: Opener
     tour: Tour
     signs: SignFilter
-    recent: Recent = field(default_factory=Recent)
+    recent: list[str] = field(default_factory=list)
+    """The actions of the commands used lately, the last one first."""
     mouse_on: bool = True
 
 
@@ -241,18 +242,13 @@ class Actions:
         """Search the lines typed before; the one that is taken goes into the line and is not sent."""
         await self._parts.questions.history(self._parts.assist.history(), self.action_begin_line)
 
-    @property
-    def _page(self) -> str:
-        """The sheet of the page in front; empty on the main screen."""
-        front = self._parts.app.screen
-        return front.SHEET if isinstance(front, Page) else ""
-
     def commands(self) -> list[Command]:
         parts = self._parts
-        switches = Switches(parts.polling.on, parts.mouse_on, parts.model.bus("").twinned)
-        return parts.recent.first(
-            list(all_commands(parts.session, parts.macros, parts.assist.verbs(), parts.keymap, switches, self._page))
-        )
+        front = parts.app.screen
+        sheet = front.SHEET if isinstance(front, Page) else ""
+        switches = {"polling": parts.polling.on, "mouse": parts.mouse_on, "twin": parts.model.bus("").twinned}
+        found = all_commands(parts.session, parts.macros, parts.assist.verbs(), parts.keymap, switches, sheet)
+        return ordered(list(found), parts.recent)
 
     async def action_palette(self) -> None:
         """Search everything by name."""
@@ -262,7 +258,8 @@ class Actions:
         found, page = self.commands(), parts.app.screen
 
         async def run(number: int) -> None:
-            parts.recent.used(found[number])
+            action = found[number].action
+            parts.recent = [action, *(each for each in parts.recent if each != action)][:LATELY]
             await parts.app.run_action(found[number].action, page if found[number].here else parts.main)
 
         width = min(PALETTE, parts.app.size.width) - PADDING
