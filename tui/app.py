@@ -114,7 +114,7 @@ class MultidropApp(App[int]):
             session, self.model, self.main, self.presenter.label, self.keyboard.turn_deaf, self.show_line
         )
         self.unsent = Unsent(self.main, self.model, session.now, self.assist.keep, self._warn)
-        self.questions = Questions(self, session, self.main, self.keyboard)
+        self.questions = Questions(self, session, self.main, self.keyboard, lambda: self._check_size(self.size))
         self.tour = Tour(session, self.keymap, lambda: getattr(self.screen, "heading", type(self.screen).__name__))
         self.opener = Opener(self, session, self.assist, self.keyboard, self.show_line, self.tour.begin)
         self.typist = Typist(
@@ -162,7 +162,7 @@ class MultidropApp(App[int]):
         )
         self.act = Actions(parts)
         self._action_targets |= {"act"}
-        Hooks(parts, self.act, self.presenter, lambda: self._check_size(self.size))
+        Hooks(parts, self.act, self.presenter)
 
     def get_default_screen(self) -> Screen[Any]:
         return self.main
@@ -428,9 +428,7 @@ class MultidropApp(App[int]):
 
     async def action_quit(self) -> None:
         unsaved = [text.name for text in self.texts.unsaved()]
-        await self.questions.quit(
-            lambda: self.outbox.waiting, self.stop_all, lambda: self._check_size(self.size), unsaved
-        )
+        await self.questions.quit(lambda: self.outbox.waiting, self.stop_all, unsaved)
 
 
 def bindings() -> list[BindingType]:

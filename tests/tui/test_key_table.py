@@ -154,9 +154,9 @@ async def opened(app: MultidropApp, name: str) -> None:
     elif name == "answers":
         await app.questions.paste(["MR 1", "MR 2"], lambda lines: None)
     elif name == "question":
-        app.run_worker(app.questions.go_on("Send it?", lambda: None))
+        app.run_worker(app.questions.go_on("Send it?"))
     else:
-        app.run_worker(app.questions.fill("go", [Wanted("speed", "a number", "5", lambda text: "")], lambda: None))
+        app.run_worker(app.questions.fill("go", [Wanted("speed", "a number", "5", lambda text: "")]))
 
 
 BOXES = {
