@@ -109,12 +109,12 @@ class Actions:
             Offer(Signs.BOXES.value, "boxes    no braille: Linux console, PuTTY"),
             Offer(Signs.ASCII.value, "ascii    nothing but ASCII"),
         ]
-        await self._parts.questions.open(Choose("Signs", answers), self.show_signs)
+        await self._parts.questions.open(Choose("Signs", answers), lambda name: self.show_signs(Signs(name)))
 
-    def show_signs(self, name: str) -> None:
+    def show_signs(self, signs: Signs) -> None:
         parts = self._parts
-        parts.signs.font = Signs(name)
-        parts.model.look.ink = ink_of(parts.signs.font)
+        parts.signs.font = signs
+        parts.model.look.ink = ink_of(signs)
         parts.app.refresh_css()
         parts.app.refresh(layout=True)  # an equal style sheet paints nothing
 

@@ -79,8 +79,8 @@ def all_commands(
     yield from _choices(session, macros, keys)
     switched = {name: "off" if on else "on" for name, on in switches.items()}
     for row in rows(__file__, "commands.csv"):
-        key = row["key"] if row["key"].startswith("/") else keys.shown(row["key"])
-        yield Command(row["title"].format(**switched), row["about"], row["action"], key)
+        shown = row["key"] if row["key"].startswith("/") else keys.shown(row["key"])
+        yield Command(row["title"].format(**switched), row["about"], row["action"], shown)
     for name, _, meaning in verbs:
         yield Command(name, meaning, _call("act.begin_line", f"{name} "))
 

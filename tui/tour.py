@@ -26,7 +26,7 @@ class Step(NamedTuple):
 
     words: str
     until: str
-    """`typed LINE`: a line was sent that begins so; `shown NAME`: that dialog or screen is in front; a stop; no latch."""
+    """`typed LINE`: a line was sent that begins so; `shown NAME`: that dialog or screen is in front."""
 
 
 STEPS = (

@@ -11,7 +11,6 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-
 from multidrop.dialects import Diagnostic
 from multidrop.dialects.values import (
     ORDINARY,

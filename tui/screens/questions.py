@@ -63,7 +63,8 @@ class Questions:
         """Ask before a step that needs a yes; return the answer. A cancellation closes the question."""
         try:
             box = GoOn(question, self._main.action_look, self._main.give_room)
-            return bool(await self._answer(box))
+            agreed: bool | None = await self._answer(box)
+            return bool(agreed)
         finally:
             self._main.give_room(0)
 
@@ -92,9 +93,7 @@ class Questions:
                 screen.dismiss(None)
             self._closed()
 
-    async def quit(
-        self, waiting: Callable[[], int], stop: Callable[[], None], unsaved: Sequence[str] = ()
-    ) -> None:
+    async def quit(self, waiting: Callable[[], int], stop: Callable[[], None], unsaved: Sequence[str] = ()) -> None:
         """Quit; ask first if that leaves something unfinished.
 
         `waiting` counts the lines that were not sent; `unsaved` are files with a text that was not saved.
