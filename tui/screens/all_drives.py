@@ -164,8 +164,7 @@ class AllDrives(ListPage):
         drives = sum(len(bus.drives) for bus in view.session.buses.values())
         room = self.size.height - HEAD - max(FEWEST, drives)
         room = room if width >= WIDE and room >= LEAST else 0
-        if part.styles.height is None or part.styles.height.value != room:
-            part.styles.height = room
+        part.styles.height = room
         part.put(self._chosen_rows(view, at, width, room) if room and self._places else [])
         below = self.put_rows(self._places, at, lambda place, chosen: drive_row(place, now, width, chosen), [_NOTHING])
         heading: Row = ((" ALL DRIVES   ", "strong"), (summary(self._places), "text"))

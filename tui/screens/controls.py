@@ -151,11 +151,7 @@ class ControlsPage(SendingPage):
         name = f"{bus}:{name_of(glance)}" if glance is not None else "no drive selected"
         right: Row = (("each key press is one move; ^X stops all ", "dim"),)
         self.lines("heading").put([spread([(" CONTROLS   ", "strong"), (name, "accent")], right, width)])
-        drive = self.lines("drive")
-        rows = drive_rows(view, width, max(3, self.size.height - 18))
-        if drive.styles.height is None or drive.styles.height.value != len(rows):
-            drive.styles.height = len(rows)
-        drive.put(rows)
+        self.lines("drive").put_all(drive_rows(view, width, max(3, self.size.height - 18)))
         self.lines("controls").put(self._rows(view, glance, width))
         self.lines("said").put([((" ", "text"), (fit(self.said[0], width - 2), self.said[1]))])
         self.were_painted()

@@ -295,10 +295,8 @@ class MainScreen(Framed):
     # The input line
 
     def set_label(self, row: Row) -> None:
-        label = self.lines("label")
-        if label.rows != [row]:
-            label.styles.width = width_of(row)
-            label.put([row])
+        self.lines("label").styles.width = width_of(row)
+        self.lines("label").put([row])
 
     def set_hint(self, text: str, first: str = "") -> None:
         """Show the meaning of the typed text beside it, if there is room, and `first` before it."""
@@ -310,8 +308,7 @@ class MainScreen(Framed):
         hint, entry = self.lines("hint"), self.entry
         room = self.size.width - self.lines("label").size.width - max(30, -(-(len(entry.value) + 4) // 20) * 20)
         shown = room >= 20
-        if hint.display != shown:
-            hint.display = shown
+        hint.display = shown
         if shown:
             first = fit(self._first_hint, min(len(self._first_hint), room - 2))
             rest = room - 2 - cell_len(first) - 3 * bool(first)
@@ -320,9 +317,7 @@ class MainScreen(Framed):
             hint.put([((" " * (room - cell_len(text) - 1), "text"), (text, "dim"))] if text else [])
 
     def put_status(self, rows: Sequence[Row]) -> None:
-        if len(rows) != len(self.lines("status").rows):
-            self.lines("status").styles.height = len(rows)
-        self.lines("status").put(rows)
+        self.lines("status").put_all(rows)
 
     def show_menu(self) -> None:
         below = 2 if self.wide else 2 + max(2, len(self.lines("status").rows))

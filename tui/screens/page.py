@@ -61,8 +61,7 @@ class Framed(Keyed, Screen[None]):
 
 def show_rows(part: Lines, rows: list[Row]) -> None:
     """Show a part in as many rows as it has; none hides it."""
-    if part.display != bool(rows):
-        part.display = bool(rows)
+    part.display = bool(rows)
     part.styles.height = max(1, len(rows))
     part.put(rows)
 

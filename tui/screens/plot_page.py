@@ -193,9 +193,7 @@ class PlotPage(AskingPage):
         charts.put(plot_rows(view, size.width, size.height))
         most = max(2, self.size.height // 5)
         said: list[Row] = [((f" {self.said[0]}", self.said[1]),)] if self.said[0] else []
-        below = [*cursor_rows(view, size.width, most), *said] or [self._below(view)]
-        self.lines("below").styles.height = len(below)
-        self.lines("below").put(below)
+        self.lines("below").put_all([*cursor_rows(view, size.width, most), *said] or [self._below(view)])
 
     def _below(self, view: View) -> Row:
         """The last failure, or how to see what rerun shows."""

@@ -128,10 +128,7 @@ class ProgramPage(Page):
         rows += news_rows(
             self.host.last_records(max(NEWS[0], self.size.height // NEWS[1])), lambda at: f"{clock(at):%H:%M:%S}", width
         )
-        below = self.lines("below")
-        if below.styles.height is None or below.styles.height.value != len(rows):
-            below.styles.height = len(rows)
-        below.put(rows)
+        self.lines("below").put_all(rows)
         self._show_program(view)
 
     def _show_program(self, view: View) -> None:

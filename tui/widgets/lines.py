@@ -29,21 +29,8 @@ MOST_STRIPS = 500
 """Strips that are kept."""
 SERIES = ("series1", "series2", "series3", "series4", "series5", "series6")
 """The roles of curves."""
-ROLES = (
-    "text",
-    "strong",
-    "dim",
-    "accent",
-    "focus",
-    "found",
-    "motion",
-    "error",
-    "stop",
-    "latched",
-    "key",
-    "rule",
-    *SERIES,
-)
+PLAIN_ROLES = ("text", "strong", "dim", "accent", "focus", "found", "motion", "error", "stop", "latched", "key", "rule")
+ROLES = (*PLAIN_ROLES, *SERIES)
 
 
 class Link(str):
@@ -111,6 +98,11 @@ class Lines(Widget):
         for y in range(max(len(before), len(self.rows))):
             if before[y : y + 1] != self.rows[y : y + 1]:
                 self.refresh(Region(0, y, self.size.width, 1))
+
+    def put_all(self, rows: Sequence[Row]) -> None:
+        """Show rows, in as many lines as they are."""
+        self.styles.height = len(rows)
+        self.put(rows)
 
     def notify_style_update(self) -> None:
         super().notify_style_update()

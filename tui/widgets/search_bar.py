@@ -201,8 +201,7 @@ class Reader(Horizontal):
         counts = f"{place} of {count}" if count else "nothing" if search.text else ""
         keys = next(each for each in KEYS if not each or len(each) + COUNTS + LEAST <= self.size.width)
         room = len(keys) + COUNTS
-        if self._words.styles.width is None or self._words.styles.width.value != room:
-            self._words.styles.width = room
+        self._words.styles.width = room
         return spread((), ((counts, "strong" if count or not search.text else "error"), (keys, "dim")), room)
 
 
