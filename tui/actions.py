@@ -93,7 +93,6 @@ class Actions:
             switch(self._parts.mouse_on)
 
     def action_repaint(self) -> None:
-        """Paint everything, whatever the terminal shows."""
         repaint = getattr(self._parts.app._driver, "repaint", None)
         if repaint is not None:
             repaint()
@@ -272,7 +271,6 @@ class Actions:
         return ordered(list(found), parts.recent)
 
     async def action_palette(self) -> None:
-        """Search everything by name."""
         parts = self._parts
         if isinstance(parts.app.screen, Search):
             return

@@ -169,10 +169,8 @@ def below(name: str) -> list[str]:
 def footer(name: str) -> list[Key]:
     """The keys in the footer of a sheet, in order."""
     sheet = SHEETS[name]
-    own, others = (
-        [key for key in sheet.keys if key.word and key.keys],
-        sum((SHEETS[each].keys for each in below(name)), []),
-    )
+    own = [key for key in sheet.keys if key.word and key.keys]
+    others = [key for each in below(name) for key in SHEETS[each].keys]
     found: list[Key] = []
     for word in sheet.foot:
         found += own if word == "*" else [key for key in others if key.word == word][:1]

@@ -52,9 +52,10 @@ def log_rows(view: View, width: int, height: int) -> list[Row]:
     log = view.session.log
     if log is None:
         return [((fit(text, width), "dim"),) for text in OFF]
-    rows: list[Row] = [((" ", "text"), (_end_of(visible(str(log.path)), width - 1), "dim"))]
-    last = log.last(height - 1)
-    return rows + [((fit(f" {text}", width), "text"),) for text in last]
+    path = visible(str(log.path))
+    end = path if len(path) < width else f"…{path[2 - width :]}"  # where file names differ
+    rows: list[Row] = [((" ", "text"), (end, "dim"))]
+    return rows + [((fit(f" {text}", width), "text"),) for text in log.last(height - 1)]
 
 
 def size_words(size: int) -> str:
@@ -62,11 +63,6 @@ def size_words(size: int) -> str:
     if size < 1000:
         return f"{size} B"
     return f"{size / 1000:.0f} kB" if size < 1e6 else f"{size / 1e6:.1f} MB"
-
-
-def _end_of(path: str, width: int) -> str:
-    """Shorten a path to its end, where file names differ."""
-    return path if len(path) <= width else f"…{path[1 - width :]}"
 
 
 def traffic_rows(view: View, width: int, height: int) -> list[Row]:

@@ -190,7 +190,6 @@ class AllDrives(ListPage):
             self.choose(min(max(self._at() + by, 0), len(self._places) - 1))
 
     def choose(self, at: int) -> None:
-        """Choose a row by its place."""
         if at < len(self._places):
             self._chosen = (self._places[at].bus, self._places[at].glance.address)
 

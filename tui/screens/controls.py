@@ -331,8 +331,9 @@ class ControlsPage(SendingPage):
             self.say(self._nothing() or NO_CONTROLS)
             return
         glance, axis = chosen
-        host = self.host
-        state = axis_state(glance, axis)
+        host, state = self.host, glance.state()
+        if state in READ and axis.last is not None:
+            state = axis.own_state
         to = number if name == TO or axis.last is None else axis.last.position + number
         if not LOW <= to <= HIGH:
             self.say(f"not sent: the end of the move, {to}, is out of range")
@@ -355,12 +356,6 @@ class ControlsPage(SendingPage):
         self.end_asking()
         if said:
             self.say(said)
-
-
-def axis_state(glance: Glance, axis: Readout) -> State:
-    """The state of one axis; that of the drive where it is not known to move or rest."""
-    state = glance.state()
-    return axis.own_state if state in READ and axis.last is not None else state
 
 
 def _control_row(key: str, name: str, control: Control, number: str, width: int) -> Row:

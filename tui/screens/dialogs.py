@@ -124,7 +124,6 @@ class Dialog(Over[T], Generic[T]):
     """A dialog: Escape closes it with None."""
 
     def action_leave(self) -> None:
-        """Close without an answer."""
         self.dismiss(None)
 
 
@@ -218,7 +217,6 @@ class GoOn(Dialog[bool]):
         self.dismiss(number == 1)
 
     def action_answer(self, yes: bool) -> None:
-        """Take an answer given as its letter."""
         self.dismiss(yes)
 
     def action_look(self, pages: int) -> None:

@@ -143,19 +143,14 @@ class MacrosPage(ListPage):
             [spread(heading, [below, (recording or "Enter plays ", "motion" if recording else "dim")], width)]
         )
         self._painted = self.host.keyboard.idle
-        self._show_steps(chosen, playing, width, height - room)
-        wall = view.session.wall
-        records = news_rows(self.host.last_records(NEWS), lambda at: f"{wall(at):%H:%M:%S}", width)
-        self.lines("news").put([rule("transcript", width), *records])
-
-    def _show_steps(self, chosen: Listed | None, playing: dict[str, Playing], width: int, room: int) -> None:
         rows: list[Row] = []
         if chosen is not None:
             rows.append(rule(visible(chosen.name), width))
-            rows += step_rows(chosen, playing.get(chosen.name), width, room - 1)
-        steps = self.lines("steps")
-        steps.styles.height = max(1, room)
-        steps.put(rows)
+            rows += step_rows(chosen, playing.get(chosen.name), width, height - room - 1)
+        self.lines("steps").styles.height = max(1, height - room)
+        self.lines("steps").put(rows)
+        records = news_rows(self.host.last_records(NEWS), view.session.wall, width)
+        self.lines("news").put([rule("transcript", width), *records])
 
     async def _read(self) -> None:
         try:
@@ -215,7 +210,6 @@ class MacrosPage(ListPage):
             self.host.outbox.at_once([f"/play stop {chosen.name}"])
 
     async def action_edit(self) -> None:
-        """Open the file of the chosen macro in the editor."""
         chosen = self._chosen()
         if chosen is None or not chosen.name:
             return
@@ -241,7 +235,6 @@ class MacrosPage(ListPage):
         await self.app.push_screen(Ask(f"Key of {chosen.name}", chosen.place.strip("-"), about), named)
 
     async def action_delete(self) -> None:
-        """Ask before the chosen macro is deleted."""
         chosen = self._chosen()
         if chosen is None or not chosen.name:
             return

@@ -25,13 +25,6 @@ from multidrop.tui.widgets.search_bar import Reader
 from multidrop.tui.widgets.transcript import Transcript
 
 
-class Half(Transcript):
-    """A transcript without a foot: its filter is not the person's, and `/filter` is for the other half."""
-
-    def _foot(self, width: int) -> list[Row]:
-        return []
-
-
 class Beside(Vertical):
     """A heading and a transcript that copies what another one takes in. Hidden while it shows nothing."""
 
@@ -42,7 +35,9 @@ class Beside(Vertical):
         self.bus, self.address = "", ""
         """The line that it shows, and the one drive on it; an empty address is all of the line."""
         self._heading = Lines(id="beside-head")
-        self.transcript = Half(clock)
+        self.transcript = Transcript(
+            clock, foot=False
+        )  # its filter is not the person's: `/filter` is for the other half
 
     def compose(self) -> ComposeResult:
         yield self._heading
@@ -286,7 +281,6 @@ class MainScreen(Framed):
         self.reader.find(self.transcript)
 
     def action_pause(self) -> None:
-        """Stop the scrolling, or let it go on."""
         self.transcript.pause()
 
     def action_pick(self, by: int) -> None:
@@ -315,9 +309,6 @@ class MainScreen(Framed):
             text = "   ".join(filter(None, (first, shorter(self._hint, rest) if rest > 10 else "")))
             hint.styles.width = room
             hint.put([((" " * (room - cell_len(text) - 1), "text"), (text, "dim"))] if text else [])
-
-    def put_status(self, rows: Sequence[Row]) -> None:
-        self.lines("status").put_all(rows)
 
     def show_menu(self) -> None:
         below = 2 if self.wide else 2 + max(2, len(self.lines("status").rows))

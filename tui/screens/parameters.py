@@ -340,7 +340,6 @@ class ParametersPage(ListPage, SendingPage):
             self.say(READING, "dim")
 
     def action_defaults(self) -> None:
-        """Compare with the defaults, or with nothing."""
         found = self._settings()
         table = self._table
         if table.other is not None and table.other[0] == "default":
@@ -353,7 +352,6 @@ class ParametersPage(ListPage, SendingPage):
             )
 
     def action_differing(self) -> None:
-        """Show only what differs, or everything."""
         table = self._table
         if table.other is None:
             self.say("choose first what to compare with: ^P, compare")
@@ -361,7 +359,6 @@ class ParametersPage(ListPage, SendingPage):
             table.only_differing, table.at = not table.only_differing, 0
 
     def action_variables(self) -> None:
-        """Show the variables of the program alone, or everything."""
         self.field.value = "" if self.field.value == VARIABLES else VARIABLES
 
     def action_ask(self, kind: str, name: str = "", value: str = "") -> None:
@@ -380,7 +377,6 @@ class ParametersPage(ListPage, SendingPage):
             self.action_ask(EDIT, row.reading.name, row.value.strip('[]"'))
 
     def action_save(self) -> None:
-        """Have the drive keep its settings; the verb asks first."""
         if self._glance is None:
             self.say("no drive is selected")
         else:

@@ -286,7 +286,6 @@ class PlotPage(AskingPage):
         self._look.shorter(by)
 
     def action_closer(self, by: int) -> None:
-        """Magnify the values, or show more of them."""
         self._look.closer(by)
 
     def action_automatic(self) -> None:
@@ -300,7 +299,6 @@ class PlotPage(AskingPage):
         await self.app.run_action("act.panel('plot')")
 
     def action_apart(self) -> None:
-        """Give each drive charts of its own, or put all into one."""
         self._look.apart = not self._look.apart
 
     def action_hide(self, word: str) -> None:
@@ -326,7 +324,6 @@ class PlotPage(AskingPage):
             self._type(f"/plot {' '.join(texts)}")
 
     def action_difference(self) -> None:
-        """Plot the differences of the plotted drives from their twins, or plot them no longer."""
         named = list(plotted(self.host.session))
         texts = [each.text for each in named if each.word != DIFFERENCE]
         if len(texts) == len(named):
@@ -335,7 +332,6 @@ class PlotPage(AskingPage):
             self._type(f"/plot {' '.join(texts)}")
 
     def action_stream(self) -> None:
-        """Serve what is plotted for viewers of rerun, or end all such plots."""
         if self.host.session.plots:
             self._type("/plot off")
             return

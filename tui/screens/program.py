@@ -9,6 +9,7 @@ Every line that it sends is a typed line, which a dialog shows before it is sent
 from __future__ import annotations
 
 import asyncio
+import shlex
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
@@ -41,7 +42,6 @@ from multidrop.tui.screens.program_rows import (
     news_rows,
     problem_rows,
     product_of,
-    quoted,
     refusal,
     rule,
     run_choices,
@@ -71,7 +71,7 @@ class ProgramPage(Page):
         self.text: OpenText | None = None
         self.grammar: Grammar | None = None
         self.findings = Findings()
-        self.view: View | None = None
+        self.view = View(host.session, host.model, (), host.session.now(), True)
         self._edited_at: float | None = None
         """The time of the last edit that was not taken in; None: there is none."""
         self._taking_in = False
@@ -121,19 +121,17 @@ class ProgramPage(Page):
         lines, product = self._compared
         if (self.program.lines is not lines or product_of(self.host.session) != product) and self._edited_at is None:
             self._edited_at = 0.0
-        clock = self.host.session.wall
         rows = problem_rows(self.findings.problems, self.editor.cursor_location[0] + 1, width)
         rows = [rule(self.findings.words[0].strip(), width), *rows] if rows else []
         rows.append(rule("transcript", width, self.state_words()))
-        rows += news_rows(
-            self.host.last_records(max(NEWS[0], self.size.height // NEWS[1])), lambda at: f"{clock(at):%H:%M:%S}", width
-        )
+        news = self.host.last_records(max(NEWS[0], self.size.height // NEWS[1]))
+        rows += news_rows(news, self.host.session.wall, width)
         self.lines("below").put_all(rows)
         self._show_program(view)
 
     def _show_program(self, view: View) -> None:
         """Paint the signs beside the lines, and the panels."""
-        chosen = self.view.chosen if self.view is not None else None
+        chosen = view.chosen
         spot = spot_of(chosen.readout) if chosen is not None else None
         number = index_of(self.program.lines, spot.address) if spot is not None else None
         line = None if number is None else dict(self.findings.addresses).get(self.program.lines[number][0])
@@ -147,15 +145,13 @@ class ProgramPage(Page):
 
     @property
     def program(self) -> ProgramFacts:
-        chosen = self.view.chosen if self.view is not None else None
-        return chosen.readout.program if chosen is not None else NO_FACTS
+        return self.view.chosen.readout.program if self.view.chosen is not None else NO_FACTS
 
     def state_words(self) -> str:
         """The action of the program, where no panel says it."""
-        chosen = self.view.chosen if self.view is not None else None
-        if self.view is None or chosen is None or self.lines("program-side").display:
+        if self.view.chosen is None or self.lines("program-side").display:
             return ""
-        words = state_words(chosen, self.view.now)
+        words = state_words(self.view.chosen, self.view.now)
         return f"program: {words}" if words else ""
 
     def _break_line(self, program: ProgramFacts) -> int | None:
@@ -250,7 +246,7 @@ class ProgramPage(Page):
 
         def named(file: str | None) -> None:
             if file:
-                line = with_target("/upload", quoted(file), target)
+                line = with_target("/upload", shlex.quote(file), target)
                 self.run_worker(self._then_open(self._start(line), file))
 
         await self.app.push_screen(Ask(f"New file for the program in {target or base}", name), named)

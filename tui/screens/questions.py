@@ -51,13 +51,18 @@ class Questions:
 
     async def paste(self, lines: list[str], send: Callable[[list[str]], None]) -> None:
         """Ask before several pasted lines are sent."""
-        title, shown, answers = sending(self._session, lines)
+        drive, count = self._session.selected, len(lines)
+        to = f" to {drive.label or drive.address or self._session.selected_bus}" if drive is not None else ""
+        shown = [f"  {line[:60]}" for line in lines[:PREVIEW]]
+        if count > PREVIEW:
+            shown.append(f"  … and {count - PREVIEW} more")
+        answers = [("send", f"Send {count} lines"), ("no", "Do not send")]
 
         def answered(answer: str | None) -> None:
             if answer == "send":
                 send(lines)
 
-        await self._app.push_screen(Confirm(title, shown, answers), answered)
+        await self._app.push_screen(Confirm(f"Send {count} pasted lines{to}?", shown, answers), answered)
 
     async def go_on(self, question: str) -> bool:
         """Ask before a step that needs a yes; return the answer. A cancellation closes the question."""
@@ -158,17 +163,6 @@ def leaving(
     else:
         answers.insert(1, ("leave", "Quit, drives go on"))
     return lines, answers
-
-
-def sending(session: Session, lines: Sequence[str]) -> tuple[str, list[str], Answers]:
-    """Title, preview and answers for several pasted lines."""
-    drive = session.selected
-    to = f" to {drive.label or drive.address or session.selected_bus}" if drive is not None else ""
-    shown = [f"  {line[:60]}" for line in lines[:PREVIEW]]
-    if len(lines) > PREVIEW:
-        shown.append(f"  … and {len(lines) - PREVIEW} more")
-    answers = [("send", f"Send {len(lines)} lines"), ("no", "Do not send")]
-    return f"Send {len(lines)} pasted lines{to}?", shown, answers
 
 
 def lines_like(lines: Sequence[str], typed: str) -> list[Match]:

@@ -249,7 +249,6 @@ class Start(Over[None]):
         outcome.update(text)
 
     def action_leave(self) -> None:
-        """Go to the main screen on Escape, unless nothing is open."""
         if not self.only:
             self.dismiss(None)
 

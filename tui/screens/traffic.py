@@ -81,5 +81,4 @@ class TrafficPage(Page):
         self._polls = not self._polls
 
     def action_hex(self) -> None:
-        """Show bytes in hex beside the text, or text alone."""
         self._hex = not self._hex

@@ -22,7 +22,7 @@ from multidrop.tui.readout import Readout
 from multidrop.tui.screens.page import OVERTAKEN, SendingPage
 from multidrop.tui.screens.program_rows import news_rows, rule
 from multidrop.tui.text import at_words
-from multidrop.tui.widgets.lines import Row, spread, width_of
+from multidrop.tui.widgets.lines import Row, beside, spread
 
 WIDE = 110
 """Width from which the curves are beside the facts."""
@@ -78,12 +78,8 @@ class WhyPage(SendingPage):
         if not wide:
             return [*rows[: height - LOW], *self._curves(one, glance, width, height - min(len(rows), height - LOW))]
         curves = self._curves(one, glance, width - room - 1, height)
-        rows += [()] * (len(curves) - len(rows))
         curves += [()] * (len(rows) - len(curves))
-        return [
-            (*row, (" " * (room - width_of(row)), "text"), ("│", "rule"), *curve)
-            for row, curve in zip(rows, curves, strict=True)
-        ][:height]
+        return beside(rows, [(("│", "rule"), *curve) for curve in curves], room)[:height]
 
     def _curves(self, view: View, glance: Glance, width: int, height: int) -> list[Row]:
         """The last seconds as charts, or as a row each where there is no room for a chart."""
@@ -111,13 +107,11 @@ class WhyPage(SendingPage):
             for each in self.host.last_records(LOOKED)
             if each.mark in MARKS and each.address == glance.address and not each.text.startswith("/")
         ]
-        clock = view.session.wall
-        return [rule("sent to it last", width), *news_rows(own[-most:], lambda at: f"{clock(at):%H:%M:%S}", width)]
+        return [rule("sent to it last", width), *news_rows(own[-most:], view.session.wall, width)]
 
     # Keys
 
     def action_read_error(self) -> None:
-        """Show the line that reads or clears the error; Enter sends it."""
         drive = self.host.session.selected
         lines = error_lines(drive, self.host.model.bus("").readout(drive.address).axes) if drive is not None else ()
         self.begun = None

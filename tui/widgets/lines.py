@@ -165,13 +165,11 @@ class Lines(Widget):
         rows = self.shown()
         return self.strip(rows[y] if y < len(rows) else (), self.size.width)
 
-    def _action_at(self, y: int) -> str:
-        row = self.rows[y] if y < len(self.rows) else ()
-        return next((text.action for text, _ in row if isinstance(text, Link)), "")
-
     async def on_click(self, event: events.Click) -> None:
-        if action := self._action_at(event.y):
-            await self.run_action(action)
+        row = self.rows[event.y] if event.y < len(self.rows) else ()
+        link = next((text for text, _ in row if isinstance(text, Link)), None)
+        if link is not None:
+            await self.run_action(link.action)
 
     @property
     def plain(self) -> str:
