@@ -14,6 +14,7 @@ from textual.widgets import Input, TextArea
 
 from multidrop.tui.assist import Assist
 from multidrop.tui.keymap import Keymap
+from multidrop.tui.outbox import ended
 from multidrop.tui.palette import LATELY, PADDING, PALETTE, Command, all_commands, commands_like, entries, ordered
 from multidrop.tui.palette import found as help_on
 from multidrop.tui.panels.view import glances_of
@@ -166,15 +167,9 @@ class Actions:
 
         When this returns the line has taken its first step and has its drive.
         """
-        self._parts.app.run_worker(self._end_of(self._parts.session.start(line)))
+        self._parts.app.run_worker(ended(self._parts.session.start(line)))
         await asyncio.sleep(0)
         self._parts.selection.follow()
-
-    @staticmethod
-    async def _end_of(task: asyncio.Task[bool]) -> None:
-        await asyncio.wait([task])
-        if not task.cancelled():
-            task.result()
 
     def action_begin_line(self, text: str) -> None:
         self._parts.main.entry.put(text)

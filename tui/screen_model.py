@@ -145,9 +145,7 @@ class TrafficStore:
             poll = request is not None and request.priority is Priority.POLL
             address = request.address if request is not None else ""
             self._bytes += min(len(event.data), MOST_BYTES)
-            if len(self.pieces) == MOST:
-                self._bytes -= len(self.pieces.popleft().data)
-            while self.pieces and self._bytes > MOST_BYTES:
+            while self.pieces and (len(self.pieces) == MOST or self._bytes > MOST_BYTES):
                 self._bytes -= len(self.pieces.popleft().data)
             piece = Piece(event.at, event.outgoing, event.data[-MOST_BYTES:], address, poll)
             last = self.pieces[-1] if self.pieces else None

@@ -81,11 +81,8 @@ class Hooks:
         now = session.now()
         await asyncio.to_thread(_write, path, records, session.wall(now) - timedelta(seconds=now))
         what = f", {page.sight.filter.words}" if page.sight.filter else ""
-        older = (
-            f"; {counted(page.records.dropped, 'older line was', 'older lines were')} dropped before"
-            if page.records.dropped
-            else ""
-        )
+        dropped = page.records.dropped
+        older = f"; {counted(dropped, 'older line was', 'older lines were')} dropped before" if dropped else ""
         return f"{counted(len(records), 'line')}{what}, in {path}{older}"
 
     async def _offer_unsent(self) -> None:

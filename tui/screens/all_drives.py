@@ -50,13 +50,10 @@ class Place(NamedTuple):
         where = ":".join(filter(None, (self.bus, self.glance.address)))
         return f"{where} {self.glance.label}".strip()
 
-    @property
-    def trouble(self) -> str:
-        return "; ".join(filter(None, map(trouble_of, self.glance.readout.axes)))
-
     def alarm(self, room: int = 200) -> str:
         """Its trouble, and the differences of its axes from their twins."""
-        return alarm_words(self.trouble, self.glance.readout.axes, room)
+        axes = self.glance.readout.axes
+        return alarm_words("; ".join(filter(None, map(trouble_of, axes))), axes, room)
 
     def besides(self, room: int, now: float) -> Span:
         """The fact that matters most besides its state: trouble and its twin, its program, else its product."""

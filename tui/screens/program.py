@@ -23,6 +23,7 @@ from multidrop.shell.programs.checking import ending_of
 from multidrop.shell.programs.edited_file import ChangedMeanwhile
 from multidrop.shell.programs.program_text import ProgramGrammar
 from multidrop.tui.editor import ConfigurationGrammar, Editor, Grammar, grammar_of
+from multidrop.tui.outbox import ended
 from multidrop.tui.panels.program import SIGNS, index_of, spot_of, state_words
 from multidrop.tui.panels.table import column_rows, panel, side_width
 from multidrop.tui.panels.view import View
@@ -349,7 +350,7 @@ class ProgramPage(Page):
     def _start(self, line: str) -> asyncio.Task[bool]:
         """Run a line as if it was typed; a failure is shown in the transcript."""
         task = self.host.session.start(line)
-        self.run_worker(_ended(task))
+        self.run_worker(ended(task))
         return task
 
     def _target(self) -> str:
@@ -424,10 +425,3 @@ class ProgramPage(Page):
             self.notify(
                 "No label here, and no address: the drive is not known to hold this text; ^D sends it", timeout=6
             )
-
-
-async def _ended(task: asyncio.Task[bool]) -> None:
-    """Wait for a line; a bug in it ends the app."""
-    await asyncio.wait([task])
-    if not task.cancelled():
-        task.result()

@@ -7,6 +7,7 @@ top narrows the list, and takes a URL. Enter opens what is highlighted.
 from __future__ import annotations
 
 from collections.abc import Awaitable, Callable, Sequence
+from dataclasses import dataclass
 
 from rich.text import Text
 from textual.app import App, ComposeResult
@@ -257,20 +258,17 @@ TRY = "try PR P, MR 51200 and @b PR P, each with Enter; /tour walks through ever
 """A hint for an empty demo cell."""
 
 
+@dataclass(eq=False)
 class Opener:
-    """Opens connections. `show_line` writes to the transcript, `begin_tour` begins the tour."""
+    """Opens connections."""
 
-    def __init__(
-        self,
-        app: App[int],
-        session: Session,
-        assist: Assist,
-        keyboard: Keyboard,
-        show_line: Callable[[str, str], None],
-        begin_tour: Callable[[], Awaitable[None]],
-    ) -> None:
-        self._app, self._session, self._assist, self._keyboard = app, session, assist, keyboard
-        self._show_line, self._begin_tour = show_line, begin_tour
+    _app: App[int]
+    _session: Session
+    _assist: Assist
+    _keyboard: Keyboard
+    _show_line: Callable[[str, str], None]
+    """Writes to the transcript."""
+    _begin_tour: Callable[[], Awaitable[None]]
 
     async def open_all(self, urls: Sequence[str]) -> None:
         """Open what was named at the start, side by side; ask if nothing could be opened."""

@@ -66,10 +66,8 @@ class WhyPage(SendingPage):
     def _rows(self, view: View, glance: Glance, drive: Drive) -> list[Row]:
         width, height = self.lines("why").size
         wide = width >= WIDE
-        room, one = (
-            width // 2 if wide else width,
-            replace(view, only=(Series(view.session.selected_bus, glance.address),)),
-        )
+        room = width // 2 if wide else width
+        one = replace(view, only=(Series(view.session.selected_bus, glance.address),))
         known = [*self._facts(view, glance, drive, room)]
         spare = height - len(known) - SENT - 1 - (0 if wide else LOW)
         rows = [*drive_rows(view, room, max(LEAST, spare)), *known]

@@ -43,11 +43,8 @@ class Complete(Protocol):
         """Return the completions. `learned`: a person asks for them; it is called when there are more."""
 
 
-class Typed(Protocol):
-    """Takes a submitted line. It calls `empty`, which empties the input line, once the line is on its way."""
-
-    async def __call__(self, line: str, empty: Callable[[], object], /) -> None:
-        """Send the line."""
+Typed = Callable[[str, Callable[[], object]], Awaitable[None]]
+"""Takes a submitted line, and calls the function, which empties the input line, once the line is on its way."""
 
 
 class Recall:
