@@ -136,10 +136,10 @@ class ControlsPage(SendingPage):
         if place != self._place:
             self._place, self._axis, self._jog = place, 0, Jog()
         asked = self.asked
-        if asked is not None and self.overtaken(asked):
+        if asked is not None and asked.overtaken(self.host.session):
             self._close("stopped; the number was not used" if asked.place == place else "another drive is selected")
         begun = self.begun
-        if begun is not None and self.overtaken(begun):
+        if begun is not None and begun.overtaken(self.host.session):
             self.begun = None
             self.say("stopped; nothing was sent" if begun.place == place else "another drive is selected")
         if view.model.trouble:
@@ -154,7 +154,7 @@ class ControlsPage(SendingPage):
         self.lines("drive").put_all(drive_rows(view, width, max(3, self.size.height - 18)))
         self.lines("controls").put(self._rows(view, glance, width))
         self.lines("said").put([((" ", "text"), (fit(self.said[0], width - 2), self.said[1]))])
-        self.were_painted()
+        self.painted = self.begun is not None and (self.painted or self.host.keyboard.idle)
 
     def _rows(self, view: View, glance: Glance | None, width: int) -> list[Row]:
         controls = self._controls()
@@ -305,7 +305,7 @@ class ControlsPage(SendingPage):
 
     def typed(self, text: str) -> None:
         asked = self.asked
-        if asked is None or self.overtaken(asked):
+        if asked is None or asked.overtaken(self.host.session):
             self._close("the number was not used")
             return
         name, what = NUMBERED[asked.kind]

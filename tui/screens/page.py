@@ -94,6 +94,10 @@ class Begun(NamedTuple):
     name: str = ""
     lines: tuple[str, ...] = ()
 
+    def overtaken(self, session: Session) -> bool:
+        """True if a stop, or another drive, came since."""
+        return (self.stops, self.place) != (session.stops, session.place)
+
 
 class Page(Framed):
     """The base of all pages. `content` makes the widgets, `show` paints them when something has happened."""
@@ -191,10 +195,6 @@ class AskingPage(Page):
     def begin(self, kind: str, name: str = "", lines: tuple[str, ...] = ()) -> Begun:
         return Begun(kind, self.host.session.stops, self.host.session.place, name, lines)
 
-    def overtaken(self, begun: Begun) -> bool:
-        """True if a stop, or another drive, came since something was begun."""
-        return begun[1:3] != (self.host.session.stops, self.host.session.place)
-
 
 OVERTAKEN = "nothing was sent: a stop or another drive came in between"
 
@@ -213,17 +213,13 @@ class SendingPage(AskingPage):
         """Let Enter send lines, once they were shown."""
         self.begun, self.painted = self.begin(kind, lines=lines), False
 
-    def were_painted(self) -> None:
-        """Note that the lines that Enter would send are shown now."""
-        self.painted = self.begun is not None and (self.painted or self.host.keyboard.idle)
-
     def accepted(self) -> Begun | None:
         """Return what Enter sends; None for an Enter that was typed before the lines were seen, or came too late."""
         begun = self.begun
         if begun is None or not self.painted:
             return None
         self.begun = None
-        if self.overtaken(begun):
+        if begun.overtaken(self.host.session):
             self.say(OVERTAKEN)
             return None
         return begun

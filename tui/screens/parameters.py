@@ -9,6 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from multidrop.dialects import Diagnostic
@@ -200,7 +201,7 @@ class SettingsTable:
         except Diagnostic:
             return f"{row.reading.name} {row.meaning}"
 
-    def row(self, row: Setting, width: int, chosen: bool, units: Callable[[str, Value], str]) -> Row:
+    def row(self, row: Setting, width: int, chosen: bool, units: Callable[[str, Value], str] | None) -> Row:
         there: list[Span] = []
         if self.other is not None:
             there.append((f"{_aligned(row.other or '–')} ", "strong" if row.differs else "dim"))
@@ -214,7 +215,7 @@ class SettingsTable:
         ]
         room = width - sum(len(text) for text, _ in left)
         meaning = row.meaning or (row.reading.unit if len(row.reading.unit) > UNIT else "")
-        shown = units(row.reading.name, row.reading.value).strip(" ()")
+        shown = units(row.reading.name, row.reading.value).strip(" ()") if units is not None else ""
         kind = "program variable" if row.reading.section == VARIABLES else ""
         about = "  ".join(filter(None, (shown, kind, meaning)))
         return (*left, (fit(about, room), "dim"))
@@ -260,10 +261,6 @@ class ParametersPage(ListPage, SendingPage):
 
     # What is shown
 
-    def _in_units(self, name: str, value: Value) -> str:
-        session, drive = self.host.session, self.host.session.selected
-        return setting_units.shown(session.units, drive, name, value) if session.scaled and drive is not None else ""
-
     def show(self, view: View) -> None:
         self._glance = view.chosen
         # Forget what was begun before a stop, or for another drive.
@@ -287,11 +284,12 @@ class ParametersPage(ListPage, SendingPage):
         if self.said[0] == READING and self._table.found is not self._settings():
             self.say("", "dim")
         self._table.make(self._settings(), drive)
-        table = self._table
+        table, session = self._table, view.session
+        units = partial(setting_units.shown, session.units, drive) if session.scaled and drive is not None else None
         below = self.put_rows(
             table.shown,
             table.at,
-            lambda row, chosen: table.row(row, width, chosen, self._in_units),
+            lambda row, chosen: table.row(row, width, chosen, units),
             self._nothing(view),
         )
         self.lines("heading").put([table.heading(view, self._glance, width, below)])
@@ -403,7 +401,7 @@ class ParametersPage(ListPage, SendingPage):
         if asked is None:
             self.action_enter()
             return
-        if self.overtaken(asked):
+        if asked.overtaken(self.host.session):
             self._close("it was not used")
             return
         try:

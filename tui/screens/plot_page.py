@@ -182,7 +182,7 @@ class PlotPage(AskingPage):
         return View(self.host.session, self.host.model, [], self.host.session.now(), True)
 
     def show(self, view: View) -> None:
-        if self.asked is not None and self.overtaken(self.asked):
+        if self.asked is not None and self.asked.overtaken(self.host.session):
             self._close("a stop or another drive came in between: it was not used")
         self._look.follow(view.model.traces, view.now)
         charts = self.lines("charts")
@@ -247,7 +247,7 @@ class PlotPage(AskingPage):
 
     def typed(self, text: str) -> None:
         asked, view = self.asked, self._view
-        if asked is None or self.overtaken(asked):
+        if asked is None or asked.overtaken(self.host.session):
             self._close("it was not used")
             return
         try:

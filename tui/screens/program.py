@@ -353,9 +353,6 @@ class ProgramPage(Page):
         self.run_worker(ended(task))
         return task
 
-    def _target(self) -> str:
-        return target_of(self.host.session)
-
     async def action_download(self) -> None:
         """Send the file to the drive: show what that does, and ask how."""
         self.take_text()
@@ -366,14 +363,14 @@ class ProgramPage(Page):
         if not isinstance(self.grammar, ProgramGrammar):
             self.notify(f"{text.name} is not a program: nothing to download")
             return
-        ways = download_choices(text, self._target())
+        ways = download_choices(text, target_of(self.host.session))
         facts = download_facts(text, self.findings, self.program)
 
         async def answered(line: str | None) -> None:
             if line and (await self.save() if text.changed or text.file.new else True):
                 self._start(line)
 
-        title = f"Download {text.name} to {self._target() or chosen.product}?"
+        title = f"Download {text.name} to {target_of(self.host.session) or chosen.product}?"
         answers = [(each.line, f"{each.title:<38} {each.line}") for each in ways]
         await self.app.push_screen(Confirm(title, facts, answers), answered)
 
@@ -386,10 +383,10 @@ class ProgramPage(Page):
             self.notify("No drive is selected: ^O chooses one")
             return
         program = self.program
-        found = run_choices(self._entries(), self._target(), program)
+        found = run_choices(self._entries(), target_of(self.host.session), program)
         found = [each for each in found if only in each.line]
         known = "is this text" if self.findings.addresses else "may be another one than this text"
-        heading = f"{title} {self._target() or chosen.product}: its program {known}"
+        heading = f"{title} {target_of(self.host.session) or chosen.product}: its program {known}"
 
         def taken(key: str | None) -> None:
             if key is not None:
@@ -405,13 +402,13 @@ class ProgramPage(Page):
             return
         program = self.program
         if program.line is not None and program.phase.waits:
-            self._step = self._start(with_target("/step", self._target()))
+            self._step = self._start(with_target("/step", target_of(self.host.session)))
         else:
             await self._choose("/step ", "Step in")
 
     async def action_break(self) -> None:
         """Set the break point at the line of the cursor, or remove it there."""
-        row, target, program = self.editor.cursor_location[0], self._target(), self.program
+        row, target, program = self.editor.cursor_location[0], target_of(self.host.session), self.program
         if self.host.session.selected is None:
             return
         if self._break_line(program) == row:

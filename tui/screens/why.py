@@ -47,7 +47,7 @@ class WhyPage(SendingPage):
 
     def show(self, view: View) -> None:
         """Paint the facts, the curves beside or below them, and the keys that help."""
-        if self.begun is not None and self.overtaken(self.begun):
+        if self.begun is not None and self.begun.overtaken(self.host.session):
             self.begun = None
             self.say(OVERTAKEN)
         drive, glance, width = view.session.selected, view.chosen, self.size.width
@@ -61,7 +61,7 @@ class WhyPage(SendingPage):
             helps = helping(glance, drive)
             said: Row = ((f" {self.said[0]}", self.said[1]),) if self.said[0] else rule("what helps", width)
             self.lines("helps").put([said, *(((f" {key:<4}", "key"), (text, "text")) for key, text in helps)])
-        self.were_painted()
+        self.painted = self.begun is not None and (self.painted or self.host.keyboard.idle)
 
     def _rows(self, view: View, glance: Glance, drive: Drive) -> list[Row]:
         width, height = self.lines("why").size
