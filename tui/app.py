@@ -378,7 +378,7 @@ class MultidropApp(Dressed):
 
     def last_records(self, number: int) -> Sequence[Record]:
         records = self.main.page(self.main.current).records
-        return [records[each] for each in range(max(records.first, records.taken - number), records.taken)]
+        return [record for _, record in records.since(records.taken - number)]
 
     def show_line(self, text: str, mark: str = ".") -> None:
         """Append a line of the app's own to the transcript that is shown."""

@@ -119,9 +119,10 @@ class Presenter:
         keys = footer(screen.SHEET)
         shown = [(self.keymap.shown(key.name) if key.name else key.shown, key.word) for key in keys]
         first = [(self.keymap.shown("help"), "help")]
-        if screen.PLAYS and self.macros.place:
+        plays = isinstance(screen, MainScreen)
+        if plays and self.macros.place:
             first.append((self.keymap.shown("macro-page"), self.macros.place))
-        for key, name in self.macros.shown if screen.PLAYS else ():  # a person may have given it another key
+        for key, name in self.macros.shown if plays else ():  # a person may have given it another key
             first.append((self.keymap.shown(f"play-{key.lower()}") or key, name))
         recording, latched = bool(self.session.recording), self.session.latched and not self.session.watching
         screen.lines("footer").put([footer_row([*first, *shown], recording, latched, width, self.model.progress)])

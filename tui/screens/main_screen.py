@@ -19,7 +19,7 @@ from multidrop.tui.screen_model import Record
 from multidrop.tui.screens.page import Framed
 from multidrop.tui.text import fit, shorter
 from multidrop.tui.widgets.bars import Banner, rule_row
-from multidrop.tui.widgets.entry import Complete, Draft, Entry, Menu, Typed
+from multidrop.tui.widgets.entry import Complete, Draft, Entry, Typed
 from multidrop.tui.widgets.lines import Lines, Roles, Row, width_of
 from multidrop.tui.widgets.search_bar import Reader
 from multidrop.tui.widgets.transcript import Transcript
@@ -84,6 +84,7 @@ HALF = 60
 """Width from which the halves of a split screen are side by side; else they are one above the other."""
 PLAIN = ("rule-above", "panel", "side", "far", "rule-below", "tour", "status", "label", "hint")
 """Parts that are only rows."""
+MENU_WIDTH = 64
 PANEL_SHARE = 0.5
 """Share of the transcript's height that a panel takes on a narrow screen."""
 
@@ -92,7 +93,6 @@ class MainScreen(Framed):
     """The main screen. It is given rows, and divides the room among them."""
 
     AUTO_FOCUS = "#entry"
-    PLAYS = True
     SHEET = "main"
     BINDINGS: ClassVar[list[BindingType]] = [
         Binding(
@@ -121,7 +121,8 @@ class MainScreen(Framed):
         self._hint = self._first_hint = ""
         self.reader = Reader(self.take_keys, id="reader")
         self.entry = Entry(complete, history, typed, pasted, id="entry")
-        self.menu = Menu(id="menu")
+        self.menu = Lines(id="menu")
+        """The list of completions, above the line."""
         self._stack = Vertical(id="pages")
         self.beside = Beside(clock, self.make_room)
         self._halves = Vertical(self.beside, self._stack, id="halves")
@@ -311,5 +312,12 @@ class MainScreen(Framed):
             hint.put([((" " * (room - cell_len(text) - 1), "text"), (text, "dim"))] if text else [])
 
     def show_menu(self) -> None:
-        below = 2 if self.wide else 2 + max(2, len(self.lines("status").rows))
-        self.menu.show(self.entry.listing, self.lines("label").size.width, below)
+        """Show the completions above the text that they complete, or hide them."""
+        listing, left = self.entry.listing, self.lines("label").size.width
+        self.menu.display = listing.open
+        if listing.open:
+            below = 2 if self.wide else 2 + max(2, len(self.lines("status").rows))
+            width = min(MENU_WIDTH, self.size.width - left - 1)
+            self.menu.styles.width = width
+            self.menu.styles.margin = (0, 0, below, max(0, left - 1))
+            self.menu.put_all(listing.rows(width))

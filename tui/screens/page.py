@@ -36,8 +36,6 @@ from multidrop.tui.widgets.lines import Lines, Link, Row, Span, T, in_view
 class Framed(Keyed, Screen[None]):
     """A screen with a top line and a footer, which the presenter paints."""
 
-    PLAYS: ClassVar[bool] = False
-    """True if function keys play macros on this screen."""
     SHEET: ClassVar[str] = "screen"
 
     def __init__(self) -> None:
