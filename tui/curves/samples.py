@@ -78,9 +78,9 @@ class Trace:
         age = now - self.at[-1]
         return age if age > max(OVERDUE, 3 * min(self.at[-1] - self.at[-2], OVERDUE)) else 0.0
 
-    def rate(self, now: float, over: float = 2.0) -> float:
-        """Samples per second over the last seconds."""
-        return (len(self.at) - bisect_left(self.at, now - over)) / over
+    def rate(self, now: float) -> float:
+        """Samples per second over the last two."""
+        return (len(self.at) - bisect_left(self.at, now - 2.0)) / 2.0
 
 
 class Traces:

@@ -35,9 +35,8 @@ class Beside(Vertical):
         self.bus, self.address = "", ""
         """The line that it shows, and the one drive on it; an empty address is all of the line."""
         self._heading = Lines(id="beside-head")
-        self.transcript = Transcript(
-            clock, foot=False
-        )  # its filter is not the person's: `/filter` is for the other half
+        # Without a foot: its filter is not the person's, and `/filter` is for the other half.
+        self.transcript = Transcript(clock, foot=False)
 
     def compose(self) -> ComposeResult:
         yield self._heading

@@ -144,10 +144,8 @@ def chosen(row: Row) -> Row:
 class Transcript(Lines, can_focus=False):
     """Shows records; see the module. `times`: the form of their times, a word of `TIMES`."""
 
-    def __init__(
-        self, clock: Callable[[float], str], times: str = "clock", *, foot: bool = True, id: str | None = None
-    ) -> None:
-        super().__init__(id=id)
+    def __init__(self, clock: Callable[[float], str], times: str = "clock", *, foot: bool = True) -> None:
+        super().__init__()
         self._has_foot = foot
         self.records = Records()
         self.sight = Sight(self.records)

@@ -44,9 +44,6 @@ class Records:
     def __iter__(self) -> Iterator[Record]:
         return iter(self._kept)
 
-    def __reversed__(self) -> Iterator[Record]:
-        return reversed(self._kept)
-
     def __getitem__(self, number: int) -> Record:
         return self._kept[number - self.first]
 
