@@ -135,16 +135,14 @@ def _drives(session: Session, model: ScreenModel, plotted: Sequence[Series], res
 def _watches(session: Session) -> Wanted:
     """The periods at which conditions are read: of the selected drive, the others of its line, other lines."""
     wanted: Wanted = {}
-    for name, bus in session.buses.items():
-        if bus.lost is not None:
-            continue
-        here, chosen = name == session.selected_bus, session.selected
+    for bus in _open(session):
+        here, chosen = bus.name == session.selected_bus, session.selected
         own = chosen.address if here and chosen is not None and chosen.address in bus.drives else None
         others = tuple(address for address in bus.drives if address != own)
         if own is not None:
-            wanted[name, id(bus), (own,)] = CONDITIONS
+            wanted[bus.name, id(bus), (own,)] = CONDITIONS
         if others:
-            wanted[name, id(bus), others] = max(CONDITIONS_OF_OTHERS if here else ELSEWHERE, float(len(others)))
+            wanted[bus.name, id(bus), others] = max(CONDITIONS_OF_OTHERS if here else ELSEWHERE, float(len(others)))
     return wanted
 
 

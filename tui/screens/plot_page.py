@@ -37,10 +37,7 @@ def _lines(view: View) -> list[Line]:
 
 def _named(line: Line) -> str:
     """`a velocity`, `press:b X position`: as a person types it."""
-    axis = line.quantity.axis
-    return " ".join(
-        filter(None, (line.name.split()[0], axis if axis != line.name.split()[0] else "", line.quantity.word))
-    )
+    return f"{line.short} {line.quantity.word}"
 
 
 def typed_trigger(view: View) -> str:
