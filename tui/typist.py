@@ -28,7 +28,7 @@ from multidrop.tui.widgets.entry import LONGEST
 from multidrop.tui.widgets.lines import Row
 
 
-@dataclass(eq=False)
+@dataclass(eq=False, repr=False)
 class Selection:
     """Makes the main screen follow the session's selection."""
 
@@ -109,7 +109,7 @@ NOT_TEXT = r"[^\t\r\n -~\xa0-\U0010ffff]"
 """A key that is not text."""
 
 
-@dataclass(eq=False)
+@dataclass(eq=False, repr=False)
 class Unsent:
     """The lines of one main screen that a stop drops. `_keep` stores a line in the history, `_warn` shows one."""
 
@@ -174,7 +174,7 @@ class Unsent:
         self._model.page(bus).append(Record(self._clock(), "", "!", f"not sent: {text}"))
 
 
-@dataclass(eq=False)
+@dataclass(eq=False, repr=False)
 class Typist:
     """Takes the lines of the main screen."""
 

@@ -258,7 +258,7 @@ TRY = "try PR P, MR 51200 and @b PR P, each with Enter; /tour walks through ever
 """A hint for an empty demo cell."""
 
 
-@dataclass(eq=False)
+@dataclass(eq=False, repr=False)
 class Opener:
     """Opens connections."""
 
