@@ -14,21 +14,24 @@ from textual.widgets import Input, TextArea
 
 from multidrop.tui.assist import Assist
 from multidrop.tui.keymap import Keymap
-from multidrop.tui.palette import PADDING, PALETTE, Command, Recent, Switches, all_commands, commands_like, entries
+from multidrop.tui.outbox import ended
+from multidrop.tui.palette import LATELY, PADDING, PALETTE, Command, all_commands, commands_like, entries, ordered
 from multidrop.tui.palette import found as help_on
 from multidrop.tui.panels.view import glances_of
 from multidrop.tui.polling import Polling
-from multidrop.tui.screens.dialogs import Search
+from multidrop.tui.screens.dialogs import Ask, Choose, Offer, Search
 from multidrop.tui.screens.main_screen import MainScreen
 from multidrop.tui.screens.page import Host, Page, page_entry
-from multidrop.tui.screens.questions import HELP, Questions
+from multidrop.tui.screens.questions import Questions, drive_choices, lines_like, place_of
 from multidrop.tui.screens.start import Opener
 from multidrop.tui.tour import Tour
 from multidrop.tui.typist import Selection
-from multidrop.tui.widgets.theme import SignFilter, Signs, ink_of
+from multidrop.tui.widgets.theme import THEMES, SignFilter, Signs, ink_of
 
 WATCHED = ("drives", "plot")
 """The pages that a watcher has."""
+HELP = "Help"
+"""The heading of the help."""
 CTRL_C = "Ctrl+Q quits, Ctrl+X stops all drives"
 
 
@@ -46,7 +49,8 @@ class Parts(Host):
     opener: Opener
     tour: Tour
     signs: SignFilter
-    recent: Recent = field(default_factory=Recent)
+    recent: list[str] = field(default_factory=list)
+    """The actions of the commands used lately, the last one first."""
     mouse_on: bool = True
 
 
@@ -90,16 +94,22 @@ class Actions:
             switch(self._parts.mouse_on)
 
     def action_repaint(self) -> None:
-        """Paint everything, whatever the terminal shows."""
         repaint = getattr(self._parts.app._driver, "repaint", None)
         if repaint is not None:
             repaint()
 
     async def action_choose_theme(self) -> None:
-        await self._parts.questions.theme()
+        app, ours = self._parts.app, [theme.name for theme in THEMES]
+        themes = [Offer(name, name) for name in [*ours, *sorted(set(app.available_themes) - set(ours))]]
+        await self._parts.questions.open(Choose("Theme", themes, app.theme), partial(setattr, app, "theme"))
 
     async def action_choose_signs(self) -> None:
-        await self._parts.questions.signs(self.show_signs)
+        answers = [
+            Offer(Signs.FULL.value, "full     ⣀⠔⠉ ▶ ■ ✗ ● ○   all signs"),
+            Offer(Signs.BOXES.value, "boxes    no braille: Linux console, PuTTY"),
+            Offer(Signs.ASCII.value, "ascii    nothing but ASCII"),
+        ]
+        await self._parts.questions.open(Choose("Signs", answers), lambda name: self.show_signs(Signs(name)))
 
     def show_signs(self, signs: Signs) -> None:
         parts = self._parts
@@ -115,7 +125,7 @@ class Actions:
             return
         found = entries(sheet, parts.keymap, parts.macros.bound)
         width = min(PALETTE, parts.app.size.width) - PADDING
-        await parts.questions.help(lambda typed: help_on(found, typed, width))
+        await parts.app.push_screen(Search(HELP, lambda typed: help_on(found, typed, width), "close"))
 
     def action_explain(self) -> None:
         """Copy the selected text on Ctrl+C, else name the keys that end and stop."""
@@ -133,7 +143,11 @@ class Actions:
         """Split the screen: choose what the other half shows; once it is split, type to the other half."""
         parts, beside = self._parts, self._parts.main.beside
         if not beside.display:
-            await parts.questions.half(partial(glances_of, parts.session, parts.model), self._show_half)
+            drives, _ = drive_choices(parts.session, partial(glances_of, parts.session, parts.model))
+            lines = [Offer(f"{name}\n", f" {name:<8} all of the line") for name in parts.session.buses]
+            if lines:
+                halves = Choose("The other half shows", [*drives, *lines])
+                await parts.questions.open(halves, lambda key: self._show_half(*place_of(key)))
             return
         place, (bus, address) = parts.session.place, (beside.bus, beside.address)
         self._show_half(place.address, place.bus)
@@ -153,15 +167,9 @@ class Actions:
 
         When this returns the line has taken its first step and has its drive.
         """
-        self._parts.app.run_worker(self._end_of(self._parts.session.start(line)))
+        self._parts.app.run_worker(ended(self._parts.session.start(line)))
         await asyncio.sleep(0)
         self._parts.selection.follow()
-
-    @staticmethod
-    async def _end_of(task: asyncio.Task[bool]) -> None:
-        await asyncio.wait([task])
-        if not task.cancelled():
-            task.result()
 
     def action_begin_line(self, text: str) -> None:
         self._parts.main.entry.put(text)
@@ -199,7 +207,13 @@ class Actions:
             self._end_recording(key, parts.session.recording)
         else:
             self._key = key
-            await parts.questions.macro_name(lambda name: self.action_run_line(f"/record {name}"), key)
+            await self._begin_recording(key)
+
+    async def _begin_recording(self, key: str = "") -> None:
+        """Ask for the name of a macro that is recorded; for a key, which ends the recording."""
+        title = f"{key and f'{key} plays nothing yet. '}Record what is typed as a macro named"
+        box = Ask(title, about=f"{key or '/record stop'} ends it")
+        await self._parts.questions.open(box, lambda name: self.action_run_line(f"/record {name}"))
 
     def _end_recording(self, key: str, name: str) -> None:
         """End the recording that was begun on a key, and put it there; another key ends none."""
@@ -224,7 +238,7 @@ class Actions:
         if self._parts.session.recording:
             await self.action_run_line("/record stop")
         else:
-            await self._parts.questions.macro_name(lambda name: self.action_run_line(f"/record {name}"))
+            await self._begin_recording()
 
     def action_twin(self) -> None:
         """Type the line that runs a twin beside each drive of the selected bus, or ends the twins."""
@@ -239,38 +253,41 @@ class Actions:
 
     async def action_search_history(self) -> None:
         """Search the lines typed before; the one that is taken goes into the line and is not sent."""
-        await self._parts.questions.history(self._parts.assist.history(), self.action_begin_line)
-
-    @property
-    def _page(self) -> str:
-        """The sheet of the page in front; empty on the main screen."""
-        front = self._parts.app.screen
-        return front.SHEET if isinstance(front, Page) else ""
+        kept = list(dict.fromkeys(reversed(self._parts.assist.history())))
+        box = Search("Lines typed before", lambda text: lines_like(kept, text), "into the line")
+        await self._parts.questions.open(box, self.action_begin_line)
 
     def commands(self) -> list[Command]:
         parts = self._parts
-        switches = Switches(parts.polling.on, parts.mouse_on, parts.model.bus("").twinned)
-        return parts.recent.first(
-            list(all_commands(parts.session, parts.macros, parts.assist.verbs(), parts.keymap, switches, self._page))
-        )
+        front = parts.app.screen
+        sheet = front.SHEET if isinstance(front, Page) else ""
+        switches = {"polling": parts.polling.on, "mouse": parts.mouse_on, "twin": parts.model.bus("").twinned}
+        found = all_commands(parts.session, parts.macros, parts.assist.verbs(), parts.keymap, switches, sheet)
+        return ordered(list(found), parts.recent)
 
     async def action_palette(self) -> None:
-        """Search everything by name."""
         parts = self._parts
         if isinstance(parts.app.screen, Search):
             return
         found, page = self.commands(), parts.app.screen
 
-        async def run(number: int) -> None:
-            parts.recent.used(found[number])
-            await parts.app.run_action(found[number].action, page if found[number].here else parts.main)
+        async def run(key: str) -> None:
+            taken = found[int(key)]
+            parts.recent = [taken.action, *(each for each in parts.recent if each != taken.action)][:LATELY]
+            await parts.app.run_action(taken.action, page if taken.here else parts.main)
 
         width = min(PALETTE, parts.app.size.width) - PADDING
-        await parts.questions.palette(lambda typed: commands_like(found, typed, width), run)
+        everything = Search("Everything", lambda typed: commands_like(found, typed, width), "do it")
+        await parts.questions.open(everything, run)
 
     async def action_choose_drive(self) -> None:
-        glances = partial(glances_of, self._parts.session, self._parts.model)
-        await self._parts.questions.drive(glances, self._parts.selection.select)
+        parts = self._parts
+        options, current = drive_choices(parts.session, partial(glances_of, parts.session, parts.model))
+        if not options:
+            parts.app.notify("No drive is known: /open URL opens a line of drives", timeout=4)
+            return
+        box = Choose("Plain text goes to", options, current)
+        await parts.questions.open(box, lambda key: parts.selection.select(*place_of(key)))
 
     async def action_page_key(self, name: str) -> None:
         """Show a page on its key; Ctrl+A within a line goes to its start first."""

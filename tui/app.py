@@ -13,7 +13,6 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-import os
 from collections.abc import Sequence
 from functools import partial
 from typing import Any, ClassVar
@@ -21,10 +20,8 @@ from typing import Any, ClassVar
 from rich.console import RenderableType
 from textual import events
 from textual._compositor import ChopsUpdate, LayoutUpdate
-from textual.app import App
 from textual.binding import BindingType
 from textual.driver import Driver
-from textual.filter import LineFilter
 from textual.geometry import Size
 from textual.message import Message
 from textual.screen import Screen
@@ -56,7 +53,7 @@ from multidrop.tui.tour import Tour
 from multidrop.tui.typist import Selection, Typist, Unsent
 from multidrop.tui.widgets.bars import Banner, Footer
 from multidrop.tui.widgets.entry import Entry
-from multidrop.tui.widgets.theme import DEFAULTS, SignFilter, Signs, dress, ink_of, signs_for, wrong_theme
+from multidrop.tui.widgets.theme import Dressed, ink_of, wrong_theme
 
 TOLD = 5.0
 """Seconds for which a line about a key is shown."""
@@ -72,15 +69,13 @@ def is_stop(message: Message) -> bool:
     return key == "x" and "ctrl" in modifiers
 
 
-class MultidropApp(App[int]):
+class MultidropApp(Dressed):
     """The screen of one Session."""
 
     typist: Typist
 
     CSS_PATH = "multidrop.tcss"
     TITLE = "multidrop"
-    ENABLE_COMMAND_PALETTE = False
-    """Textual's own palette; ours is a `Search`, in which keys keep their order."""
     BINDINGS: ClassVar[list[BindingType]] = bound("app")
 
     def __init__(
@@ -92,8 +87,7 @@ class MultidropApp(App[int]):
         look: Look = DEFAULT_LOOK,
         model: ScreenModel | None = None,
     ) -> None:
-        # With NO_COLOR, only this makes Textual take colours away altogether; else it makes greys of them.
-        super().__init__(driver_class=driver, ansi_color=True if "NO_COLOR" in os.environ else None)
+        super().__init__(look, driver)
         self.session, self.urls, self.assist = session, list(urls), assist
         figures, named = partial(figures_at, session), partial(name_at, session)
         self.model = model or ScreenModel(lambda: session.selected_bus, lambda: session.buses, figures, named)
@@ -114,7 +108,7 @@ class MultidropApp(App[int]):
             session, self.model, self.main, self.presenter.label, self.keyboard.turn_deaf, self.show_line
         )
         self.unsent = Unsent(self.main, self.model, session.now, self.assist.keep, self._warn)
-        self.questions = Questions(self, session, self.main, self.keyboard)
+        self.questions = Questions(self, session, self.main, self.keyboard, lambda: self._check_size(self.size))
         self.tour = Tour(session, self.keymap, lambda: getattr(self.screen, "heading", type(self.screen).__name__))
         self.opener = Opener(self, session, self.assist, self.keyboard, self.show_line, self.tour.begin)
         self.typist = Typist(
@@ -128,9 +122,8 @@ class MultidropApp(App[int]):
         self._is_composed = False
         """The main screen has its parts: they can be painted."""
         self.frames = Frames(self._paint, self.call_later, lambda: self.presenter.behind)
-        self._signs = SignFilter(signs_for(look.signs, os.environ))
-        dress(self, look)
-        self.model.look.ink = ink_of(self._signs.font)
+        self.dress(look)
+        self.model.look.ink = ink_of(self.signs.font)
         self._set_actions()
         self.set_keymap(self.keymap.changed)
         self._troubles = [*map(str, session.settings.problems)]
@@ -158,11 +151,11 @@ class MultidropApp(App[int]):
             self.keymap,
             self.opener,
             self.tour,
-            self._signs,
+            self.signs,
         )
         self.act = Actions(parts)
         self._action_targets |= {"act"}
-        Hooks(parts, self.act, self.presenter, lambda: self._check_size(self.size))
+        Hooks(parts, self.act, self.presenter)
 
     def get_default_screen(self) -> Screen[Any]:
         return self.main
@@ -281,15 +274,6 @@ class MultidropApp(App[int]):
 
     # Frames
 
-    def get_line_filters(self) -> Sequence[LineFilter]:
-        """The filters of Textual, and the one that replaces signs; it comes last."""
-        filters = super().get_line_filters()
-        return filters if self._signs.font is Signs.FULL else [*filters, self._signs]
-
-    def get_theme_variable_defaults(self) -> dict[str, str]:
-        """Colours for themes that are not ours."""
-        return DEFAULTS
-
     def refresh_css(self, animate: bool = True) -> None:
         """Read the style sheet again, for other colours; at the start Textual reads it by itself."""
         if self.main.is_attached:
@@ -394,7 +378,7 @@ class MultidropApp(App[int]):
 
     def last_records(self, number: int) -> Sequence[Record]:
         records = self.main.page(self.main.current).records
-        return [records[each] for each in range(max(records.first, records.taken - number), records.taken)]
+        return [record for _, record in records.since(records.taken - number)]
 
     def show_line(self, text: str, mark: str = ".") -> None:
         """Append a line of the app's own to the transcript that is shown."""
@@ -428,12 +412,10 @@ class MultidropApp(App[int]):
 
     async def action_quit(self) -> None:
         unsaved = [text.name for text in self.texts.unsaved()]
-        await self.questions.quit(
-            lambda: self.outbox.waiting, self.stop_all, lambda: self._check_size(self.size), unsaved
-        )
+        await self.questions.quit(lambda: self.outbox.waiting, self.stop_all, unsaved)
 
 
 def bindings() -> list[BindingType]:
     """The keys of all screens that can be set, those of the app first; no page has one of its own."""
-    screens: list[type[Framed]] = [MainScreen, Page]
+    screens: list[type[Framed]] = [Framed, MainScreen, Page]
     return [*MultidropApp.BINDINGS, *(each for screen in screens for each in screen.BINDINGS)]

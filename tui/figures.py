@@ -48,7 +48,7 @@ class Figures(NamedTuple):
 
     def number(self, counts: int) -> str:
         """A position without its unit."""
-        return _fixed(self.places.value(counts), self.decimals) if self.unit else digits(counts)
+        return fixed(self.places.value(counts), self.decimals) if self.unit else digits(counts)
 
     def place(self, counts: int | None) -> str:
         """`12.50000 mm`, or `128000`; `–` if it is not known."""
@@ -58,12 +58,12 @@ class Figures(NamedTuple):
         """The same with its sign: `+0.50000 mm`."""
         if not self.unit:
             return f"{counts:+}"
-        return f"{_fixed(self.places.gain * counts, self.decimals, '+')} {self.unit}{self.sign}"
+        return f"{fixed(self.places.gain * counts, self.decimals, '+')} {self.unit}{self.sign}"
 
     def rate(self, native: int) -> str:
         """A velocity without its unit."""
         value = self.speeds.value(native)
-        return _fixed(value, max(0, self.decimals - COARSER)) if self.speed_unit else digits(native)
+        return fixed(value, max(0, self.decimals - COARSER)) if self.speed_unit else digits(native)
 
     def speed(self, native: int | None) -> str:
         """`50.000 mm/s`, or `512000`."""
@@ -101,6 +101,6 @@ def _figures(measure: Measure, sure: bool, referenced: bool) -> Figures:
     )
 
 
-def _fixed(value: float, decimals: int, sign: str = "-") -> str:
+def fixed(value: float, decimals: int, sign: str = "-") -> str:
     """A number with its decimals; 0 has no minus."""
     return f"{round(value, decimals) + 0.0:{sign}.{decimals}f}"

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from typing import NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 from textual.binding import Binding, BindingType
 
@@ -138,6 +138,18 @@ def bound(name: str) -> list[BindingType]:
     return made
 
 
+class Keyed:
+    """A screen or a part of one, whose keys are those of its sheet, before any that it adds."""
+
+    SHEET: ClassVar[str]
+    BINDINGS: ClassVar[list[BindingType]]
+
+    def __init_subclass__(cls, **named: Any) -> None:
+        if "SHEET" in cls.__dict__:
+            cls.BINDINGS = [*bound(cls.SHEET), *cls.__dict__.get("BINDINGS", ())]
+        super().__init_subclass__(**named)
+
+
 def all_groups(name: str) -> dict[str, list[Key]]:
     """The keys that work with a sheet, in groups: its own, then those of the sheets below it."""
     found: dict[str, list[Key]] = {}
@@ -157,10 +169,8 @@ def below(name: str) -> list[str]:
 def footer(name: str) -> list[Key]:
     """The keys in the footer of a sheet, in order."""
     sheet = SHEETS[name]
-    own, others = (
-        [key for key in sheet.keys if key.word and key.keys],
-        sum((SHEETS[each].keys for each in below(name)), []),
-    )
+    own = [key for key in sheet.keys if key.word and key.keys]
+    others = [key for each in below(name) for key in SHEETS[each].keys]
     found: list[Key] = []
     for word in sheet.foot:
         found += own if word == "*" else [key for key in others if key.word == word][:1]

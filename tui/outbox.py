@@ -188,6 +188,13 @@ class Outbox:
         ]
 
 
+async def ended(task: asyncio.Task[bool]) -> None:
+    """Wait for a line; a bug in it ends the app."""
+    await asyncio.wait([task])
+    if not task.cancelled():
+        task.result()
+
+
 def them(lines: Sequence[object]) -> str:
     return "them" if len(lines) > 1 else "it"
 

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from itertools import chain
 from typing import NamedTuple
 
 from rich.text import Text
 from textual.fuzzy import Matcher
 
+from multidrop.dialects.files import rows
 from multidrop.shell.session import Session
 from multidrop.tui.key_table import SHEETS, all_groups
 from multidrop.tui.keymap import FunctionKeys, Keymap
@@ -38,29 +40,11 @@ class Command(NamedTuple):
     """It is a function of the page in front."""
 
 
-class Switches(NamedTuple):
-    """The states that commands switch."""
-
-    polling: bool
-    mouse: bool
-    twin: bool
-
-
-class Recent:
-    """The commands used lately: they come first."""
-
-    def __init__(self) -> None:
-        self._actions: list[str] = []
-
-    def used(self, command: Command) -> None:
-        """Note the use of a command, whatever its title will be next time."""
-        self._actions = [command.action, *(each for each in self._actions if each != command.action)][:LATELY]
-
-    def first(self, commands: Sequence[Command]) -> list[Command]:
-        """Order commands: the urgent ones, those of the page, those used lately, all others."""
-        urgent = [each for each in commands if each.urgent] + [each for each in commands if each.here]
-        lately = [each for action in self._actions for each in commands if each.action == action and each not in urgent]
-        return [*urgent, *lately, *(each for each in commands if each not in urgent and each not in lately)]
+def ordered(commands: Sequence[Command], recent: Sequence[str]) -> list[Command]:
+    """The urgent commands, those of the page, those used lately (by their actions, the last one first), all others."""
+    urgent = [each for each in commands if each.urgent] + [each for each in commands if each.here]
+    lately = [each for action in recent for each in commands if each.action == action and each not in urgent]
+    return [*urgent, *lately, *(each for each in commands if each not in urgent and each not in lately)]
 
 
 def all_commands(
@@ -68,10 +52,10 @@ def all_commands(
     macros: FunctionKeys,
     verbs: Iterable[tuple[str, str, str]],
     keys: Keymap,
-    switches: Switches,
+    switches: Mapping[str, bool],
     sheet: str = "",
 ) -> Iterator[Command]:
-    """Each function, the most urgent first; those of the page in front come next."""
+    """Each function, the most urgent first; those of the page in front come next. `switches`: what is on."""
     yield Command("Stop all", "every drive, macro and script, now", "app.stop_all", "^X", urgent=True)
     if session.latched:
         yield Command("Resume", "let macros and scripts run again", _line("/resume"), "/resume", urgent=True)
@@ -93,43 +77,12 @@ def all_commands(
         title = f"Panel {panel.name} on or off"
         yield Command(title, panel.about, _call("act.panel", panel.name), keys.shown(f"panel-{panel.name}"))
     yield from _choices(session, macros, keys)
-    about = "simulated drives that run beside those of this line; every difference shows"
-    yield Command(f"Twin {_other(switches.twin)}", about, "act.twin", keys.shown("twin"))
-    about = "the drives' own numbers in place of units, or units again"
-    yield Command("Units", about, "act.units", keys.shown("units"))
-    yield Command("Search history", "the lines typed before", "act.search_history", keys.shown("history"))
-    yield from _view(keys, switches)
+    switched = {name: "off" if on else "on" for name, on in switches.items()}
+    for row in rows(__file__, "commands.csv"):
+        shown = row["key"] if row["key"].startswith("/") else keys.shown(row["key"])
+        yield Command(row["title"].format(**switched), row["about"], row["action"], shown)
     for name, _, meaning in verbs:
         yield Command(name, meaning, _call("act.begin_line", f"{name} "))
-
-
-def _view(keys: Keymap, switches: Switches) -> Iterator[Command]:
-    """The commands of the screen itself."""
-    yield Command(f"Polling {_other(switches.polling)}", "reading of position and velocity", "act.polling")
-    yield Command("Open a connection", "saved ones, serial ports, the demo cell, a URL", "act.open", "/open URL")
-    yield Command("Split the screen", "a second transcript; again: type to it", "act.split", keys.shown("split"))
-    yield Command("One half", "end the split of the screen", "act.unsplit")
-    yield Command("Tour", "two minutes through the product, on a demo cell", _line("/tour"), "/tour")
-    # The commands of the transcript that is shown.
-    yield Command("Search the transcript", "as you type; Tab shows only what is found", "find", keys.shown("find"))
-    yield Command("Pause the scrolling", "or let it go on", "pause", keys.shown("pause"))
-    yield Command("Copy lines", "pick lines of the transcript, and copy them", "pick(0)", keys.shown("pick"))
-    yield Command("Copy the view", "the transcript in view, to the terminal's clipboard", "act.copy_view")
-    yield Command("Only my lines", "with their replies, and warnings", _line("/filter mine"), "/filter mine")
-    yield Command("Only errors", "failures and warnings, with the lines that failed", _line("/filter errors"))
-    yield Command("All lines", "end the filter", _line("/filter off"), "/filter off")
-    yield Command("Times", "of day, since the start, since the line above, off", _line("/times"), "/times")
-    yield Command("Bytes", "of the selected line, both ways, beside its lines", _line("/hex"), "/hex")
-    yield Command("Save the transcript", "to a new file", _call("act.begin_line", "/save "), "/save FILE")
-    yield Command("Newest line", "follow the transcript again", "look_end(True)", keys.shown("newest"))
-    yield Command("Oldest line", "the beginning of the transcript", "look_end(False)", keys.shown("oldest"))
-    yield Command("Clear the transcript", "of the bus that is shown", "act.clear")
-    yield Command(f"Mouse {_other(switches.mouse)}", "off: the terminal's own selection works", "act.mouse")
-    yield Command("Repaint", "the whole screen, where another program wrote on it", "act.repaint")
-    yield Command("Theme", "colours; multidrop-ansi uses the terminal's own", "act.choose_theme")
-    yield Command("Signs", "all, boxes without braille, or ASCII alone", "act.choose_signs")
-    yield Command("Help", "keys and signs, for where you are", "act.help", keys.shown("help"))
-    yield Command("Quit", "drives go on as they are", "app.quit", keys.shown("quit"))
 
 
 def _choices(session: Session, macros: FunctionKeys, keymap: Keymap) -> Iterator[Command]:
@@ -160,10 +113,6 @@ def _choices(session: Session, macros: FunctionKeys, keymap: Keymap) -> Iterator
             yield Command("Tab to the left", "one place", _line("/tab left"), keymap.shown("tab-left"))
             yield Command("Tab to the right", "one place", _line("/tab right"), keymap.shown("tab-right"))
         yield Command(f"Close bus {bus.name}", "moves nothing, stops nothing", _line(f"/close {bus.name}"))
-
-
-def _other(on: bool) -> str:
-    return "off" if on else "on"
 
 
 def _line(line: str) -> str:
@@ -202,34 +151,6 @@ Entry = tuple[str, str]
 """A key, a line or a sign, and its meaning; a heading has an empty meaning."""
 KEY = 15
 """Width of keys, lines and signs."""
-STOP: Sequence[Entry] = (
-    ("The stop", ""),
-    ("^X", "STOP ALL: drives, macros, scripts; from anywhere"),
-    ("/resume", "after a stop: macros and scripts may run again"),
-)
-TYPING: Sequence[Entry] = (
-    ("Lines", ""),
-    ("MR 51200", "goes to the selected drive, in its own language"),
-    ("@b PR P", "to drive b; @* to all; @press:b on another bus"),
-    ("/help MR", "the meaning of a word; /help alone lists the verbs"),
-    ("Tab", "completions of what is typed"),
-    ("Up Down", "lines typed before that begin with what is typed"),
-)
-SIGNS: Sequence[Entry] = (
-    ("Signs", ""),
-    ("› »", "typed by a person; sent by a macro or a script"),
-    ("«", "printed by a drive without a request"),
-    ("↑ ↓", "bytes sent, bytes received (/hex)"),
-    ("✗", "refused, no reply, lost"),
-    ("· !", "progress; warning"),
-    ("▶ ■", "velocity last read: not 0; 0"),
-    ("□", "at rest without current: nothing holds the load"),
-    ("~", "the position does not count since a restart: home it, set it, or /referenced"),
-    ("? ·", "does not reply; not read lately"),
-    ("mm?", "a program ran, or a setting changed, since the scale was confirmed: /units ADDR"),
-    ("≠", "the position differs from that of the drive's twin by more than the limit"),
-    ("◆", "program mode: lines are stored, not executed"),
-)
 
 
 def entries(sheet: str, keys: Keymap, macros: Iterable[Entry]) -> list[Entry]:
@@ -248,8 +169,12 @@ def entries(sheet: str, keys: Keymap, macros: Iterable[Entry]) -> list[Entry]:
         here = f"page-{sheet}"
         found.append(("Near", ""))
         found += [(keys.shown(each.name) or f"/page {each.name[5:]}", each.about) for each in near if each.name != here]
+    everywhere: dict[str, list[Entry]] = {}
+    for row in rows(__file__, "help.csv"):
+        everywhere.setdefault(row["group"], [(row["group"], "")]).append((row["key"], row["about"]))
     played = [("Macros on keys", ""), *((key, f"plays {name}") for key, name in macros)]
-    return [*found, *STOP, *(played if len(played) > 1 else ()), *TYPING, *SIGNS]
+    stop, *others = everywhere.values()
+    return [*found, *stop, *(played if len(played) > 1 else ()), *chain.from_iterable(others)]
 
 
 def found(entries: Sequence[Entry], typed: str, width: int) -> list[Match]:

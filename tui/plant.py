@@ -6,17 +6,14 @@ It is an app of its own, without a session: nothing here could send a line. What
 from __future__ import annotations
 
 import asyncio
-import os
 import sys
 from collections import Counter
-from collections.abc import Sequence
 from datetime import datetime, timedelta
 from typing import ClassVar
 
 from textual import events
-from textual.app import App, ComposeResult
+from textual.app import ComposeResult
 from textual.binding import Binding, BindingType
-from textual.filter import LineFilter
 
 from multidrop.shell import configuration
 from multidrop.shell.configuration import Settings
@@ -32,7 +29,7 @@ from multidrop.tui.text import age, fit
 from multidrop.tui.widgets.bars import Banner
 from multidrop.tui.widgets.lines import Lines, Roles, in_view, spread
 from multidrop.tui.widgets.lines import Row as Shown
-from multidrop.tui.widgets.theme import DEFAULTS, SignFilter, Signs, dress, signs_for
+from multidrop.tui.widgets.theme import Dressed
 
 PAINT = 0.5
 """Seconds between two pictures while nothing is pressed."""
@@ -43,13 +40,12 @@ PARTS = ("heading", "columns", "drives", "ignored", "footer")
 KEYS = (("↑↓", "choose"), ("Enter", "follow"), ("Esc", "back"), ("type", "narrows"), ("^Q", "quit"))
 
 
-class PlantApp(App[int]):
+class PlantApp(Dressed):
     """The screen of a plant."""
 
     CSS_PATH = "multidrop.tcss"
     CSS = "#drives { height: 1fr; }"
     TITLE = "multidrop plant"
-    ENABLE_COMMAND_PALETTE = False
     BINDINGS: ClassVar[list[BindingType]] = [
         Binding("ctrl+x", "unreached", priority=True),
         Binding("ctrl+q", "quit", priority=True),
@@ -64,13 +60,12 @@ class PlantApp(App[int]):
     broker: Watch
 
     def __init__(self, url: str, settings: Settings) -> None:
-        super().__init__(ansi_color=True if "NO_COLOR" in os.environ else None)
+        super().__init__(settings.look)
         self.target, self._settings = parse_target(url, "plant"), settings
-        self._signs = SignFilter(signs_for(settings.look.signs, os.environ))
         self._rows: list[Row] = []
         self._chosen: Place | None = None
         self._words = self._told = ""
-        dress(self, settings.look)
+        self.dress(settings.look)
 
     def compose(self) -> ComposeResult:
         yield Roles()
@@ -91,13 +86,6 @@ class PlantApp(App[int]):
         self.set_interval(DRAIN, self.broker.drain)
         self.set_interval(PAINT, self.paint)
         self.call_after_refresh(self.paint)
-
-    def get_line_filters(self) -> Sequence[LineFilter]:
-        filters = super().get_line_filters()
-        return filters if self._signs.font is Signs.FULL else [*filters, self._signs]
-
-    def get_theme_variable_defaults(self) -> dict[str, str]:
-        return DEFAULTS
 
     def tell(self, text: str) -> None:
         self._told = text

@@ -7,9 +7,8 @@ and more often while they move. If polling is off, nothing is polled, and the sc
 
 from __future__ import annotations
 
-from collections.abc import Callable, Container, Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any, TypeVar
+from collections.abc import Callable, Container, Sequence
+from typing import Any
 
 from multidrop.drives.bus import Bus
 from multidrop.drives.telemetry import Subscription, Telemetry, Value
@@ -35,15 +34,14 @@ ELSEWHERE = 10.0
 """The same of the drives of other lines: their tabs show errors."""
 
 
-T = TypeVar("T")
-Wanted = dict[tuple[str, int, tuple[T, ...]], float]
+Wanted = dict[tuple[str, int, tuple[Any, ...]], float]
 """Periods, by bus, its identity, and its drives or values."""
-
-
-@dataclass
-class _Held:
-    period: float
-    subscription: Subscription[Any]
+BEGIN: tuple[Callable[[Telemetry], Callable[[Sequence[Any], float], Subscription[Any]]], ...] = (
+    lambda telemetry: telemetry.subscribe,
+    lambda telemetry: telemetry.watch,
+    lambda telemetry: telemetry.read,
+)
+"""What polls drives, watches their conditions, and reads values."""
 
 
 class Polling:
@@ -51,9 +49,8 @@ class Polling:
 
     def __init__(self) -> None:
         self.on = True
-        self._polled: dict[object, _Held] = {}
-        self._watched: dict[object, _Held] = {}
-        self._read: dict[object, _Held] = {}
+        self._held: dict[object, Subscription[Any]] = {}
+        """By what begins them, by bus, drives or values, and period."""
 
     def update(self, session: Session, model: ScreenModel, wants: Container[str]) -> None:
         """Subscribe to what is shown, and end all other subscriptions. `wants`: as panels name it."""
@@ -69,32 +66,19 @@ class Polling:
         for (bus, _, addresses), period in watches.items():
             for address in addresses:
                 model.bus(bus).readout(address).watched = period
-        _hold(session, self._polled, drives, lambda telemetry: telemetry.subscribe)
-        _hold(session, self._watched, watches, lambda telemetry: telemetry.watch)
-        _hold(session, self._read, values, lambda telemetry: telemetry.read)
+        kinds = zip(BEGIN, (drives, watches, values), strict=True)
+        wanted = [(begin, place, period) for begin, places in kinds for place, period in places.items()]
+        for gone in [each for each in self._held if each not in wanted]:
+            self._held.pop(gone).close()
+        for each in wanted:
+            if each not in self._held:
+                begin, (bus, _, members), period = each
+                self._held[each] = begin(session.buses[bus].telemetry)(members, period)
 
     def end(self) -> None:
-        for held in (self._polled, self._watched, self._read):
-            for each in held.values():
-                each.subscription.close()
-            held.clear()
-
-
-def _hold(
-    session: Session,
-    held: dict[object, _Held],
-    wanted: Mapping[tuple[str, int, tuple[T, ...]], float],
-    begin: Callable[[Telemetry], Callable[[Sequence[T], float], Subscription[Any]]],
-) -> None:
-    """Begin what is wanted, and end what is not, or no longer with this period."""
-    periods: dict[object, float] = dict(wanted.items())
-    for key, each in list(held.items()):
-        if periods.get(key) != each.period:
-            each.subscription.close()
-            del held[key]
-    for place, period in wanted.items():
-        if place not in held:
-            held[place] = _Held(period, begin(session.buses[place[0]].telemetry)(place[2], period))
+        for each in self._held.values():
+            each.close()
+        self._held.clear()
 
 
 def plotted(session: Session) -> Sequence[Series]:
@@ -130,9 +114,9 @@ def _open(session: Session) -> list[Bus]:
     return [bus for bus in session.buses.values() if bus.lost is None]
 
 
-def _drives(session: Session, model: ScreenModel, plotted: Sequence[Series], rest: float) -> Wanted[str]:
+def _drives(session: Session, model: ScreenModel, plotted: Sequence[Series], rest: float) -> Wanted:
     """The periods of drives; `rest` is that of plotted drives that stand still."""
-    wanted: Wanted[str] = {}
+    wanted: Wanted = {}
     for bus in _open(session):
         chosen = session.selected.address if bus.name == session.selected_bus and session.selected is not None else None
         fast = {each.address for each in plotted if each.bus == bus.name and each.of_motion}
@@ -148,24 +132,22 @@ def _drives(session: Session, model: ScreenModel, plotted: Sequence[Series], res
     return wanted
 
 
-def _watches(session: Session) -> Wanted[str]:
+def _watches(session: Session) -> Wanted:
     """The periods at which conditions are read: of the selected drive, the others of its line, other lines."""
-    wanted: Wanted[str] = {}
-    for name, bus in session.buses.items():
-        if bus.lost is not None:
-            continue
-        here, chosen = name == session.selected_bus, session.selected
+    wanted: Wanted = {}
+    for bus in _open(session):
+        here, chosen = bus.name == session.selected_bus, session.selected
         own = chosen.address if here and chosen is not None and chosen.address in bus.drives else None
         others = tuple(address for address in bus.drives if address != own)
         if own is not None:
-            wanted[name, id(bus), (own,)] = CONDITIONS
+            wanted[bus.name, id(bus), (own,)] = CONDITIONS
         if others:
-            wanted[name, id(bus), others] = max(CONDITIONS_OF_OTHERS if here else ELSEWHERE, float(len(others)))
+            wanted[bus.name, id(bus), others] = max(CONDITIONS_OF_OTHERS if here else ELSEWHERE, float(len(others)))
     return wanted
 
 
-def _values(session: Session, plotted: Sequence[Series]) -> Wanted[Value]:
-    wanted: Wanted[Value] = {}
+def _values(session: Session, plotted: Sequence[Series]) -> Wanted:
+    wanted: Wanted = {}
     for bus in _open(session):
         values = tuple(
             Value(each.address, each.word) for each in plotted if each.bus == bus.name and not each.of_motion

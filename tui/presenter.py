@@ -48,19 +48,13 @@ class Presenter:
         return View(self.session, self.model, glances, now, self.polling.on, keys=self.keymap, macros=self.macros)
 
     def tabs(self, now: float) -> list[Tab]:
-        return [
-            Tab(
-                number,
-                bus.name,
-                State.SILENT
-                if bus.silent and bus.lost is None
-                else bus_state(self.model.buses.get(bus.name), list(bus.drives), bus.lost is not None),
-                bus.name == self.session.selected_bus,
-                bus_old(self.model.buses.get(bus.name), list(bus.drives), now),
-                trouble_mark(self.model.buses.get(bus.name), list(bus.drives), bus.lost is not None),
-            )
-            for number, bus in enumerate(self.session.buses.values(), 1)
-        ]
+        tabs: list[Tab] = []
+        for number, bus in enumerate(self.session.buses.values(), 1):
+            facts, drives, lost = self.model.buses.get(bus.name), list(bus.drives), bus.lost is not None
+            state = State.SILENT if bus.silent and not lost else bus_state(facts, drives, lost)
+            selected, old = bus.name == self.session.selected_bus, bus_old(facts, drives, now)
+            tabs.append(Tab(number, bus.name, state, selected, old, trouble_mark(facts, drives, lost)))
+        return tabs
 
     def paint(self, main: MainScreen, now: float, panels: bool, page: Page | None = None) -> None:
         """Paint new records, and all else if `panels`.
@@ -124,17 +118,14 @@ class Presenter:
         screen.lines("top").put([row])
         keys = footer(screen.SHEET)
         shown = [(self.keymap.shown(key.name) if key.name else key.shown, key.word) for key in keys]
-        macros = [(self._play_key(key), name) for key, name in self.macros.shown] if screen.PLAYS else []
-        page_of_keys = (
-            [(self.keymap.shown("macro-page"), self.macros.place)] if screen.PLAYS and self.macros.place else []
-        )
-        first = [(self.keymap.shown("help"), "help"), *page_of_keys, *macros]
+        first = [(self.keymap.shown("help"), "help")]
+        plays = isinstance(screen, MainScreen)
+        if plays and self.macros.place:
+            first.append((self.keymap.shown("macro-page"), self.macros.place))
+        for key, name in self.macros.shown if plays else ():  # a person may have given it another key
+            first.append((self.keymap.shown(f"play-{key.lower()}") or key, name))
         recording, latched = bool(self.session.recording), self.session.latched and not self.session.watching
         screen.lines("footer").put([footer_row([*first, *shown], recording, latched, width, self.model.progress)])
-
-    def _play_key(self, key: str) -> str:
-        """The key that plays what is on a function key; a person may have given it another one."""
-        return self.keymap.shown(f"play-{key.lower()}") or key
 
     def label(self) -> Row:
         """The row before the input line: the drive that the line goes to, with its bus if several are open.
@@ -165,7 +156,7 @@ class Presenter:
             joined = [y + top for y, row in enumerate(rows) if row[:1] and row[0][0] in ("─", "├", "┼")]
             main.lines(name).put(rows)
         if not main.wide:
-            main.put_status(narrow_rows(view, main.size.width))
+            main.lines("status").put_all(narrow_rows(view, main.size.width))
 
 
 def trouble_mark(facts: BusFacts | None, addresses: Sequence[str], lost: bool) -> str:

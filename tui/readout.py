@@ -7,6 +7,7 @@ from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from enum import Enum
+from itertools import takewhile
 from typing import NamedTuple
 
 from multidrop.dialects.values import Conditions, Pace, Readings
@@ -50,17 +51,8 @@ class State(Enum):
     DIFFERS = ("≠", "twin", "error")
     """Of a line: a drive of it differs from its twin."""
 
-    @property
-    def sign(self) -> str:
-        return self.value[0]
-
-    @property
-    def word(self) -> str:
-        return self.value[1]
-
-    @property
-    def role(self) -> str:
-        return self.value[2]
+    def __init__(self, sign: str, word: str, role: str) -> None:
+        self.sign, self.word, self.role = sign, word, role
 
 
 READ = (State.MOVING, State.STOPPED, State.DWELL, State.NO_CURRENT)
@@ -336,12 +328,7 @@ class Readout:
         return any(each.last is not None and each.last.velocity != 0 for each in self.axes)
 
     def rate(self, now: float) -> float:
-        recent = 0
-        for point in reversed(self.points):
-            if point.at < now - 2:
-                break
-            recent += 1
-        return recent / 2
+        return sum(1 for _ in takewhile(lambda point: point.at >= now - 2, reversed(self.points))) / 2
 
     def state(self, *, storing: bool = False) -> State:
         if storing:

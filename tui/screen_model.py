@@ -145,9 +145,7 @@ class TrafficStore:
             poll = request is not None and request.priority is Priority.POLL
             address = request.address if request is not None else ""
             self._bytes += min(len(event.data), MOST_BYTES)
-            if len(self.pieces) == MOST:
-                self._bytes -= len(self.pieces.popleft().data)
-            while self.pieces and self._bytes > MOST_BYTES:
+            while self.pieces and (len(self.pieces) == MOST or self._bytes > MOST_BYTES):
                 self._bytes -= len(self.pieces.popleft().data)
             piece = Piece(event.at, event.outgoing, event.data[-MOST_BYTES:], address, poll)
             last = self.pieces[-1] if self.pieces else None
@@ -375,15 +373,15 @@ def bus_state(facts: BusFacts | None, addresses: list[str], lost: bool) -> State
         return State.LOST
     if facts is None or not addresses:
         return State.UNKNOWN
-    states = [facts.readout(address).state() for address in addresses]
+    readouts = [facts.readout(address) for address in addresses]
+    states = [each.state() for each in readouts]
     for telling in (State.MOVING, State.SILENT):
         if telling in states:
             return telling
-    if any(facts.readout(address).in_trouble for address in addresses):
+    if any(each.in_trouble for each in readouts):
         return State.TROUBLE
-    if any(facts.readout(address).differs for address in addresses):
+    if any(each.differs for each in readouts):
         return State.DIFFERS
-    readouts = [facts.readout(address) for address in addresses]
     if any(each.program.runs for each in readouts):
         return State.DWELL
     if any(state not in READ for state in states) or any(each.program.ran or each.stopped_since for each in readouts):

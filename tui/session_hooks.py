@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from datetime import datetime, timedelta
 
 from multidrop.dialects import Diagnostic
 from multidrop.dialects.text import counted, visible
 from multidrop.shell import new_file
-from multidrop.shell.channel import Field, Front
+from multidrop.shell.channel import Front
 from multidrop.shell.roles import Filter, Transcripts
 from multidrop.tui.actions import Actions, Parts
 from multidrop.tui.presenter import Presenter
@@ -18,13 +18,13 @@ from multidrop.tui.widgets.transcript import MARKS
 
 
 class Hooks:
-    """The answers of the screen to what a session asks of its front end. `closed` is called after each dialog."""
+    """The answers of the screen to what a session asks of its front end."""
 
-    def __init__(self, parts: Parts, actions: Actions, presenter: Presenter, closed: Callable[[], None]) -> None:
-        self._parts, self._actions, self._presenter, self._closed = parts, actions, presenter, closed
+    def __init__(self, parts: Parts, actions: Actions, presenter: Presenter) -> None:
+        self._parts, self._actions, self._presenter = parts, actions, presenter
         parts.session.front = Front(
             self._go_on,
-            self._fill_in,
+            parts.questions.fill,
             before_quit=self._before_quit,
             renamed=parts.selection.rename,
             edit=self._edit,
@@ -37,10 +37,7 @@ class Hooks:
 
     async def _go_on(self, question: str) -> bool:
         self._presenter.take_records(self._parts.main)
-        return await self._parts.questions.go_on(question, self._closed)
-
-    async def _fill_in(self, title: str, fields: Sequence[Field]) -> dict[str, str] | None:
-        return await self._parts.questions.fill(title, fields, self._closed)
+        return await self._parts.questions.go_on(question)
 
     async def _show_page(self, name: str) -> None:
         """Show what `/page` and `/tour` name. Raises Diagnostic, and what an opening raises."""
@@ -84,11 +81,8 @@ class Hooks:
         now = session.now()
         await asyncio.to_thread(_write, path, records, session.wall(now) - timedelta(seconds=now))
         what = f", {page.sight.filter.words}" if page.sight.filter else ""
-        older = (
-            f"; {counted(page.records.dropped, 'older line was', 'older lines were')} dropped before"
-            if page.records.dropped
-            else ""
-        )
+        dropped = page.records.dropped
+        older = f"; {counted(dropped, 'older line was', 'older lines were')} dropped before" if dropped else ""
         return f"{counted(len(records), 'line')}{what}, in {path}{older}"
 
     async def _offer_unsent(self) -> None:

@@ -11,6 +11,7 @@ import sys
 from collections import deque
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
@@ -157,7 +158,8 @@ class Feed:
 
     def __init__(self, app: MultidropApp, folder: Path) -> None:
         self._app, self._loop = app, asyncio.get_running_loop()
-        calls = Calls(app.stop_ahead, self._stop, self._joined, self._catch_up, self._left, self._refused)
+        refused = partial(app.session.notify, warning=True)
+        calls = Calls(app.stop_ahead, self._stop, self._joined, self._catch_up, self._left, refused)
         self.gate = Gate(folder, self._loop, calls)
         self._pending: list[Item] = []
         self._last: dict[tuple[str, ...], deque[Item]] = {}
@@ -242,8 +244,8 @@ class Feed:
         self._catch_up(watcher, SAMPLES)
         for bus, page in app.main.pages.items():
             kept = page.records
-            numbers = range(max(kept.first, kept.taken - HISTORY), kept.taken)
-            _put(watcher, [Item(kept[each], bus) for each in numbers if not kept[each].private])
+            last = kept.since(kept.taken - HISTORY)
+            _put(watcher, [Item(record, bus) for _, record in last if not record.private])
         app.session.notify(f"{watcher.name} watches this screen", outcome=True)
         if self._timer is None:
             self._beat()
@@ -253,9 +255,6 @@ class Feed:
             self.gate.watchers.remove(watcher)
             self._app.presenter.watchers = [each.name for each in self.gate.watchers]
             self._app.session.notify(f"{watcher.name} no longer watches this screen", outcome=True)
-
-    def _refused(self, why: str) -> None:
-        self._app.session.notify(why, warning=True)
 
     def _stop(self, name: str) -> None:
         self._app.session.stop(f"stop by {name}, who watches")

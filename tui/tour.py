@@ -21,59 +21,42 @@ ROWS = 3
 """Height of the tour: its step in words, and how to end it."""
 
 
-class Facts(NamedTuple):
-    """The events since a step began."""
-
-    lines: tuple[Entered, ...]
-    """Lines that a person sent to the demo cell."""
-    stopped: bool
-    latched: bool
-    shown: str
-    """The heading of the dialog in front, else the class of the screen."""
-
-
 class Step(NamedTuple):
-    """A task, and the test that it is done. `{NAME}` is replaced by the key of a function."""
+    """A task, and what ends it. `{NAME}` is replaced by the key of a function."""
 
     words: str
-    done: Callable[[Facts], bool]
-
-
-def _typed(*begins: str) -> Callable[[Facts], bool]:
-    """True once a line that begins so was sent."""
-    return lambda facts: any(line.line.upper().startswith(begins) for line in facts.lines)
+    until: str
+    """`typed LINE`: a line was sent that begins so; `shown NAME`: that dialog or screen is in front."""
 
 
 STEPS = (
-    Step("Drive a answers in its own language. Type PR P and press Enter: it prints its position.", _typed("PR P")),
-    Step("Now a move: type MR 512000 and press Enter. Its row shows the travel and what is left of it.", _typed("MR")),
-    Step("Another drive of the same line: @b PR P goes to drive b, whatever is selected.", _typed("@B")),
-    Step("{page-drives} shows all drives of all lines, the worst first.", lambda facts: facts.shown == "AllDrives"),
-    Step("Escape goes back from every page.", lambda facts: facts.shown == "MainScreen"),
-    Step("Let drive a run without end: SL 100000 and Enter.", _typed("SL")),
-    Step("^X stops every drive, macro and script, from anywhere, always. Press it now.", lambda facts: facts.stopped),
+    Step("Drive a answers in its own language. Type PR P and press Enter: it prints its position.", "typed PR P"),
+    Step("Now a move: type MR 512000 and press Enter. Its row shows the travel and what is left of it.", "typed MR"),
+    Step("Another drive of the same line: @b PR P goes to drive b, whatever is selected.", "typed @B"),
+    Step("{page-drives} shows all drives of all lines, the worst first.", "shown AllDrives"),
+    Step("Escape goes back from every page.", "shown MainScreen"),
+    Step("Let drive a run without end: SL 100000 and Enter.", "typed SL"),
+    Step("^X stops every drive, macro and script, from anywhere, always. Press it now.", "stopped"),
     Step(
         "STOPPED below the tabs means: velocity 0 was read from every drive. Macros and scripts wait: type /resume.",
-        lambda facts: not facts.latched,
+        "resumed",
     ),
-    Step(
-        "{palette} finds everything by name. Open it, look, and close it with Escape.",
-        lambda f: f.shown == "Everything",
-    ),
-    Step("{help} is help for where you are. Open it and type a word, then Escape.", lambda f: f.shown == "Help"),
+    Step("{palette} finds everything by name. Open it, look, and close it with Escape.", "shown Everything"),
+    Step("{help} is help for where you are. Open it and type a word, then Escape.", "shown Help"),
 )
 END = "That was the tour. The demo cell stays open; /close closes a line. Escape ends the tour."
 
 
 class Tour:
-    """The tour of one app. `front` names the screen in front."""
+    """The tour of one app. `front` returns the heading of the dialog in front, else the class of the screen."""
 
     def __init__(self, session: Session, keys: Keymap, front: Callable[[], str]) -> None:
         self._session, self._keys, self._front = session, keys, front
         self.bus = ""
         """The simulated line that it is on; empty while there is no tour."""
         self._at = 0
-        self._lines: tuple[Entered, ...] = ()
+        self._lines: list[str] = []
+        """Lines that a person sent to the demo cell since the step began, in capitals."""
         self._stops = 0
         session.subscribe(self._take)
 
@@ -100,18 +83,27 @@ class Tour:
 
     def _take(self, event: SessionEvent) -> None:
         if isinstance(event, Entered) and event.by is By.OPERATOR and event.bus == self.bus and self.on:
-            self._lines = (*self._lines, event)
+            self._lines.append(event.line.upper())
 
     def _next(self, at: int) -> None:
-        self._at, self._lines, self._stops = at, (), self._session.stops
+        self._at, self._lines, self._stops = at, [], self._session.stops
+
+    def _is_done(self, until: str) -> bool:
+        what, _, text = until.partition(" ")
+        match what:
+            case "typed":
+                return any(line.startswith(text) for line in self._lines)
+            case "shown":
+                return self._front() == text
+            case "stopped":
+                return self._session.stops != self._stops
+            case _:
+                return not self._session.latched
 
     def rows(self, width: int) -> list[Row]:
         """The step in words; goes on to the next one once it was done."""
-        if self.on and self._at < len(STEPS):
-            shown = self._front()
-            stopped = self._session.stops != self._stops
-            if STEPS[self._at].done(Facts(self._lines, stopped, self._session.latched, shown)):
-                self._next(self._at + 1)
+        if self.on and self._at < len(STEPS) and self._is_done(STEPS[self._at].until):
+            self._next(self._at + 1)
         words = [f" {row}" for row in at_words(self._words(), width - 2)][: ROWS - 1]
         last = f" tour {min(self._at + 1, len(STEPS))} of {len(STEPS)}   Esc ends it"
         rows: list[Row] = [((row, "strong"),) for row in words]

@@ -11,6 +11,7 @@ from __future__ import annotations
 import asyncio
 import re
 from collections.abc import Callable
+from dataclasses import dataclass, field
 
 from multidrop.dialects.files import split_lines
 from multidrop.dialects.text import counted
@@ -27,27 +28,22 @@ from multidrop.tui.widgets.entry import LONGEST
 from multidrop.tui.widgets.lines import Row
 
 
+@dataclass(eq=False, repr=False)
 class Selection:
-    """Makes the main screen follow the session's selection.
+    """Makes the main screen follow the session's selection."""
 
-    `label` returns the row before the input line, `turn_deaf` discards keys until a pause, `show_line` shows a line.
-    """
-
-    def __init__(
-        self,
-        session: Session,
-        model: ScreenModel,
-        main: MainScreen,
-        label: Callable[[], Row],
-        turn_deaf: Callable[[], None],
-        show_line: Callable[[str, str], None],
-    ) -> None:
-        self._session, self._model, self._main = session, model, main
-        self._label, self._turn_deaf, self._show_line = label, turn_deaf, show_line
-        self.shown = Place("", "")
-        """The drive that the screen shows."""
-        self._meant = False
-        """A typed `/use` selected another drive than the one that is shown."""
+    _session: Session
+    _model: ScreenModel
+    _main: MainScreen
+    _label: Callable[[], Row]
+    """Returns the row before the input line."""
+    _turn_deaf: Callable[[], None]
+    """Discards keys until a pause."""
+    _show_line: Callable[[str, str], None]
+    shown: Place = Place("", "")
+    """The drive that the screen shows."""
+    _meant: bool = False
+    """A typed `/use` selected another drive than the one that is shown."""
 
     def select(self, address: str, bus: str = "") -> None:
         """Select a drive or a bus; show why that is not possible."""
@@ -113,25 +109,21 @@ NOT_TEXT = r"[^\t\r\n -~\xa0-\U0010ffff]"
 """A key that is not text."""
 
 
+@dataclass(eq=False, repr=False)
 class Unsent:
-    """The lines of one main screen that a stop drops. `keep` stores a line in the history, `warn` shows one."""
+    """The lines of one main screen that a stop drops. `_keep` stores a line in the history, `_warn` shows one."""
 
-    def __init__(
-        self,
-        main: MainScreen,
-        model: ScreenModel,
-        clock: Callable[[], float],
-        keep: Callable[[str], None],
-        warn: Callable[[str], None],
-    ) -> None:
-        self._main, self._model, self._clock = main, model, clock
-        self._keep, self._warn = keep, warn
-        self._half: str | None = None
-        """The text of the line when the last stop came, until it is reported; None while a dialog was open."""
-        self._cut: list[str] = [""]
-        """Text that was typed after it and dropped, by stop; it arrives in pieces."""
-        self._gathering = False
-        """A stop came, and the lines are not emptied yet: more pieces may come."""
+    _main: MainScreen
+    _model: ScreenModel
+    _clock: Callable[[], float]
+    _keep: Callable[[str], None]
+    _warn: Callable[[str], None]
+    _half: str | None = None
+    """The text of the line when the last stop came, until it is reported; None while a dialog was open."""
+    _cut: list[str] = field(default_factory=lambda: [""])
+    """Text that was typed after it and dropped, by stop; it arrives in pieces."""
+    _gathering: bool = False
+    """A stop came, and the lines are not emptied yet: more pieces may come."""
 
     def stopped(self, half: str | None) -> None:
         """Note the half-typed line when a stop comes; None if a dialog had the keys."""
@@ -182,24 +174,19 @@ class Unsent:
         self._model.page(bus).append(Record(self._clock(), "", "!", f"not sent: {text}"))
 
 
+@dataclass(eq=False, repr=False)
 class Typist:
     """Takes the lines of the main screen."""
 
-    def __init__(
-        self,
-        session: Session,
-        main: MainScreen,
-        assist: Assist,
-        outbox: Outbox,
-        selection: Selection,
-        unsent: Unsent,
-        keyboard: Keyboard,
-        questions: Questions,
-    ) -> None:
-        self._session, self._main, self._assist = session, main, assist
-        self._outbox, self._selection, self._unsent = outbox, selection, unsent
-        self._keyboard, self._questions = keyboard, questions
-        self._meaning = ""
+    _session: Session
+    _main: MainScreen
+    _assist: Assist
+    _outbox: Outbox
+    _selection: Selection
+    _unsent: Unsent
+    _keyboard: Keyboard
+    _questions: Questions
+    _meaning: str = ""
 
     def edited(self) -> None:
         text = self._main.entry.value

@@ -11,10 +11,15 @@ import pytest
 from textual import events
 from textual.pilot import Pilot
 
+from multidrop.dialects.files import rows
 from multidrop.shell.channel import Field as Wanted
-from multidrop.tui.app import MultidropApp
+from multidrop.tui import palette
+from multidrop.tui.actions import Actions
+from multidrop.tui.app import MultidropApp, bindings
 from multidrop.tui.key_table import SHEETS, all_groups
+from multidrop.tui.keymap import keymap
 from multidrop.tui.screens.dialogs import Field
+from multidrop.tui.screens.main_screen import MainScreen
 from multidrop.tui.screens.page import PAGES
 from tests.support import key_docs
 from tests.support.fake_session import FakeSession, a_move, a_talk, demo_session, make_app, settle
@@ -154,9 +159,9 @@ async def opened(app: MultidropApp, name: str) -> None:
     elif name == "answers":
         await app.questions.paste(["MR 1", "MR 2"], lambda lines: None)
     elif name == "question":
-        app.run_worker(app.questions.go_on("Send it?", lambda: None))
+        app.run_worker(app.questions.go_on("Send it?"))
     else:
-        app.run_worker(app.questions.fill("go", [Wanted("speed", "a number", "5", lambda text: "")], lambda: None))
+        app.run_worker(app.questions.fill("go", [Wanted("speed", "a number", "5", lambda text: "")]))
 
 
 BOXES = {
@@ -187,3 +192,12 @@ async def test_every_key_of_a_box_is_noticed_and_the_stop_works_after_it(name: s
             assert session.stops > stops, f"the stop after {key} on {name}"
             await settle(pilot)
             assert app.screen is app.main and not app.main.reader.open
+
+
+def test_every_command_of_the_palette_has_an_action_and_a_key_that_can_be_set() -> None:
+    targets = {"act": Actions, "app": MultidropApp, "": MainScreen}
+    named = keymap(bindings(), {}).keys
+    for row in rows(palette.__file__, "commands.csv"):
+        target, _, action = row["action"].partition("(")[0].rpartition(".")
+        assert hasattr(targets[target], f"action_{action}"), row
+        assert row["key"] in {"", *named} or row["key"].startswith("/"), row

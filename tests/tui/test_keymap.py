@@ -110,7 +110,7 @@ async def test_a_wrong_setting_is_said_at_the_start() -> None:
         shown = app.main.page("press").plain
         assert "multidrop.toml: keys.nothing: no such function" in shown
         assert "multidrop.toml: screen.theme: no theme no-such" in shown
-        assert app._signs.font is Signs.ASCII
+        assert app.signs.font is Signs.ASCII
 
 
 @pytest.mark.tui

@@ -174,12 +174,8 @@ class Frame(NamedTuple):
         return self.first + self.columns - 1
 
 
-@dataclass(frozen=True)
-class _Drawn:
-    """One column of cells from top to bottom: signs, and the series to which each belongs."""
-
-    signs: tuple[str, ...]
-    owners: tuple[int, ...]
+Cells = tuple[tuple[str, ...], tuple[int, ...]]
+"""A column or a row of cells: signs, and the series to which each belongs."""
 
 
 class Curve(NamedTuple):
@@ -195,11 +191,11 @@ class Raster:
     """Draws curves, and keeps what it drew."""
 
     def __init__(self) -> None:
-        self._kept: dict[int, _Drawn] = {}
+        self._kept: dict[int, Cells] = {}
         self._valid: object = None
         self._seen: list[tuple[int, int]] = []
         """For each curve, the samples taken and the newest column at the last drawing."""
-        self._rows: list[tuple[tuple[str, ...], tuple[int, ...]]] = []
+        self._rows: list[Cells] = []
         self._runs: list[list[Run]] = []
         """The rows of the last picture, by cells and by runs."""
         self.drawn = 0
@@ -224,14 +220,14 @@ class Raster:
         if len(self._kept) > 3 * frame.columns:
             self._kept = {x: self._kept[x] for x in range(frame.first, frame.last + 1)}
         shown = [self._kept[x] for x in range(frame.first, frame.last + 1)]
-        signs = zip(*(each.signs for each in shown), strict=True)
-        owners = zip(*(each.owners for each in shown), strict=True)
+        signs = zip(*(signs for signs, _ in shown), strict=True)
+        owners = zip(*(owners for _, owners in shown), strict=True)
         before, self._rows = self._rows, list(zip(signs, owners, strict=True))
         same = len(before) == len(self._rows)
         self._runs = [self._runs[y] if same and row == before[y] else _runs(*row) for y, row in enumerate(self._rows)]
         return self._runs
 
-    def _column(self, curves: Sequence[Curve], frame: Frame, x: int) -> _Drawn:
+    def _column(self, curves: Sequence[Curve], frame: Frame, x: int) -> Cells:
         """Draw one column of cells; where curves meet, the cell shows the dots of all, and belongs to the first."""
         self.drawn += 1
         ink, rows = frame.ink, frame.rows
@@ -247,7 +243,7 @@ class Raster:
                     dots[y // ink.tall] |= 1 << (side * ink.tall + y % ink.tall)
                     owners[y // ink.tall] = number
         signs = (ink.glyph(each, owner) if each else " " for each, owner in zip(dots, owners, strict=True))
-        return _Drawn(tuple(signs), tuple(owners))
+        return tuple(signs), tuple(owners)
 
 
 def _span(column: Column, scale: Scale, dots: int) -> tuple[int, int] | None:

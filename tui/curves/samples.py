@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from array import array
 from bisect import bisect_left
+from collections import defaultdict
 from collections.abc import Iterator
 from math import floor, nan
 from typing import NamedTuple
@@ -77,22 +78,19 @@ class Trace:
         age = now - self.at[-1]
         return age if age > max(OVERDUE, 3 * min(self.at[-1] - self.at[-2], OVERDUE)) else 0.0
 
-    def rate(self, now: float, over: float = 2.0) -> float:
-        """Samples per second over the last seconds."""
-        return (len(self.at) - bisect_left(self.at, now - over)) / over
+    def rate(self, now: float) -> float:
+        """Samples per second over the last two."""
+        return (len(self.at) - bisect_left(self.at, now - 2.0)) / 2.0
 
 
 class Traces:
     """The traces of all that is plotted or shown."""
 
     def __init__(self) -> None:
-        self._traces: dict[Quantity, Trace] = {}
+        self._traces: defaultdict[Quantity, Trace] = defaultdict(Trace)
 
     def add(self, quantity: Quantity, at: float, value: float) -> None:
-        trace = self._traces.get(quantity)
-        if trace is None:
-            trace = self._traces[quantity] = Trace()
-        trace.add(at, value)
+        self._traces[quantity].add(at, value)
 
     def take(self, bus: str, event: Sample | Valued) -> None:
         if isinstance(event, Valued):
@@ -117,9 +115,8 @@ class Traces:
         return [each.axis for each in self._traces if each[:2] == (bus, address) and each.word == "position"]
 
     def rename(self, before: str, now: str) -> None:
-        self._traces = {
-            each._replace(bus=now) if each.bus == before else each: trace for each, trace in self._traces.items()
-        }
+        for each in [each for each in self._traces if each.bus == before]:
+            self._traces[each._replace(bus=now)] = self._traces.pop(each)
 
     def forget(self, bus: str) -> None:
         for each in [each for each in self._traces if each.bus == bus]:

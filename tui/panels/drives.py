@@ -65,7 +65,10 @@ def narrow_rows(view: View, width: int) -> list[Row]:
     if chosen is None:
         return [((fit(" no drive selected   ^O chooses one", width), "dim"),), ()]
     shown = kept(view.glances, MOST)
-    rows = [row for glance in shown for row in _drive_rows(glance, now, width)]
+    rows: list[Row] = []
+    for glance in shown:  # a row for each axis of the selected drive, and one for any other drive
+        axes = glance.readout.axes if glance.selected else [glance.readout]
+        rows += [_axis_row(glance, axis, now, width, first=axis is glance.readout) for axis in axes]
     others = len(view.glances) - len(shown)
     more = f"+{others} ^A   " if others else ""
     twin = difference_words(chosen.readout)
@@ -91,12 +94,6 @@ def _troubled(glance: Glance) -> bool:
     return in_trouble or glance.state() in (State.SILENT, State.LOST)
 
 
-def _drive_rows(glance: Glance, now: float, width: int) -> list[Row]:
-    """A row for each axis of the selected drive, and one for any other drive."""
-    axes = glance.readout.axes if glance.selected else [glance.readout]
-    return [_axis_row(glance, axis, now, width, first=axis is glance.readout) for axis in axes]
-
-
 def _axis_row(glance: Glance, axis: Readout, now: float, width: int, *, first: bool) -> Row:
     """Name, state, place in the travel, position, velocity, and what matters most besides."""
     position, velocity, role = glance.values(now, axis)
@@ -105,7 +102,7 @@ def _axis_row(glance: Glance, axis: Readout, now: float, width: int, *, first: b
     per, beyond = "" if own_speed else "/s", max(0, len(position) - NUMBER)
     row: list[Span] = [
         _name(glance, axis, first=first),
-        (short_words(glance, axis, now), _state_role(glance, now)),
+        (short_words(glance, axis, now), glance.sign(now)[1]),
         (f"{bar(axis, BAR)} ", "dim" if role == "dim" else "text"),
         (f"{position:>{NUMBER}}", role),
         (f"{f' {velocity}{per}' if moves else '':>{max(0, VELOCITY - beyond)}} ", role),
@@ -121,10 +118,6 @@ def _name(glance: Glance, axis: Readout, *, first: bool) -> Span:
     shown = f"{name} {axis.axis}".rstrip() if first else axis.axis.rjust(len(name) + 1 if axis.axis else 0)
     text = Link(f"{pointer}{fit(shown, NAME - 1)} ", f"act.select({glance.address!r})")
     return text, "accent" if glance.selected else "text"
-
-
-def _state_role(glance: Glance, now: float) -> str:
-    return glance.sign(now)[1]
 
 
 def short_words(glance: Glance, axis: Readout, now: float) -> str:
@@ -173,10 +166,10 @@ def drives_rows(view: View, width: int, height: int) -> list[Row]:
 
 def _panel_row(glance: Glance, now: float, width: int) -> Row:
     position, _, role = glance.values(now)
-    state = glance.state()
+    state, state_role = glance.state(), glance.sign(now)[1]
     row: list[Span] = [
         _name(glance, glance.readout, first=True),
-        (f"{state.sign} ", _state_role(glance, now)),
+        (f"{state.sign} ", state_role),
         (f"{position:>{NUMBER}} ", "text" if role == "strong" else role),
     ]
     room = width - width_of(row)
@@ -187,7 +180,7 @@ def _panel_row(glance: Glance, now: float, width: int) -> Row:
         text = differs(glance.readout, causes=False)
     stale = role == "dim" and state is not State.UNKNOWN and not text
     if state in (State.SILENT, State.LOST, State.STORING) or stale:
-        text, text_role = short_words(glance, glance.readout, now)[2:].strip(), _state_role(glance, now)
+        text, text_role = short_words(glance, glance.readout, now)[2:].strip(), state_role
     shown = min(len(text) + 1, room) if text else 0
     drawn = spark(glance.readout, now, room - shown)
     return (*row, (drawn, "dim" if role == "dim" else "accent"), (fit(f" {text}", shown), text_role))

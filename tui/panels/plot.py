@@ -12,6 +12,7 @@ from typing import NamedTuple
 
 from multidrop.tui.curves.chart import Chart, Extent, Look, Window
 from multidrop.tui.curves.raster import CURSOR, EMPTY, TWINS, Scale, row_of, ticks, with_cursor
+from multidrop.tui.curves.samples import Quantity
 from multidrop.tui.curves.trigger import State
 from multidrop.tui.panels.plotted import PLOTTED, Group, Line, groups, role_of
 from multidrop.tui.panels.view import View
@@ -48,7 +49,11 @@ def chart_rows(view: View, shown: Shown, window: Window, height: int) -> list[Ro
         return []
     look = view.model.look
     scale = _scale(view, shown, height)
-    lines = [(line.quantity, line.stroke, _own_scale(line, scale)) for line in shown.moving]
+    lines: list[tuple[Quantity, int, Scale]] = []
+    for line in shown.moving:  # each in the numbers that are plotted, whose scale falls where their sign is turned
+        gain, zero = line.conversion
+        own = Scale((scale.low - zero) / gain, (scale.high - zero) / gain, scale.step)
+        lines.append((line.quantity, line.stroke, own))
     drawn = shown.chart.draw(lines, window, height, scale, look.ink)
     marks = ticks(scale, height)
     cursors = [
@@ -90,12 +95,6 @@ def _scale(view: View, shown: Shown, rows: int) -> Scale:
     middle, convert = newest if centre is None else centre, first.conversion
     least = LEAST.get(word, 1.0) * abs(convert.gain)
     return shown.chart.scale(extents, least, word == "velocity", look.zoom, convert.value(middle), rows)
-
-
-def _own_scale(line: Line, scale: Scale) -> Scale:
-    """The scale of a chart in the numbers that are plotted; it falls where their sign is turned."""
-    gain, zero = line.conversion
-    return Scale((scale.low - zero) / gain, (scale.high - zero) / gain, scale.step)
 
 
 def time_row(view: View, window: Window) -> Row:

@@ -11,11 +11,10 @@ from multidrop.shell.roles import DIFFERENCE, Series
 from multidrop.tui.curves.chart import Extent
 from multidrop.tui.curves.raster import TWINS
 from multidrop.tui.curves.samples import PREDICTED, Quantity
-from multidrop.tui.figures import NATIVE, Conversion, Figures
+from multidrop.tui.figures import NATIVE, Conversion, Figures, fixed
 from multidrop.tui.panels.view import View
 from multidrop.tui.polling import moved_lately, plotted
 from multidrop.tui.readout import Readout
-from multidrop.tui.text import digits
 from multidrop.tui.widgets.lines import SERIES
 
 PLOTTED = ("velocity", "position")
@@ -55,17 +54,16 @@ class Line(NamedTuple):
 
     def text(self, plotted: float) -> str:
         """A plotted value; in units with its unit, else a whole number has no decimals."""
-        figures, value = self.figures, self.conversion.value(plotted)
-        if figures.unit and self.unit:
-            return f"{round(value, figures.decimals) + 0.0:.{figures.decimals}f} {self.unit}"
-        return digits(int(value)) if value == int(value) else f"{value:.3f}"
+        return self._written(self.conversion.value(plotted), "-")
 
     def apart(self, difference: float) -> str:
         """A difference of two plotted values."""
-        figures, value = self.figures, self.conversion.gain * difference
-        if figures.unit and self.unit:
-            return f"{round(value, figures.decimals) + 0.0:+.{figures.decimals}f} {self.unit}"
-        return f"{int(value):+}" if value == int(value) else f"{value:+.3f}"
+        return self._written(self.conversion.gain * difference, "+")
+
+    def _written(self, value: float, sign: str) -> str:
+        if self.figures.unit and self.unit:
+            return f"{fixed(value, self.figures.decimals, sign)} {self.unit}"
+        return f"{int(value):{sign}}" if value == int(value) else f"{value:{sign}.3f}"
 
     def extent(self, plotted: Extent) -> Extent:
         """A plotted extent in the unit that is shown."""

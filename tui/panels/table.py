@@ -52,9 +52,10 @@ def log_rows(view: View, width: int, height: int) -> list[Row]:
     log = view.session.log
     if log is None:
         return [((fit(text, width), "dim"),) for text in OFF]
-    rows: list[Row] = [((" ", "text"), (_end_of(visible(str(log.path)), width - 1), "dim"))]
-    last = log.last(height - 1)
-    return rows + [((fit(f" {text}", width), "text"),) for text in last]
+    path = visible(str(log.path))
+    end = path if len(path) < width else f"…{path[2 - width :]}"  # where file names differ
+    rows: list[Row] = [((" ", "text"), (end, "dim"))]
+    return rows + [((fit(f" {text}", width), "text"),) for text in log.last(height - 1)]
 
 
 def size_words(size: int) -> str:
@@ -62,11 +63,6 @@ def size_words(size: int) -> str:
     if size < 1000:
         return f"{size} B"
     return f"{size / 1000:.0f} kB" if size < 1e6 else f"{size / 1e6:.1f} MB"
-
-
-def _end_of(path: str, width: int) -> str:
-    """Shorten a path to its end, where file names differ."""
-    return path if len(path) <= width else f"…{path[1 - width :]}"
 
 
 def traffic_rows(view: View, width: int, height: int) -> list[Row]:
@@ -143,50 +139,16 @@ class Panel(NamedTuple):
     """Whether it has something to show; if not, the next one in its place is shown."""
 
 
+_ALL, _FAST, _FREE = frozenset({MOTION, CONDITIONS}), frozenset({MOTION, PLOT}), frozenset[str]()
 PANELS: tuple[Panel, ...] = (
-    Panel(
-        "drive",
-        drive_title,
-        selected_rows,
-        9,
-        14,
-        frozenset({MOTION, CONDITIONS}),
-        "position, travel, state, lamps, error and program",
-    ),
-    Panel("drives", "drives", drives_rows, 3, 12, frozenset({MOTION, CONDITIONS}), "every drive of the line in a row"),
-    Panel(
-        "program",
-        program_title,
-        program_rows,
-        3,
-        60,
-        frozenset({MOTION, CONDITIONS}),
-        "the lines around the current one",
-        shows=program_shows,
-    ),
-    Panel("next", "what to press", next_rows, 3, 60, frozenset(), "keys, macros and lines that go on from here"),
-    Panel(
-        "plot",
-        plot_title,
-        panel_rows,
-        8,
-        60,
-        frozenset({MOTION, PLOT}),
-        "velocity and position of what moves",
-        shows=plot_shows,
-    ),
-    Panel("cards", "lines and drives", cards_rows, 3, 60, frozenset(), "what every line and drive is"),
-    Panel("traffic", traffic_title, traffic_rows, 3, 40, frozenset(), "the bytes of the line, both ways", first=False),
-    Panel(
-        "log",
-        log_title,
-        log_rows,
-        2,
-        12,
-        frozenset(),
-        "the session log: where, how large, its last entries",
-        first=False,
-    ),
+    Panel("drive", drive_title, selected_rows, 9, 14, _ALL, "position, travel, state, lamps, error and program"),
+    Panel("drives", "drives", drives_rows, 3, 12, _ALL, "every drive of the line in a row"),
+    Panel("program", program_title, program_rows, 3, 60, _ALL, "the lines around the current one", shows=program_shows),
+    Panel("next", "what to press", next_rows, 3, 60, _FREE, "keys, macros and lines that go on from here"),
+    Panel("plot", plot_title, panel_rows, 8, 60, _FAST, "velocity and position of what moves", shows=plot_shows),
+    Panel("cards", "lines and drives", cards_rows, 3, 60, _FREE, "what every line and drive is"),
+    Panel("traffic", traffic_title, traffic_rows, 3, 40, _FREE, "the bytes of the line, both ways", first=False),
+    Panel("log", log_title, log_rows, 2, 12, _FREE, "the session log: where, how large, its last entries", first=False),
 )
 
 

@@ -49,20 +49,20 @@ class Glance:
         """The state as last read; LOST on a lost bus, where nothing else is known."""
         return State.LOST if self.lost else self.readout.state(storing=self.storing)
 
-    def sign(self, now: float, width: int = STATE) -> Span:
+    def sign(self, now: float) -> Span:
         state = self.state()
         words = state.word if self.lost else self.readout.words(now, storing=self.storing)
         aged = state in READ and self.readout.old(now)
         if state is State.NO_CURRENT and self.readout.touched > self.readout.conditioned_at:
             aged = True  # a line was sent since, which may have switched it on
         aged = aged or (state is State.DWELL and self.readout.program_aged(now))
-        return fit(f"{state.sign} {words}", width), "dim" if aged else state.role
+        return fit(f"{state.sign} {words}", STATE), "dim" if aged else state.role
 
     def values(self, now: float, axis: Readout | None = None) -> tuple[str, str, str]:
         """Position and velocity, each with its unit if they have one, and their role: dim unless they are current."""
-        last = (axis or self.readout).last
-        dim = self.lost or self.readout.silent_since is not None or self.readout.old(now) or self.storing
         axis = axis or self.readout
+        last = axis.last
+        dim = self.lost or self.readout.silent_since is not None or self.readout.old(now) or self.storing
         sign = "" if last is None or self.counts(axis) else UNREFERENCED
         position = sign + axis.figures.place(None if last is None else last.position)
         velocity = axis.figures.speed(None if last is None else last.velocity)

@@ -5,13 +5,10 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Awaitable, Sequence
 from dataclasses import replace
-from typing import ClassVar, NamedTuple
-
-from textual.binding import BindingType
+from typing import NamedTuple
 
 from multidrop.dialects.text import visible
 from multidrop.shell.roles import Series
-from multidrop.tui.key_table import bound
 from multidrop.tui.panels.drive import SIGN, alarm_words, program_words, trouble_of
 from multidrop.tui.panels.drives import STATE, short_words, spark
 from multidrop.tui.panels.facts import selected_rows
@@ -53,13 +50,10 @@ class Place(NamedTuple):
         where = ":".join(filter(None, (self.bus, self.glance.address)))
         return f"{where} {self.glance.label}".strip()
 
-    @property
-    def trouble(self) -> str:
-        return "; ".join(filter(None, map(trouble_of, self.glance.readout.axes)))
-
     def alarm(self, room: int = 200) -> str:
         """Its trouble, and the differences of its axes from their twins."""
-        return alarm_words(self.trouble, self.glance.readout.axes, room)
+        axes = self.glance.readout.axes
+        return alarm_words("; ".join(filter(None, map(trouble_of, axes))), axes, room)
 
     def besides(self, room: int, now: float) -> Span:
         """The fact that matters most besides its state: trouble and its twin, its program, else its product."""
@@ -145,7 +139,6 @@ class AllDrives(ListPage):
     """All drives. Enter selects one; what is typed filters."""
 
     SHEET = "drives"
-    BINDINGS: ClassVar[list[BindingType]] = bound("drives")
     WANTS = frozenset({"motion", "conditions"})
     PARTS = {"heading": None, "filter": None, "columns": None, "drives": "1fr", "chosen": 0}
     FIELD, LIST = "filter", "drives"
@@ -168,8 +161,7 @@ class AllDrives(ListPage):
         drives = sum(len(bus.drives) for bus in view.session.buses.values())
         room = self.size.height - HEAD - max(FEWEST, drives)
         room = room if width >= WIDE and room >= LEAST else 0
-        if part.styles.height is None or part.styles.height.value != room:
-            part.styles.height = room
+        part.styles.height = room
         part.put(self._chosen_rows(view, at, width, room) if room and self._places else [])
         below = self.put_rows(self._places, at, lambda place, chosen: drive_row(place, now, width, chosen), [_NOTHING])
         heading: Row = ((" ALL DRIVES   ", "strong"), (summary(self._places), "text"))
@@ -195,7 +187,6 @@ class AllDrives(ListPage):
             self.choose(min(max(self._at() + by, 0), len(self._places) - 1))
 
     def choose(self, at: int) -> None:
-        """Choose a row by its place."""
         if at < len(self._places):
             self._chosen = (self._places[at].bus, self._places[at].glance.address)
 

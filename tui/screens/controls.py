@@ -20,11 +20,10 @@ from textual.binding import Binding, BindingType
 
 from multidrop.dialects.text import counted
 from multidrop.dialects.values import BY, DISABLE, ENABLE, HIGH, HOME_MINUS, HOME_PLUS, LOW, STOP, TO, Control, Controls
-from multidrop.tui.key_table import bound
 from multidrop.tui.panels.drive import drive_rows, unit_of
 from multidrop.tui.panels.view import Glance, View, name_of
 from multidrop.tui.readout import READ, Readout, State
-from multidrop.tui.screens.page import AskingPage, Begun, Host
+from multidrop.tui.screens.page import Host, SendingPage
 from multidrop.tui.text import fit
 from multidrop.tui.widgets.lines import Row, Span, spread, width_of
 
@@ -101,14 +100,12 @@ WORD = 10
 LINE = 22
 
 
-class ControlsPage(AskingPage):
+class ControlsPage(SendingPage):
     """Controls of the selected drive."""
 
-    AUTO_FOCUS = ""
     SHEET = "controls"
     BINDINGS: ClassVar[list[BindingType]] = [
-        *bound("controls"),
-        *(Binding(each, "drop", show=False) for each in ascii_letters + digits if each not in "lmbhed"),
+        Binding(each, "drop", show=False) for each in ascii_letters + digits if each not in "lmbhed"
     ]
     WANTS = frozenset({"motion", "conditions"})
     PARTS = {"heading": None, "drive": "auto", "controls": "1fr", "number": None, "said": None}
@@ -119,13 +116,8 @@ class ControlsPage(AskingPage):
         self.step = FIRST_STEP
         self._jog = Jog()
         self._axis = 0
-        self._asked: Begun | None = None
-        self._begun: Begun | None = None
-        """The control that Enter would send."""
         self._homing = False
         """The next key may be the direction of a homing."""
-        self._painted = False
-        """The line of that control was shown, and no key waited then that was typed before."""
         self._place = host.session.place
         self._view: View | None = None
 
@@ -143,30 +135,26 @@ class ControlsPage(AskingPage):
         place = view.session.place
         if place != self._place:
             self._place, self._axis, self._jog = place, 0, Jog()
-        asked = self._asked
-        if asked is not None and self.overtaken(asked):
+        asked = self.asked
+        if asked is not None and asked.overtaken(self.host.session):
             self._close("stopped; the number was not used" if asked.place == place else "another drive is selected")
-        begun = self._begun
-        if begun is not None and self.overtaken(begun):
-            self._begun = None
+        begun = self.begun
+        if begun is not None and begun.overtaken(self.host.session):
+            self.begun = None
             self.say("stopped; nothing was sent" if begun.place == place else "another drive is selected")
         if view.model.trouble:
             self.say(f"✗ {view.model.trouble}")
-            view.model.trouble, self._begun = "", None
+            view.model.trouble, self.begun = "", None
         self._jog.look(view.now, idle=self.host.outbox.idle)
         glance, width = view.chosen, self.size.width
         bus = view.session.selected_bus
         name = f"{bus}:{name_of(glance)}" if glance is not None else "no drive selected"
         right: Row = (("each key press is one move; ^X stops all ", "dim"),)
         self.lines("heading").put([spread([(" CONTROLS   ", "strong"), (name, "accent")], right, width)])
-        drive = self.lines("drive")
-        rows = drive_rows(view, width, max(3, self.size.height - 18))
-        if drive.styles.height is None or drive.styles.height.value != len(rows):
-            drive.styles.height = len(rows)
-        drive.put(rows)
+        self.lines("drive").put_all(drive_rows(view, width, max(3, self.size.height - 18)))
         self.lines("controls").put(self._rows(view, glance, width))
         self.lines("said").put([((" ", "text"), (fit(self.said[0], width - 2), self.said[1]))])
-        self._painted = self._begun is not None and (self._painted or self.host.keyboard.idle)
+        self.painted = self.begun is not None and (self.painted or self.host.keyboard.idle)
 
     def _rows(self, view: View, glance: Glance | None, width: int) -> list[Row]:
         controls = self._controls()
@@ -240,14 +228,14 @@ class ControlsPage(AskingPage):
         )
 
     def action_step(self, by: int) -> None:
-        self._begun = None
+        self.begun = None
         larger = [each for each in STEPS if each > self.step]
         smaller = [each for each in STEPS if each < self.step]
         found = larger[:1] if by > 0 else smaller[-1:]
         self.step = found[0] if found else self.step
 
     def action_axis(self) -> None:
-        self._begun = None
+        self.begun = None
         chosen = self._chosen()
         if chosen is not None:
             self._axis = (self._axis + 1) % len(chosen[0].readout.axes)
@@ -255,45 +243,36 @@ class ControlsPage(AskingPage):
 
     def action_jog(self, sign: int) -> None:
         """Move by one step, if the drive is known to rest; else drop the press."""
-        self._begun = None
+        self.begun = None
         self._move(BY, sign * self.step)
 
     def action_do(self, key: str) -> None:
         """Stop at once; every other control waits for Enter, as a letter alone neither moves nor lets go."""
         name = KEYED[key]
         control = self._controls().get(name)
-        self._begun, self._homing = None, False
+        self.begun, self._homing = None, False
         if name == STOP and control is not None and not control.absent:
             self.host.outbox.at_once(control.filled())
-            self._tell(control.filled())
+            self.say(f"sent: {', '.join(control.filled())}", "dim")
         elif nothing := self._nothing():
             self.say(nothing)
         elif control is None or control.absent:
             self.say(f"no {WORDS[name]}: {control.absent}" if control is not None else NO_CONTROLS)
         else:
-            self._begun = self.begin(key)
-            self._painted = False
+            self.offer(key, control.filled())
             about = f" - {control.about}" if control.about else ""
             self.say(f"Enter sends {', '.join(control.filled())}{about}   Esc: nothing")
 
     def action_go(self) -> None:
         """Send the control that was begun, unless a stop or another drive came in between."""
-        if self._begun is not None and not self._painted:
-            return  # an Enter that was typed before the line was seen
-        if self._homing:
+        if self.begun is None and self._homing:
             self.action_drop()
-            return
-        begun, self._begun = self._begun, None
-        if begun is None:
-            return
-        if self.overtaken(begun):
-            self.say("nothing was sent: a stop or another drive came in between")
-            return
-        name = KEYED[begun.kind]
-        if name in (HOME_MINUS, HOME_PLUS):
-            self._move(name, 0)
-        elif (control := self._controls().get(name)) is not None:
-            self._send(control.filled())
+        elif (begun := self.accepted()) is not None:
+            name = KEYED[begun.kind]
+            if name in (HOME_MINUS, HOME_PLUS):
+                self._move(name, 0)
+            elif (control := self._controls().get(name)) is not None:
+                self.send(control.filled())
 
     def action_home(self) -> None:
         """Ask for the direction of a homing: one letter begins none."""
@@ -307,17 +286,16 @@ class ControlsPage(AskingPage):
 
     def action_drop(self) -> None:
         """Drop the control that waits for Enter: a key that means nothing here is part of a word, such as `halt`."""
-        if self._begun is not None or self._homing:
-            self._begun, self._homing = None, False
+        if self.begun is not None or self._homing:
+            self.begun, self._homing = None, False
             self.say("nothing was sent")
 
     def action_ask(self, key: str) -> None:
-        self._begun = None
+        self.begun = None
         if not self._controls() or self._nothing():
             self.say(self._nothing() or NO_CONTROLS)
             return
-        self._asked = self.begin(key)
-        self.ask_for("", f"{NUMBERED[key][1]}: a whole number, then Enter; Esc: none; Space: stop")
+        self.ask_for(key, "", f"{NUMBERED[key][1]}: a whole number, then Enter; Esc: none; Space: stop")
 
     def edited(self, text: str) -> None:
         """Take a blank, which no number has, as the key of the stop."""
@@ -326,8 +304,8 @@ class ControlsPage(AskingPage):
             self.action_do(SPACE)
 
     def typed(self, text: str) -> None:
-        asked = self._asked
-        if asked is None or self.overtaken(asked):
+        asked = self.asked
+        if asked is None or asked.overtaken(self.host.session):
             self._close("the number was not used")
             return
         name, what = NUMBERED[asked.kind]
@@ -353,8 +331,9 @@ class ControlsPage(AskingPage):
             self.say(self._nothing() or NO_CONTROLS)
             return
         glance, axis = chosen
-        host = self.host
-        state = axis_state(glance, axis)
+        host, state = self.host, glance.state()
+        if state in READ and axis.last is not None:
+            state = axis.own_state
         to = number if name == TO or axis.last is None else axis.last.position + number
         if not LOW <= to <= HIGH:
             self.say(f"not sent: the end of the move, {to}, is out of range")
@@ -362,38 +341,21 @@ class ControlsPage(AskingPage):
         if not self._jog.allows(glance.readout, axis, state, host.session.now(), idle=host.outbox.idle):
             self.say(f"not sent: {self._jog.why}")
             return
-        self._send(control.filled(by=number, to=to))
-
-    def _send(self, lines: tuple[str, ...]) -> None:
-        """Send lines in their order, each once the one before it is answered."""
-        for line in lines:
-            self.host.outbox.type(line)
-        self._tell(lines)
-
-    def _tell(self, lines: tuple[str, ...]) -> None:
-        self.say(f"sent: {', '.join(lines)}", "dim")
+        self.send(control.filled(by=number, to=to))
 
     def action_leave(self) -> None:
         """Leave the number or the control that waits for Enter, then the page."""
-        if self._begun is not None or self._homing:
+        if self.begun is not None or self._homing:
             self.action_drop()
-            return
-        if self._asked is not None:
+        elif self.asked is not None:
             self._close("")
-            return
-        super().action_leave()
+        else:
+            super().action_leave()
 
     def _close(self, said: str) -> None:
-        self._asked = None
         self.end_asking()
         if said:
             self.say(said)
-
-
-def axis_state(glance: Glance, axis: Readout) -> State:
-    """The state of one axis; that of the drive where it is not known to move or rest."""
-    state = glance.state()
-    return axis.own_state if state in READ and axis.last is not None else state
 
 
 def _control_row(key: str, name: str, control: Control, number: str, width: int) -> Row:

@@ -22,7 +22,7 @@ from textual.widgets.option_list import Option
 
 from multidrop.dialects.text import visible
 from multidrop.shell.channel import Field as Wanted
-from multidrop.tui.key_table import bound, hint
+from multidrop.tui.key_table import Keyed, hint
 from multidrop.tui.widgets.bars import StopSign
 
 T = TypeVar("T")
@@ -93,13 +93,12 @@ class Hint(Static):
         self.update(Text.assemble((f"{text}\n" if text else "", "bold"), self._keys))
 
 
-class Over(ModalScreen[T], Generic[T]):
+class Over(Keyed, ModalScreen[T], Generic[T]):
     """A screen over the main one, with the app's keys that work everywhere."""
 
     told = ""
     """What became of the last key, where the box does not show that by itself."""
     SHEET: ClassVar[str] = "box"
-    BINDINGS: ClassVar[list[BindingType]] = bound("box")
 
     hint = ""
     """The keys at the foot of the box."""
@@ -125,7 +124,6 @@ class Dialog(Over[T], Generic[T]):
     """A dialog: Escape closes it with None."""
 
     def action_leave(self) -> None:
-        """Close without an answer."""
         self.dismiss(None)
 
 
@@ -194,7 +192,7 @@ class GoOn(Dialog[bool]):
     """A question before a step that needs a yes: y is yes; n, Enter, Escape and a stop are no."""
 
     SHEET = "question"
-    BINDINGS: ClassVar[list[BindingType]] = [*bound("question"), REFUSED]
+    BINDINGS: ClassVar[list[BindingType]] = [REFUSED]
 
     def __init__(self, question: str, look: Callable[[int], None], room: Callable[[int], None]) -> None:
         """Make the question. `look` scrolls the transcript by pages; `room` leaves rows free above it for the box."""
@@ -219,7 +217,6 @@ class GoOn(Dialog[bool]):
         self.dismiss(number == 1)
 
     def action_answer(self, yes: bool) -> None:
-        """Take an answer given as its letter."""
         self.dismiss(yes)
 
     def action_look(self, pages: int) -> None:
@@ -240,7 +237,6 @@ class Search(Dialog[str]):
     """Type to narrow a list; returns the key of the chosen result. The key that opened it steps to the next one."""
 
     SHEET = "list"
-    BINDINGS: ClassVar[list[BindingType]] = bound("list")
 
     def __init__(self, title: str, find: Callable[[str], Sequence[Match]], take: str = "take") -> None:
         """Make it; `take` is what Enter does."""
@@ -344,7 +340,7 @@ class Form(Dialog[dict[str, str]]):
     """Asks for values; returns them by name. Enter takes a value and goes to the next, at the end it takes all."""
 
     SHEET = "form"
-    BINDINGS: ClassVar[list[BindingType]] = [*bound("form"), REFUSED]
+    BINDINGS: ClassVar[list[BindingType]] = [REFUSED]
 
     def __init__(self, title: str, wanted: Sequence[Wanted]) -> None:
         super().__init__()

@@ -4,14 +4,11 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Sequence
-from typing import ClassVar, NamedTuple
-
-from textual.binding import BindingType
+from typing import NamedTuple
 
 from multidrop.dialects import Diagnostic
 from multidrop.macros import Macro, MacroStore
 from multidrop.shell.playing import Playing
-from multidrop.tui.key_table import bound
 from multidrop.tui.panels.view import View
 from multidrop.tui.screens.dialogs import Ask, Confirm
 from multidrop.tui.screens.page import Host, ListPage
@@ -106,7 +103,6 @@ class MacrosPage(ListPage):
     """The macros. Enter plays the chosen one that is shown, or the one whose whole name was typed."""
 
     SHEET = "macros"
-    BINDINGS: ClassVar[list[BindingType]] = bound("macros")
     FIELD, LIST = "filter", "macros"
     WANTS = frozenset({"motion"})
     PARTS = {"heading": None, "filter": None, "macros": "1fr", "steps": None, "news": NEWS + 1}
@@ -147,19 +143,14 @@ class MacrosPage(ListPage):
             [spread(heading, [below, (recording or "Enter plays ", "motion" if recording else "dim")], width)]
         )
         self._painted = self.host.keyboard.idle
-        self._show_steps(chosen, playing, width, height - room)
-        wall = view.session.wall
-        records = news_rows(self.host.last_records(NEWS), lambda at: f"{wall(at):%H:%M:%S}", width)
-        self.lines("news").put([rule("transcript", width), *records])
-
-    def _show_steps(self, chosen: Listed | None, playing: dict[str, Playing], width: int, room: int) -> None:
         rows: list[Row] = []
         if chosen is not None:
             rows.append(rule(visible(chosen.name), width))
-            rows += step_rows(chosen, playing.get(chosen.name), width, room - 1)
-        steps = self.lines("steps")
-        steps.styles.height = max(1, room)
-        steps.put(rows)
+            rows += step_rows(chosen, playing.get(chosen.name), width, height - room - 1)
+        self.lines("steps").styles.height = max(1, height - room)
+        self.lines("steps").put(rows)
+        records = news_rows(self.host.last_records(NEWS), view.session.wall, width)
+        self.lines("news").put([rule("transcript", width), *records])
 
     async def _read(self) -> None:
         try:
@@ -219,7 +210,6 @@ class MacrosPage(ListPage):
             self.host.outbox.at_once([f"/play stop {chosen.name}"])
 
     async def action_edit(self) -> None:
-        """Open the file of the chosen macro in the editor."""
         chosen = self._chosen()
         if chosen is None or not chosen.name:
             return
@@ -245,7 +235,6 @@ class MacrosPage(ListPage):
         await self.app.push_screen(Ask(f"Key of {chosen.name}", chosen.place.strip("-"), about), named)
 
     async def action_delete(self) -> None:
-        """Ask before the chosen macro is deleted."""
         chosen = self._chosen()
         if chosen is None or not chosen.name:
             return

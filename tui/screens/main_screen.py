@@ -13,23 +13,16 @@ from textual.containers import Horizontal, Vertical
 from textual.geometry import Size
 
 from multidrop.shell.roles import Filter
-from multidrop.tui.key_table import NONE, bound
+from multidrop.tui.key_table import NONE
 from multidrop.tui.panels.table import CONDITIONS, LAYOUTS, MOTION, PANELS, Place, Shown, fitting, side_width
 from multidrop.tui.screen_model import Record
 from multidrop.tui.screens.page import Framed
 from multidrop.tui.text import fit, shorter
 from multidrop.tui.widgets.bars import Banner, rule_row
-from multidrop.tui.widgets.entry import Complete, Draft, Entry, Menu, Typed
+from multidrop.tui.widgets.entry import Complete, Draft, Entry, Typed
 from multidrop.tui.widgets.lines import Lines, Roles, Row, width_of
 from multidrop.tui.widgets.search_bar import Reader
 from multidrop.tui.widgets.transcript import Transcript
-
-
-class Half(Transcript):
-    """A transcript without a foot: its filter is not the person's, and `/filter` is for the other half."""
-
-    def _foot(self, width: int) -> list[Row]:
-        return []
 
 
 class Beside(Vertical):
@@ -42,7 +35,8 @@ class Beside(Vertical):
         self.bus, self.address = "", ""
         """The line that it shows, and the one drive on it; an empty address is all of the line."""
         self._heading = Lines(id="beside-head")
-        self.transcript = Half(clock)
+        # Without a foot: its filter is not the person's, and `/filter` is for the other half.
+        self.transcript = Transcript(clock, foot=False)
 
     def compose(self) -> ComposeResult:
         yield self._heading
@@ -89,6 +83,7 @@ HALF = 60
 """Width from which the halves of a split screen are side by side; else they are one above the other."""
 PLAIN = ("rule-above", "panel", "side", "far", "rule-below", "tour", "status", "label", "hint")
 """Parts that are only rows."""
+MENU_WIDTH = 64
 PANEL_SHARE = 0.5
 """Share of the transcript's height that a panel takes on a narrow screen."""
 
@@ -97,17 +92,12 @@ class MainScreen(Framed):
     """The main screen. It is given rows, and divides the room among them."""
 
     AUTO_FOCUS = "#entry"
-    PLAYS = True
     SHEET = "main"
     BINDINGS: ClassVar[list[BindingType]] = [
-        *bound("screen"),
-        *bound("main"),
-        *(
-            Binding(
-                f"{NONE}panel-{each.name}", f"act.panel('{each.name}')", f"panel: {each.about}", id=f"panel-{each.name}"
-            )
-            for each in PANELS
-        ),
+        Binding(
+            f"{NONE}panel-{each.name}", f"act.panel('{each.name}')", f"panel: {each.about}", id=f"panel-{each.name}"
+        )
+        for each in PANELS
     ]
 
     def __init__(
@@ -130,7 +120,8 @@ class MainScreen(Framed):
         self._hint = self._first_hint = ""
         self.reader = Reader(self.take_keys, id="reader")
         self.entry = Entry(complete, history, typed, pasted, id="entry")
-        self.menu = Menu(id="menu")
+        self.menu = Lines(id="menu")
+        """The list of completions, above the line."""
         self._stack = Vertical(id="pages")
         self.beside = Beside(clock, self.make_room)
         self._halves = Vertical(self.beside, self._stack, id="halves")
@@ -290,7 +281,6 @@ class MainScreen(Framed):
         self.reader.find(self.transcript)
 
     def action_pause(self) -> None:
-        """Stop the scrolling, or let it go on."""
         self.transcript.pause()
 
     def action_pick(self, by: int) -> None:
@@ -299,10 +289,8 @@ class MainScreen(Framed):
     # The input line
 
     def set_label(self, row: Row) -> None:
-        label = self.lines("label")
-        if label.rows != [row]:
-            label.styles.width = width_of(row)
-            label.put([row])
+        self.lines("label").styles.width = width_of(row)
+        self.lines("label").put([row])
 
     def set_hint(self, text: str, first: str = "") -> None:
         """Show the meaning of the typed text beside it, if there is room, and `first` before it."""
@@ -314,8 +302,7 @@ class MainScreen(Framed):
         hint, entry = self.lines("hint"), self.entry
         room = self.size.width - self.lines("label").size.width - max(30, -(-(len(entry.value) + 4) // 20) * 20)
         shown = room >= 20
-        if hint.display != shown:
-            hint.display = shown
+        hint.display = shown
         if shown:
             first = fit(self._first_hint, min(len(self._first_hint), room - 2))
             rest = room - 2 - cell_len(first) - 3 * bool(first)
@@ -323,11 +310,13 @@ class MainScreen(Framed):
             hint.styles.width = room
             hint.put([((" " * (room - cell_len(text) - 1), "text"), (text, "dim"))] if text else [])
 
-    def put_status(self, rows: Sequence[Row]) -> None:
-        if len(rows) != len(self.lines("status").rows):
-            self.lines("status").styles.height = len(rows)
-        self.lines("status").put(rows)
-
     def show_menu(self) -> None:
-        below = 2 if self.wide else 2 + max(2, len(self.lines("status").rows))
-        self.menu.show(self.entry.listing, self.lines("label").size.width, below)
+        """Show the completions above the text that they complete, or hide them."""
+        listing, left = self.entry.listing, self.lines("label").size.width
+        self.menu.display = listing.open
+        if listing.open:
+            below = 2 if self.wide else 2 + max(2, len(self.lines("status").rows))
+            width = min(MENU_WIDTH, self.size.width - left - 1)
+            self.menu.styles.width = width
+            self.menu.styles.margin = (0, 0, below, max(0, left - 1))
+            self.menu.put_all(listing.rows(width))

@@ -11,7 +11,6 @@ from dataclasses import dataclass
 from typing import ClassVar, NamedTuple
 
 from textual.app import ComposeResult
-from textual.binding import BindingType
 from textual.containers import Vertical
 from textual.screen import Screen
 
@@ -20,7 +19,7 @@ from multidrop.dialects.on_demand import imported
 from multidrop.shell.line_syntax import Place
 from multidrop.shell.session import Session
 from multidrop.tui.frame_scheduler import Frames
-from multidrop.tui.key_table import bound
+from multidrop.tui.key_table import Keyed
 from multidrop.tui.keymap import FunctionKeys
 from multidrop.tui.outbox import Outbox
 from multidrop.tui.panels.view import View
@@ -34,13 +33,10 @@ from multidrop.tui.widgets.bars import Banner, Footer, TopLine
 from multidrop.tui.widgets.lines import Lines, Link, Row, Span, T, in_view
 
 
-class Framed(Screen[None]):
+class Framed(Keyed, Screen[None]):
     """A screen with a top line and a footer, which the presenter paints."""
 
-    PLAYS: ClassVar[bool] = False
-    """True if function keys play macros on this screen."""
-    SHEET: ClassVar[str]
-    """Its keys, in `tui.key_table`."""
+    SHEET: ClassVar[str] = "screen"
 
     def __init__(self) -> None:
         super().__init__()
@@ -63,8 +59,7 @@ class Framed(Screen[None]):
 
 def show_rows(part: Lines, rows: list[Row]) -> None:
     """Show a part in as many rows as it has; none hides it."""
-    if part.display != bool(rows):
-        part.display = bool(rows)
+    part.display = bool(rows)
     part.styles.height = max(1, len(rows))
     part.put(rows)
 
@@ -97,11 +92,16 @@ class Begun(NamedTuple):
     name: str = ""
     lines: tuple[str, ...] = ()
 
+    def overtaken(self, session: Session) -> bool:
+        """True if a stop, or another drive, came since."""
+        return (self.stops, self.place) != (session.stops, session.place)
+
 
 class Page(Framed):
     """The base of all pages. `content` makes the widgets, `show` paints them when something has happened."""
 
-    BINDINGS: ClassVar[list[BindingType]] = [*bound("screen"), *bound("page")]
+    AUTO_FOCUS: ClassVar[str | None] = ""
+    SHEET = "page"
     WANTS: ClassVar[frozenset[str]] = frozenset()
     """The readings that it needs while it is shown, in the words of `tui.panels.table`."""
 
@@ -154,6 +154,8 @@ class AskingPage(Page):
         super().__init__(host)
         self.field = Field(self.typed, edited=self.edited, id=self.FIELD or None)
         self.said: Span = ("", "dim")
+        self.asked: Begun | None = None
+        """What the line to type in is shown for."""
 
     def content(self) -> ComposeResult:
         """Make the parts with the line in its place."""
@@ -171,14 +173,16 @@ class AskingPage(Page):
     def edited(self, text: str) -> None:
         """Take each change of it."""
 
-    def ask_for(self, text: str, placeholder: str = "") -> None:
+    def ask_for(self, kind: str, text: str, placeholder: str, name: str = "") -> None:
         """Show the line to type in, with a text in it."""
+        self.asked = self.begin(kind, name)
         self.field.value, self.field.placeholder = text, placeholder
         self.field.display = True
         self.set_focus(self.field)
 
     def end_asking(self) -> None:
         """Empty and hide the line to type in."""
+        self.asked = None
         self.field.value = ""
         self.field.display = False
         self.set_focus(None)
@@ -189,14 +193,46 @@ class AskingPage(Page):
     def begin(self, kind: str, name: str = "", lines: tuple[str, ...] = ()) -> Begun:
         return Begun(kind, self.host.session.stops, self.host.session.place, name, lines)
 
-    def overtaken(self, begun: Begun) -> bool:
-        """True if a stop, or another drive, came since something was begun."""
-        return begun[1:3] != (self.host.session.stops, self.host.session.place)
+
+OVERTAKEN = "nothing was sent: a stop or another drive came in between"
+
+
+class SendingPage(AskingPage):
+    """A page that shows lines before Enter sends them."""
+
+    def __init__(self, host: Host) -> None:
+        super().__init__(host)
+        self.begun: Begun | None = None
+        """The lines that Enter would send."""
+        self.painted = False
+        """They were shown, and no key waited then that was typed before."""
+
+    def offer(self, kind: str, lines: tuple[str, ...]) -> None:
+        """Let Enter send lines, once they were shown."""
+        self.begun, self.painted = self.begin(kind, lines=lines), False
+
+    def accepted(self) -> Begun | None:
+        """Return what Enter sends; None for an Enter that was typed before the lines were seen, or came too late."""
+        begun = self.begun
+        if begun is None or not self.painted:
+            return None
+        self.begun = None
+        if begun.overtaken(self.host.session):
+            self.say(OVERTAKEN)
+            return None
+        return begun
+
+    def send(self, lines: Sequence[str]) -> None:
+        """Send lines in their order, each once the one before it is answered."""
+        for line in lines:
+            self.host.outbox.type(line)
+        self.say(f"sent: {', '.join(lines)}", "dim")
 
 
 class ListPage(AskingPage):
     """A page of rows to choose from: typing narrows them, arrows and the wheel choose, Enter and a click take one."""
 
+    AUTO_FOCUS = None
     LIST: ClassVar[str] = ""
     """The name of the rows among the parts."""
 
@@ -217,6 +253,7 @@ class ListPage(AskingPage):
 
     def end_asking(self) -> None:
         """Narrow again with what was typed for that."""
+        self.asked = None
         self.field.value, self.field.placeholder = self.words, "type to narrow"
         self.field.cursor_position = len(self.words)
         self.set_focus(self.field)

@@ -9,9 +9,8 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, ClassVar
-
-from textual.binding import BindingType
+from functools import partial
+from typing import TYPE_CHECKING, Any
 
 from multidrop.dialects import Diagnostic
 from multidrop.dialects.values import (
@@ -28,10 +27,9 @@ from multidrop.dialects.values import (
 from multidrop.drives.drive import Drive
 from multidrop.shell import setting_units
 from multidrop.shell.params import file as files
-from multidrop.tui.key_table import bound
 from multidrop.tui.panels.table import column_rows, panel
 from multidrop.tui.panels.view import Glance, View, name_of
-from multidrop.tui.screens.page import Begun, Host, ListPage
+from multidrop.tui.screens.page import Host, ListPage, SendingPage
 from multidrop.tui.text import age, fit
 from multidrop.tui.widgets.lines import Row, Span, spread
 
@@ -203,7 +201,7 @@ class SettingsTable:
         except Diagnostic:
             return f"{row.reading.name} {row.meaning}"
 
-    def row(self, row: Setting, width: int, chosen: bool, units: Callable[[str, Value], str]) -> Row:
+    def row(self, row: Setting, width: int, chosen: bool, units: Callable[[str, Value], str] | None) -> Row:
         there: list[Span] = []
         if self.other is not None:
             there.append((f"{_aligned(row.other or '–')} ", "strong" if row.differs else "dim"))
@@ -217,7 +215,7 @@ class SettingsTable:
         ]
         room = width - sum(len(text) for text, _ in left)
         meaning = row.meaning or (row.reading.unit if len(row.reading.unit) > UNIT else "")
-        shown = units(row.reading.name, row.reading.value).strip(" ()")
+        shown = units(row.reading.name, row.reading.value).strip(" ()") if units is not None else ""
         kind = "program variable" if row.reading.section == VARIABLES else ""
         about = "  ".join(filter(None, (shown, kind, meaning)))
         return (*left, (fit(about, room), "dim"))
@@ -238,11 +236,10 @@ ASKS = {
 }
 
 
-class ParametersPage(ListPage):
+class ParametersPage(ListPage, SendingPage):
     """All settings of the selected drive."""
 
     SHEET = "parameters"
-    BINDINGS: ClassVar[list[BindingType]] = bound("parameters")
     WANTS = frozenset({"motion"})
     PARTS = {"heading": None, "asked": None, "columns": None, "table": "1fr", "meaning": None, "said": None}
     FIELD, LIST = "asked", "table"
@@ -250,10 +247,6 @@ class ParametersPage(ListPage):
     def __init__(self, host: Host) -> None:
         super().__init__(host)
         self._table = SettingsTable()
-        self._asked: Begun | None = None
-        self._pending: Begun | None = None
-        self._painted = False
-        """The pending lines were shown."""
         self._asked_for = False
         """The settings were asked for, as nobody had read them."""
         self._reading = False
@@ -268,10 +261,6 @@ class ParametersPage(ListPage):
 
     # What is shown
 
-    def _in_units(self, name: str, value: Value) -> str:
-        session, drive = self.host.session, self.host.session.selected
-        return setting_units.shown(session.units, drive, name, value) if session.scaled and drive is not None else ""
-
     def show(self, view: View) -> None:
         self._glance = view.chosen
         # Forget what was begun before a stop, or for another drive.
@@ -279,7 +268,7 @@ class ParametersPage(ListPage):
         if place != self._place:
             self._place, self._table, self._asked_for = place, SettingsTable(), False
             self._close("")
-        begun = [each for each in (self._asked, self._pending) if each is not None]
+        begun = [each for each in (self.asked, self.begun) if each is not None]
         if any(each.stops != view.session.stops for each in begun):
             self._close("stopped; nothing was sent")
         if view.model.trouble:
@@ -295,18 +284,19 @@ class ParametersPage(ListPage):
         if self.said[0] == READING and self._table.found is not self._settings():
             self.say("", "dim")
         self._table.make(self._settings(), drive)
-        table = self._table
+        table, session = self._table, view.session
+        units = partial(setting_units.shown, session.units, drive) if session.scaled and drive is not None else None
         below = self.put_rows(
             table.shown,
             table.at,
-            lambda row, chosen: table.row(row, width, chosen, self._in_units),
+            lambda row, chosen: table.row(row, width, chosen, units),
             self._nothing(view),
         )
         self.lines("heading").put([table.heading(view, self._glance, width, below)])
         self.lines("columns").put([self._table.columns(width)])
         self.lines("meaning").put([((f" {fit(self._table.about(drive), width - 2)}", "dim"),)])
         self.lines("said").put([((f" {fit(self.said[0], width - 2)}", self.said[1]),)])
-        self._painted = self._pending is not None
+        self.painted = self.begun is not None
 
     def _settings(self) -> Readings | None:
         return self._glance.readout.settings if self._glance is not None else None
@@ -327,16 +317,16 @@ class ParametersPage(ListPage):
     # Keys
 
     def choose(self, at: int) -> None:
-        if self._pending is None and self._asked is None:
+        if self.begun is None and self.asked is None:
             self._table.at = at
 
     def action_step(self, by: int) -> None:
-        if self._pending is None and self._asked is None:
+        if self.begun is None and self.asked is None:
             self._table.step(by)
 
     async def action_clicked(self, at: int) -> None:
         """Choose a setting and edit it. A click sends nothing."""
-        if self._pending is None and self._asked is None:
+        if self.begun is None and self.asked is None:
             self.choose(at)
             self.action_enter()
 
@@ -348,7 +338,6 @@ class ParametersPage(ListPage):
             self.say(READING, "dim")
 
     def action_defaults(self) -> None:
-        """Compare with the defaults, or with nothing."""
         found = self._settings()
         table = self._table
         if table.other is not None and table.other[0] == "default":
@@ -361,7 +350,6 @@ class ParametersPage(ListPage):
             )
 
     def action_differing(self) -> None:
-        """Show only what differs, or everything."""
         table = self._table
         if table.other is None:
             self.say("choose first what to compare with: ^P, compare")
@@ -369,34 +357,24 @@ class ParametersPage(ListPage):
             table.only_differing, table.at = not table.only_differing, 0
 
     def action_variables(self) -> None:
-        """Show the variables of the program alone, or everything."""
         self.field.value = "" if self.field.value == VARIABLES else VARIABLES
 
     def action_ask(self, kind: str, name: str = "", value: str = "") -> None:
-        self._pending = None
-        self._asked = self.begin(kind, name)
-        self.ask_for(value, ASKS[kind])
+        self.begun = None
+        self.ask_for(kind, value, ASKS[kind], name)
         self.field.select_all()
         self.say(f"{name}: {ASKS[kind]}" if name else ASKS[kind], "dim")
 
     def action_enter(self) -> None:
         """Edit the chosen setting, or send what is pending."""
-        pending = self._pending
-        if pending is not None and not self._painted:
-            return  # an Enter that was typed before the lines were seen
-        self._pending = None
-        if pending is not None and self.overtaken(pending):
-            self.say("nothing was sent: a stop or another drive came in between")
-        elif pending is not None:
-            for line in pending.lines:
-                self.host.outbox.type(line)
-            self._reading = True
-            self.say(f"sent: {', '.join(pending.lines)}", "dim")
+        if self.begun is not None:
+            if (begun := self.accepted()) is not None:
+                self._reading = True
+                self.send(begun.lines)
         elif (row := self._table.chosen) is not None:
             self.action_ask(EDIT, row.reading.name, row.value.strip('[]"'))
 
     def action_save(self) -> None:
-        """Have the drive keep its settings; the verb asks first."""
         if self._glance is None:
             self.say("no drive is selected")
         else:
@@ -404,8 +382,8 @@ class ParametersPage(ListPage):
 
     def action_leave(self) -> None:
         """Leave the field or the pending lines, then the page."""
-        if self._asked is not None or self._pending is not None:
-            self._close("nothing was sent" if self._asked is None or self._asked.kind == EDIT else "")
+        if self.asked is not None or self.begun is not None:
+            self._close("nothing was sent" if self.asked is None or self.asked.kind == EDIT else "")
             return
         super().action_leave()
 
@@ -413,17 +391,17 @@ class ParametersPage(ListPage):
 
     def edited(self, text: str) -> None:
         """Narrow while the words are typed; lines that wait for Enter are dropped."""
-        if self._asked is None and text != self._table.words:
+        if self.asked is None and text != self._table.words:
             self._table.words, self._table.at = text, 0
-            if self._pending is not None:
+            if self.begun is not None:
                 self._close("nothing was sent")
 
     def typed(self, text: str) -> None:
-        asked = self._asked
+        asked = self.asked
         if asked is None:
             self.action_enter()
             return
-        if self.overtaken(asked):
+        if asked.overtaken(self.host.session):
             self._close("it was not used")
             return
         try:
@@ -456,11 +434,11 @@ class ParametersPage(ListPage):
             raise Diagnostic("the settings of the drive are not read", name, "/params read reads them")
         planned: Edit = edit(drive.family.values.parameters, drive.state, present, name, parsed(text))
         self._close("")
-        self._pending, self._painted = self.begin(EDIT, lines=planned.lines), False
+        self.offer(EDIT, planned.lines)
         warning = f" - {planned.warning}" if planned.warning else ""
         self.say(f"Enter sends {', '.join(planned.lines)}{warning}   Esc: nothing")
 
     def _close(self, said: str) -> None:
-        self._asked, self._pending = None, None
+        self.begun = None
         self.end_asking()
         self.say(said, "strong" if said else "dim")

@@ -6,9 +6,6 @@ A person sets a trigger, reads the cursors, and saves what is visible.
 from __future__ import annotations
 
 from math import isfinite
-from typing import ClassVar
-
-from textual.binding import BindingType
 
 from multidrop.dialects import Diagnostic
 from multidrop.shell.plots.plot import write
@@ -17,12 +14,11 @@ from multidrop.shell.plots.rerun_calls import Batch, Curve
 from multidrop.shell.roles import DIFFERENCE
 from multidrop.tui.curves.chart import Look
 from multidrop.tui.curves.trigger import Setting, State
-from multidrop.tui.key_table import bound
 from multidrop.tui.panels.plot import columns_of, plot_rows, plot_title
 from multidrop.tui.panels.plotted import PLOTTED, Line, groups, role_of
 from multidrop.tui.panels.view import View
 from multidrop.tui.polling import plotted
-from multidrop.tui.screens.page import AskingPage, Begun, Host
+from multidrop.tui.screens.page import AskingPage, Host
 from multidrop.tui.widgets.lines import Row, Span, width_of
 
 PORT = 9876
@@ -41,10 +37,7 @@ def _lines(view: View) -> list[Line]:
 
 def _named(line: Line) -> str:
     """`a velocity`, `press:b X position`: as a person types it."""
-    axis = line.quantity.axis
-    return " ".join(
-        filter(None, (line.name.split()[0], axis if axis != line.name.split()[0] else "", line.quantity.word))
-    )
+    return f"{line.short} {line.quantity.word}"
 
 
 def typed_trigger(view: View) -> str:
@@ -167,9 +160,7 @@ def samples_of(view: View, width: int) -> Batch:
 class PlotPage(AskingPage):
     """Plots. Keys change how a person looks at them; what is plotted changes by lines that a person could type."""
 
-    AUTO_FOCUS = ""
     SHEET = "plot"
-    BINDINGS: ClassVar[list[BindingType]] = bound("plot")
     WANTS = frozenset({"motion", "plot", "samples"})
     PARTS = {"heading": None, "charts": "1fr", "below": None, "asked": None}
     FIELD = "asked"
@@ -177,7 +168,6 @@ class PlotPage(AskingPage):
     def __init__(self, host: Host) -> None:
         super().__init__(host)
         self._columns = 1
-        self._asked: Begun | None = None
 
     @property
     def _look(self) -> Look:
@@ -189,7 +179,7 @@ class PlotPage(AskingPage):
         return View(self.host.session, self.host.model, [], self.host.session.now(), True)
 
     def show(self, view: View) -> None:
-        if self._asked is not None and self.overtaken(self._asked):
+        if self.asked is not None and self.asked.overtaken(self.host.session):
             self._close("a stop or another drive came in between: it was not used")
         self._look.follow(view.model.traces, view.now)
         charts = self.lines("charts")
@@ -200,9 +190,7 @@ class PlotPage(AskingPage):
         charts.put(plot_rows(view, size.width, size.height))
         most = max(2, self.size.height // 5)
         said: list[Row] = [((f" {self.said[0]}", self.said[1]),)] if self.said[0] else []
-        below = [*cursor_rows(view, size.width, most), *said] or [self._below(view)]
-        self.lines("below").styles.height = len(below)
-        self.lines("below").put(below)
+        self.lines("below").put_all([*cursor_rows(view, size.width, most), *said] or [self._below(view)])
 
     def _below(self, view: View) -> Row:
         """The last failure, or how to see what rerun shows."""
@@ -238,9 +226,8 @@ class PlotPage(AskingPage):
 
     # What is typed: a trigger, or the name of a file
 
-    def action_trigger(self) -> None:
-        self._asked = self.begin("trigger")
-        self.ask_for(typed_trigger(self._view), FORM)
+    def action_trigger(self, kind: str = "trigger") -> None:
+        self.ask_for(kind, typed_trigger(self._view), FORM)
         self.say(f"trigger: {FORM}; SHARE of the picture comes before the edge", "dim")
 
     def action_single(self) -> None:
@@ -248,18 +235,16 @@ class PlotPage(AskingPage):
         trigger = self._look.trigger
         if trigger.setting is not None:
             self._look.arm(trigger.setting, True, self.host.model.traces)
-            return
-        self.action_trigger()
-        self._asked = self.begin("single")
+        else:
+            self.action_trigger("single")
 
     def action_save(self) -> None:
-        self._asked = self.begin("save")
-        self.ask_for("", "FILE.csv or FILE.rrd")
+        self.ask_for("save", "", "FILE.csv or FILE.rrd")
         self.say("save what is visible: FILE.csv or FILE.rrd", "dim")
 
     def typed(self, text: str) -> None:
-        asked, view = self._asked, self._view
-        if asked is None or self.overtaken(asked):
+        asked, view = self.asked, self._view
+        if asked is None or asked.overtaken(self.host.session):
             self._close("it was not used")
             return
         try:
@@ -287,7 +272,6 @@ class PlotPage(AskingPage):
         self.host.frames.wake()
 
     def _close(self, said: str) -> None:
-        self._asked = None
         self.end_asking()
         self.say(said, "dim")
 
@@ -299,7 +283,6 @@ class PlotPage(AskingPage):
         self._look.shorter(by)
 
     def action_closer(self, by: int) -> None:
-        """Magnify the values, or show more of them."""
         self._look.closer(by)
 
     def action_automatic(self) -> None:
@@ -313,7 +296,6 @@ class PlotPage(AskingPage):
         await self.app.run_action("act.panel('plot')")
 
     def action_apart(self) -> None:
-        """Give each drive charts of its own, or put all into one."""
         self._look.apart = not self._look.apart
 
     def action_hide(self, word: str) -> None:
@@ -339,7 +321,6 @@ class PlotPage(AskingPage):
             self._type(f"/plot {' '.join(texts)}")
 
     def action_difference(self) -> None:
-        """Plot the differences of the plotted drives from their twins, or plot them no longer."""
         named = list(plotted(self.host.session))
         texts = [each.text for each in named if each.word != DIFFERENCE]
         if len(texts) == len(named):
@@ -348,7 +329,6 @@ class PlotPage(AskingPage):
             self._type(f"/plot {' '.join(texts)}")
 
     def action_stream(self) -> None:
-        """Serve what is plotted for viewers of rerun, or end all such plots."""
         if self.host.session.plots:
             self._type("/plot off")
             return
@@ -371,7 +351,7 @@ class PlotPage(AskingPage):
     def action_leave(self) -> None:
         """Close the line; remove the cursors and go on; then leave. A trigger stays."""
         look = self._look
-        if self._asked is not None:
+        if self.asked is not None:
             self._close("")
             return
         if look.cursor is not None or (look.paused_at is not None and not look.trigger.stands):

@@ -9,13 +9,12 @@ Every line that it sends is a typed line, which a dialog shows before it is sent
 from __future__ import annotations
 
 import asyncio
+import shlex
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
-from typing import ClassVar
 
 from textual.app import ComposeResult
-from textual.binding import BindingType
 from textual.containers import Horizontal, Vertical
 
 from multidrop.dialects import Diagnostic
@@ -24,7 +23,7 @@ from multidrop.shell.programs.checking import ending_of
 from multidrop.shell.programs.edited_file import ChangedMeanwhile
 from multidrop.shell.programs.program_text import ProgramGrammar
 from multidrop.tui.editor import ConfigurationGrammar, Editor, Grammar, grammar_of
-from multidrop.tui.key_table import bound
+from multidrop.tui.outbox import ended
 from multidrop.tui.panels.program import SIGNS, index_of, spot_of, state_words
 from multidrop.tui.panels.table import column_rows, panel, side_width
 from multidrop.tui.panels.view import View
@@ -44,7 +43,6 @@ from multidrop.tui.screens.program_rows import (
     news_rows,
     problem_rows,
     product_of,
-    quoted,
     refusal,
     rule,
     run_choices,
@@ -66,7 +64,6 @@ class ProgramPage(Page):
 
     AUTO_FOCUS = "#editor"
     SHEET = "program"
-    BINDINGS: ClassVar[list[BindingType]] = bound("program")
     WANTS = frozenset({"motion", "conditions"})
 
     def __init__(self, host: Host) -> None:
@@ -75,7 +72,7 @@ class ProgramPage(Page):
         self.text: OpenText | None = None
         self.grammar: Grammar | None = None
         self.findings = Findings()
-        self.view: View | None = None
+        self.view = View(host.session, host.model, (), host.session.now(), True)
         self._edited_at: float | None = None
         """The time of the last edit that was not taken in; None: there is none."""
         self._taking_in = False
@@ -125,22 +122,17 @@ class ProgramPage(Page):
         lines, product = self._compared
         if (self.program.lines is not lines or product_of(self.host.session) != product) and self._edited_at is None:
             self._edited_at = 0.0
-        clock = self.host.session.wall
         rows = problem_rows(self.findings.problems, self.editor.cursor_location[0] + 1, width)
         rows = [rule(self.findings.words[0].strip(), width), *rows] if rows else []
         rows.append(rule("transcript", width, self.state_words()))
-        rows += news_rows(
-            self.host.last_records(max(NEWS[0], self.size.height // NEWS[1])), lambda at: f"{clock(at):%H:%M:%S}", width
-        )
-        below = self.lines("below")
-        if below.styles.height is None or below.styles.height.value != len(rows):
-            below.styles.height = len(rows)
-        below.put(rows)
+        news = self.host.last_records(max(NEWS[0], self.size.height // NEWS[1]))
+        rows += news_rows(news, self.host.session.wall, width)
+        self.lines("below").put_all(rows)
         self._show_program(view)
 
     def _show_program(self, view: View) -> None:
         """Paint the signs beside the lines, and the panels."""
-        chosen = self.view.chosen if self.view is not None else None
+        chosen = view.chosen
         spot = spot_of(chosen.readout) if chosen is not None else None
         number = index_of(self.program.lines, spot.address) if spot is not None else None
         line = None if number is None else dict(self.findings.addresses).get(self.program.lines[number][0])
@@ -154,15 +146,13 @@ class ProgramPage(Page):
 
     @property
     def program(self) -> ProgramFacts:
-        chosen = self.view.chosen if self.view is not None else None
-        return chosen.readout.program if chosen is not None else NO_FACTS
+        return self.view.chosen.readout.program if self.view.chosen is not None else NO_FACTS
 
     def state_words(self) -> str:
         """The action of the program, where no panel says it."""
-        chosen = self.view.chosen if self.view is not None else None
-        if self.view is None or chosen is None or self.lines("program-side").display:
+        if self.view.chosen is None or self.lines("program-side").display:
             return ""
-        words = state_words(chosen, self.view.now)
+        words = state_words(self.view.chosen, self.view.now)
         return f"program: {words}" if words else ""
 
     def _break_line(self, program: ProgramFacts) -> int | None:
@@ -257,7 +247,7 @@ class ProgramPage(Page):
 
         def named(file: str | None) -> None:
             if file:
-                line = with_target("/upload", quoted(file), target)
+                line = with_target("/upload", shlex.quote(file), target)
                 self.run_worker(self._then_open(self._start(line), file))
 
         await self.app.push_screen(Ask(f"New file for the program in {target or base}", name), named)
@@ -360,11 +350,8 @@ class ProgramPage(Page):
     def _start(self, line: str) -> asyncio.Task[bool]:
         """Run a line as if it was typed; a failure is shown in the transcript."""
         task = self.host.session.start(line)
-        self.run_worker(_ended(task))
+        self.run_worker(ended(task))
         return task
-
-    def _target(self) -> str:
-        return target_of(self.host.session)
 
     async def action_download(self) -> None:
         """Send the file to the drive: show what that does, and ask how."""
@@ -376,14 +363,14 @@ class ProgramPage(Page):
         if not isinstance(self.grammar, ProgramGrammar):
             self.notify(f"{text.name} is not a program: nothing to download")
             return
-        ways = download_choices(text, self._target())
+        ways = download_choices(text, target_of(self.host.session))
         facts = download_facts(text, self.findings, self.program)
 
         async def answered(line: str | None) -> None:
             if line and (await self.save() if text.changed or text.file.new else True):
                 self._start(line)
 
-        title = f"Download {text.name} to {self._target() or chosen.product}?"
+        title = f"Download {text.name} to {target_of(self.host.session) or chosen.product}?"
         answers = [(each.line, f"{each.title:<38} {each.line}") for each in ways]
         await self.app.push_screen(Confirm(title, facts, answers), answered)
 
@@ -396,10 +383,10 @@ class ProgramPage(Page):
             self.notify("No drive is selected: ^O chooses one")
             return
         program = self.program
-        found = run_choices(self._entries(), self._target(), program)
+        found = run_choices(self._entries(), target_of(self.host.session), program)
         found = [each for each in found if only in each.line]
         known = "is this text" if self.findings.addresses else "may be another one than this text"
-        heading = f"{title} {self._target() or chosen.product}: its program {known}"
+        heading = f"{title} {target_of(self.host.session) or chosen.product}: its program {known}"
 
         def taken(key: str | None) -> None:
             if key is not None:
@@ -415,13 +402,13 @@ class ProgramPage(Page):
             return
         program = self.program
         if program.line is not None and program.phase.waits:
-            self._step = self._start(with_target("/step", self._target()))
+            self._step = self._start(with_target("/step", target_of(self.host.session)))
         else:
             await self._choose("/step ", "Step in")
 
     async def action_break(self) -> None:
         """Set the break point at the line of the cursor, or remove it there."""
-        row, target, program = self.editor.cursor_location[0], self._target(), self.program
+        row, target, program = self.editor.cursor_location[0], target_of(self.host.session), self.program
         if self.host.session.selected is None:
             return
         if self._break_line(program) == row:
@@ -435,10 +422,3 @@ class ProgramPage(Page):
             self.notify(
                 "No label here, and no address: the drive is not known to hold this text; ^D sends it", timeout=6
             )
-
-
-async def _ended(task: asyncio.Task[bool]) -> None:
-    """Wait for a line; a bug in it ends the app."""
-    await asyncio.wait([task])
-    if not task.cancelled():
-        task.result()

@@ -92,12 +92,12 @@ def problem_rows(problems: Sequence[Problem], at: int, width: int) -> list[Row]:
     return rows
 
 
-def news_rows(records: Sequence[Record], clock: Callable[[float], str], width: int) -> list[Row]:
-    """The last lines of the transcript, a row each."""
+def news_rows(records: Sequence[Record], wall: Callable[[float], datetime], width: int) -> list[Row]:
+    """The last lines of the transcript, a row each, with the time of day."""
     rows: list[Row] = []
     for each in records:
         sign, role = MARKS[each.mark]
-        head = f" {clock(each.at)} "
+        head = f" {wall(each.at):%H:%M:%S} "
         rows.append(
             (
                 (head, "dim"),
@@ -150,10 +150,6 @@ def target_of(session: Session) -> str:
 
 def with_target(verb: str, target: str, *words: str) -> str:
     return " ".join(each for each in (verb, target, *words) if each)
-
-
-def quoted(file: str) -> str:
-    return shlex.quote(file)
 
 
 # Files
@@ -220,7 +216,7 @@ def _match(name: str, about: str) -> Match:
 
 
 def download_choices(text: OpenText, target: str) -> list[Choice]:
-    file = quoted(text.name)
+    file = shlex.quote(text.name)
     first = "Save the file and send it" if text.changed or text.file.new else "Send it"
     return [
         Choice(first, with_target("/download", file, target)),

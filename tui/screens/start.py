@@ -7,11 +7,10 @@ top narrows the list, and takes a URL. Enter opens what is highlighted.
 from __future__ import annotations
 
 from collections.abc import Awaitable, Callable, Sequence
-from typing import ClassVar
+from dataclasses import dataclass
 
 from rich.text import Text
 from textual.app import App, ComposeResult
-from textual.binding import BindingType
 from textual.containers import Vertical
 from textual.widgets import Static
 from textual.widgets.option_list import Option
@@ -20,7 +19,7 @@ from multidrop.dialects.text import visible
 from multidrop.shell.events import FAILURES
 from multidrop.shell.session import Session
 from multidrop.tui.assist import EDIT, Assist, StartEntry
-from multidrop.tui.key_table import bound, hint
+from multidrop.tui.key_table import hint
 from multidrop.tui.screens.dialogs import Field, Hint, Options, Over
 from multidrop.tui.terminal.keyboard import Keyboard
 from multidrop.tui.widgets.bars import Banner
@@ -50,7 +49,6 @@ class Start(Over[None]):
     """
 
     SHEET = "start"
-    BINDINGS: ClassVar[list[BindingType]] = bound("start")
 
     def __init__(self, connect: Connect, assist: Assist, keyboard: Keyboard, *, only: bool, trouble: str = "") -> None:
         super().__init__()
@@ -252,7 +250,6 @@ class Start(Over[None]):
         outcome.update(text)
 
     def action_leave(self) -> None:
-        """Go to the main screen on Escape, unless nothing is open."""
         if not self.only:
             self.dismiss(None)
 
@@ -261,20 +258,17 @@ TRY = "try PR P, MR 51200 and @b PR P, each with Enter; /tour walks through ever
 """A hint for an empty demo cell."""
 
 
+@dataclass(eq=False, repr=False)
 class Opener:
-    """Opens connections. `show_line` writes to the transcript, `begin_tour` begins the tour."""
+    """Opens connections."""
 
-    def __init__(
-        self,
-        app: App[int],
-        session: Session,
-        assist: Assist,
-        keyboard: Keyboard,
-        show_line: Callable[[str, str], None],
-        begin_tour: Callable[[], Awaitable[None]],
-    ) -> None:
-        self._app, self._session, self._assist, self._keyboard = app, session, assist, keyboard
-        self._show_line, self._begin_tour = show_line, begin_tour
+    _app: App[int]
+    _session: Session
+    _assist: Assist
+    _keyboard: Keyboard
+    _show_line: Callable[[str, str], None]
+    """Writes to the transcript."""
+    _begin_tour: Callable[[], Awaitable[None]]
 
     async def open_all(self, urls: Sequence[str]) -> None:
         """Open what was named at the start, side by side; ask if nothing could be opened."""

@@ -3,12 +3,8 @@
 from __future__ import annotations
 
 from itertools import islice
-from typing import ClassVar
-
-from textual.binding import BindingType
 
 from multidrop.dialects.text import counted
-from multidrop.tui.key_table import bound
 from multidrop.tui.panels.table import piece_rows
 from multidrop.tui.panels.view import View, names_on
 from multidrop.tui.screen_model import TrafficStore
@@ -22,9 +18,7 @@ NO_TRAFFIC = TrafficStore()
 class TrafficPage(Page):
     """The bytes. The view is anchored at its last piece, which is the newest one unless the reader went up."""
 
-    AUTO_FOCUS = ""
     SHEET = "traffic"
-    BINDINGS: ClassVar[list[BindingType]] = bound("traffic")
     WANTS = frozenset({"motion"})
     PARTS = {"heading": None, "traffic": "1fr"}
 
@@ -87,5 +81,4 @@ class TrafficPage(Page):
         self._polls = not self._polls
 
     def action_hex(self) -> None:
-        """Show bytes in hex beside the text, or text alone."""
         self._hex = not self._hex

@@ -9,24 +9,20 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from operator import attrgetter
-from typing import ClassVar
-
-from textual.binding import BindingType
 
 from multidrop.dialects import Diagnostic
 from multidrop.drives.drive import Drive
 from multidrop.shell.roles import Series
-from multidrop.tui.key_table import bound
 from multidrop.tui.panels.drive import LIMITS, drive_rows
 from multidrop.tui.panels.drives import spark
 from multidrop.tui.panels.plot import plot_rows
 from multidrop.tui.panels.program import listing_rows, spot_of, state_words
 from multidrop.tui.panels.view import NOT_REFERENCED, Glance, View, name_of
 from multidrop.tui.readout import Readout
-from multidrop.tui.screens.page import AskingPage, Begun, Host
+from multidrop.tui.screens.page import OVERTAKEN, SendingPage
 from multidrop.tui.screens.program_rows import news_rows, rule
 from multidrop.tui.text import at_words
-from multidrop.tui.widgets.lines import Row, spread, width_of
+from multidrop.tui.widgets.lines import Row, beside, spread
 
 WIDE = 110
 """Width from which the curves are beside the facts."""
@@ -42,27 +38,18 @@ MARKS = frozenset({">", "»", "", "x"})
 """Marks of the lines of a drive, of their replies and of their failures."""
 
 
-class WhyPage(AskingPage):
+class WhyPage(SendingPage):
     """Why the selected drive is in trouble."""
 
-    AUTO_FOCUS = ""
     SHEET = "why"
-    BINDINGS: ClassVar[list[BindingType]] = bound("why")
     WANTS = frozenset({"motion", "conditions"})
     PARTS = {"heading": None, "why": "1fr", "helps": HELPS + 1}
 
-    def __init__(self, host: Host) -> None:
-        super().__init__(host)
-        self._begun: Begun | None = None
-        """The line that Enter would send."""
-        self._painted = False
-        """That line was shown, and no key waited then that was typed before."""
-
     def show(self, view: View) -> None:
         """Paint the facts, the curves beside or below them, and the keys that help."""
-        if self._begun is not None and self.overtaken(self._begun):
-            self._begun = None
-            self.say("nothing was sent: a stop or another drive came in between")
+        if self.begun is not None and self.begun.overtaken(self.host.session):
+            self.begun = None
+            self.say(OVERTAKEN)
         drive, glance, width = view.session.selected, view.chosen, self.size.width
         name = f"{view.session.selected_bus}:{name_of(glance)}" if glance is not None else "no drive: ^O chooses one"
         text, role = glance.sign(view.now) if glance is not None else ("", "dim")
@@ -74,15 +61,13 @@ class WhyPage(AskingPage):
             helps = helping(glance, drive)
             said: Row = ((f" {self.said[0]}", self.said[1]),) if self.said[0] else rule("what helps", width)
             self.lines("helps").put([said, *(((f" {key:<4}", "key"), (text, "text")) for key, text in helps)])
-        self._painted = self._begun is not None and (self._painted or self.host.keyboard.idle)
+        self.painted = self.begun is not None and (self.painted or self.host.keyboard.idle)
 
     def _rows(self, view: View, glance: Glance, drive: Drive) -> list[Row]:
         width, height = self.lines("why").size
         wide = width >= WIDE
-        room, one = (
-            width // 2 if wide else width,
-            replace(view, only=(Series(view.session.selected_bus, glance.address),)),
-        )
+        room = width // 2 if wide else width
+        one = replace(view, only=(Series(view.session.selected_bus, glance.address),))
         known = [*self._facts(view, glance, drive, room)]
         spare = height - len(known) - SENT - 1 - (0 if wide else LOW)
         rows = [*drive_rows(view, room, max(LEAST, spare)), *known]
@@ -91,12 +76,8 @@ class WhyPage(AskingPage):
         if not wide:
             return [*rows[: height - LOW], *self._curves(one, glance, width, height - min(len(rows), height - LOW))]
         curves = self._curves(one, glance, width - room - 1, height)
-        rows += [()] * (len(curves) - len(rows))
         curves += [()] * (len(rows) - len(curves))
-        return [
-            (*row, (" " * (room - width_of(row)), "text"), ("│", "rule"), *curve)
-            for row, curve in zip(rows, curves, strict=True)
-        ][:height]
+        return beside(rows, [(("│", "rule"), *curve) for curve in curves], room)[:height]
 
     def _curves(self, view: View, glance: Glance, width: int, height: int) -> list[Row]:
         """The last seconds as charts, or as a row each where there is no room for a chart."""
@@ -124,38 +105,29 @@ class WhyPage(AskingPage):
             for each in self.host.last_records(LOOKED)
             if each.mark in MARKS and each.address == glance.address and not each.text.startswith("/")
         ]
-        clock = view.session.wall
-        return [rule("sent to it last", width), *news_rows(own[-most:], lambda at: f"{clock(at):%H:%M:%S}", width)]
+        return [rule("sent to it last", width), *news_rows(own[-most:], view.session.wall, width)]
 
     # Keys
 
     def action_read_error(self) -> None:
-        """Show the line that reads or clears the error; Enter sends it."""
         drive = self.host.session.selected
         lines = error_lines(drive, self.host.model.bus("").readout(drive.address).axes) if drive is not None else ()
-        self._begun = self.begin("error", lines=lines) if lines else None
-        self._painted = False
+        self.begun = None
+        if lines:
+            self.offer("error", lines)
         what = f"Enter sends {lines[0]}: {CLEARS}   Esc: nothing" if lines else "no error is set that a line reads"
         self.say(what)
 
     def action_go(self) -> None:
-        """Send the line that was begun."""
-        begun = self._begun
-        if begun is None or not self._painted:
-            return  # an Enter that was typed before the line was seen
-        self._begun = None
-        if self.overtaken(begun):
-            self.say("nothing was sent: a stop or another drive came in between")
-            return
-        self.host.outbox.type(begun.lines[0])
-        self.say(f"sent: {begun.lines[0]}", "dim")
+        if (begun := self.accepted()) is not None:
+            self.send(begun.lines)
 
     def action_leave(self) -> None:
         """Drop the line that waits for Enter, else leave the page."""
-        if self._begun is None:
+        if self.begun is None:
             super().action_leave()
             return
-        self._begun = None
+        self.begun = None
         self.say("nothing was sent")
 
 

@@ -49,8 +49,7 @@ class Banner(Lines):
 
     def show(self, row: Row) -> None:
         """Show a row; hide for an empty one."""
-        if self.display != bool(row):
-            self.display = bool(row)
+        self.display = bool(row)
         self.put([row])
 
 

@@ -24,14 +24,13 @@ from textual.widgets.input import Selection
 from multidrop.dialects import Diagnostic
 from multidrop.dialects.files import lines_of
 from multidrop.tui.text import fit
-from multidrop.tui.widgets.lines import Lines, Row
+from multidrop.tui.widgets.lines import Row
 
 if TYPE_CHECKING:
     from multidrop.shell.prompt.complete import Completion
 
 LISTED = 8
 """Number of completions in view."""
-MENU_WIDTH = 64
 LONGEST = 200
 """Length in characters from which no line is looked up: no command is that long."""
 
@@ -43,11 +42,8 @@ class Complete(Protocol):
         """Return the completions. `learned`: a person asks for them; it is called when there are more."""
 
 
-class Typed(Protocol):
-    """Takes a submitted line. It calls `empty`, which empties the input line, once the line is on its way."""
-
-    async def __call__(self, line: str, empty: Callable[[], object], /) -> None:
-        """Send the line."""
+Typed = Callable[[str, Callable[[], object]], Awaitable[None]]
+"""Takes a submitted line, and calls the function, which empties the input line, once the line is on its way."""
 
 
 class Recall:
@@ -260,17 +256,3 @@ class Entry(Input):
             await self._pasted(lines)
         elif lines:
             self.replace(lines[0].replace("\t", " "), *self.selection)
-
-
-class Menu(Lines):
-    """The list of completions, above the line."""
-
-    def show(self, listing: Listing, left: int, below: int) -> None:
-        """Show the list with its text at column `left` and `below` lines under it, or hide it."""
-        self.display = listing.open
-        if listing.open:
-            width = min(MENU_WIDTH, self.screen.size.width - left - 1)
-            rows = listing.rows(width)
-            self.styles.width, self.styles.height = width, len(rows)
-            self.styles.margin = (0, 0, below, max(0, left - 1))
-            self.put(rows)

@@ -29,21 +29,8 @@ MOST_STRIPS = 500
 """Strips that are kept."""
 SERIES = ("series1", "series2", "series3", "series4", "series5", "series6")
 """The roles of curves."""
-ROLES = (
-    "text",
-    "strong",
-    "dim",
-    "accent",
-    "focus",
-    "found",
-    "motion",
-    "error",
-    "stop",
-    "latched",
-    "key",
-    "rule",
-    *SERIES,
-)
+PLAIN_ROLES = ("text", "strong", "dim", "accent", "focus", "found", "motion", "error", "stop", "latched", "key", "rule")
+ROLES = (*PLAIN_ROLES, *SERIES)
 
 
 class Link(str):
@@ -112,6 +99,11 @@ class Lines(Widget):
             if before[y : y + 1] != self.rows[y : y + 1]:
                 self.refresh(Region(0, y, self.size.width, 1))
 
+    def put_all(self, rows: Sequence[Row]) -> None:
+        """Show rows, in as many lines as they are."""
+        self.styles.height = len(rows)
+        self.put(rows)
+
     def notify_style_update(self) -> None:
         super().notify_style_update()
         self._styles_of.clear()
@@ -173,13 +165,11 @@ class Lines(Widget):
         rows = self.shown()
         return self.strip(rows[y] if y < len(rows) else (), self.size.width)
 
-    def _action_at(self, y: int) -> str:
-        row = self.rows[y] if y < len(self.rows) else ()
-        return next((text.action for text, _ in row if isinstance(text, Link)), "")
-
     async def on_click(self, event: events.Click) -> None:
-        if action := self._action_at(event.y):
-            await self.run_action(action)
+        row = self.rows[event.y] if event.y < len(self.rows) else ()
+        link = next((text for text, _ in row if isinstance(text, Link)), None)
+        if link is not None:
+            await self.run_action(link.action)
 
     @property
     def plain(self) -> str:

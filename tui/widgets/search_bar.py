@@ -7,17 +7,15 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable
-from typing import ClassVar
 
 from textual.app import ComposeResult
-from textual.binding import BindingType
 from textual.containers import Horizontal
 from textual.geometry import Size
 from textual.reactive import Reactive
 from textual.widgets import Input
 
 from multidrop.dialects.text import counted
-from multidrop.tui.key_table import bound, hint
+from multidrop.tui.key_table import Keyed, hint
 from multidrop.tui.widgets.lines import Lines, Row, spread, width_of
 from multidrop.tui.widgets.transcript import Transcript
 from multidrop.tui.widgets.viewport import Picked, Search
@@ -35,10 +33,10 @@ PICK_KEYS = (f"{hint('pick')} ", "Enter copy   Esc close ", "Enter ")
 KEYS = (f"   {hint('find')} ", "   Esc close ", "")
 
 
-class FindField(Input):
+class FindField(Keyed, Input):
     """The searched text. `edited` takes each change, `act` the keys."""
 
-    BINDINGS: ClassVar[list[BindingType]] = bound("find")
+    SHEET = "find"
     virtual_size = Reactive(Size(0, 0))
     """As of the input line: a longer text changes no layout."""
 
@@ -54,10 +52,10 @@ class FindField(Input):
         self._act(what)
 
 
-class PickBar(Lines, can_focus=True):
+class PickBar(Keyed, Lines, can_focus=True):
     """The keys while lines are picked. `move` takes lines and whether to extend, `act` the other keys."""
 
-    BINDINGS: ClassVar[list[BindingType]] = bound("pick")
+    SHEET = "pick"
 
     def __init__(self, move: Callable[[int, bool], None], act: Callable[[str], None]) -> None:
         super().__init__(id="pick")
@@ -203,8 +201,7 @@ class Reader(Horizontal):
         counts = f"{place} of {count}" if count else "nothing" if search.text else ""
         keys = next(each for each in KEYS if not each or len(each) + COUNTS + LEAST <= self.size.width)
         room = len(keys) + COUNTS
-        if self._words.styles.width is None or self._words.styles.width.value != room:
-            self._words.styles.width = room
+        self._words.styles.width = room
         return spread((), ((counts, "strong" if count or not search.text else "error"), (keys, "dim")), room)
 
 

@@ -7,8 +7,9 @@ one of the same width. So a new sign is added to the tables here, and no other m
 
 from __future__ import annotations
 
+import os
 import sys
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from enum import Enum
 from functools import lru_cache
 from typing import Any
@@ -17,6 +18,7 @@ from rich.cells import cell_len
 from rich.segment import Segment
 from textual.app import App
 from textual.color import Color
+from textual.driver import Driver
 from textual.filter import LineFilter
 from textual.theme import BUILTIN_THEMES, Theme
 
@@ -156,10 +158,30 @@ def ink_of(signs: Signs) -> Ink:
     return INKS[signs.value]
 
 
-def dress(app: App[int], look: Look) -> None:
-    """Use the theme that a configuration names, else one that fits the terminal."""
-    for theme in THEMES:
-        app.register_theme(theme)
-    app.theme = theme_for(None if app.no_color else app.console.color_system)
-    if look.theme in app.available_themes and not app.no_color:
-        app.theme = look.theme
+class Dressed(App[int]):
+    """An app with our themes, and with the signs that the font of its terminal holds."""
+
+    ENABLE_COMMAND_PALETTE = False
+    """Textual's own palette; ours is a `Search`, in which keys keep their order."""
+
+    def __init__(self, look: Look, driver: type[Driver] | None = None) -> None:
+        # With NO_COLOR, only this makes Textual take colours away altogether; else it makes greys of them.
+        super().__init__(driver_class=driver, ansi_color=True if "NO_COLOR" in os.environ else None)
+        self.signs = SignFilter(signs_for(look.signs, os.environ))
+
+    def dress(self, look: Look) -> None:
+        """Use the theme that a configuration names, else one that fits the terminal."""
+        for theme in THEMES:
+            self.register_theme(theme)
+        self.theme = theme_for(None if self.no_color else self.console.color_system)
+        if look.theme in self.available_themes and not self.no_color:
+            self.theme = look.theme
+
+    def get_line_filters(self) -> Sequence[LineFilter]:
+        """The filters of Textual, and the one that replaces signs; it comes last."""
+        filters = super().get_line_filters()
+        return filters if self.signs.font is Signs.FULL else [*filters, self.signs]
+
+    def get_theme_variable_defaults(self) -> dict[str, str]:
+        """Colours for themes that are not ours."""
+        return DEFAULTS

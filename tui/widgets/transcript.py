@@ -144,8 +144,9 @@ def chosen(row: Row) -> Row:
 class Transcript(Lines, can_focus=False):
     """Shows records; see the module. `times`: the form of their times, a word of `TIMES`."""
 
-    def __init__(self, clock: Callable[[float], str], times: str = "clock", *, id: str | None = None) -> None:
-        super().__init__(id=id)
+    def __init__(self, clock: Callable[[float], str], times: str = "clock", *, foot: bool = True) -> None:
+        super().__init__()
+        self._has_foot = foot
         self.records = Records()
         self.sight = Sight(self.records)
         self.clocks = Clocks(times, clock)
@@ -243,7 +244,7 @@ class Transcript(Lines, can_focus=False):
         if self._view is None:
             sight = self.sight
             sight.height = self.size.height
-            foot = self._foot(self.size.width)
+            foot = self._foot(self.size.width) if self._has_foot else []
             height = self.size.height - len(foot)
             numbers, place = sight.numbers, sight.end
             valid = (self.size.width, self.clocks.form, self.clocks.names, sight.filter)

@@ -8,9 +8,8 @@ from __future__ import annotations
 
 from bisect import bisect_left, bisect_right, insort
 from collections import deque
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from itertools import islice
-from typing import Protocol
 
 from multidrop.shell.line_syntax import EVERYONE
 from multidrop.shell.roles import EVERYTHING, Filter
@@ -44,9 +43,6 @@ class Records:
 
     def __iter__(self) -> Iterator[Record]:
         return iter(self._kept)
-
-    def __reversed__(self) -> Iterator[Record]:
-        return reversed(self._kept)
 
     def __getitem__(self, number: int) -> Record:
         return self._kept[number - self.first]
@@ -105,11 +101,8 @@ def concerns(wanted: Filter, record: Record) -> bool:
     return (of_drive or not wanted.address) and (of_person or not wanted.mine)
 
 
-class Chooser(Protocol):
-    """Chooses records: given each one in turn, it returns the numbers to add, of that one or of earlier ones."""
-
-    def __call__(self, number: int, record: Record) -> tuple[int, ...]:
-        """Return the numbers to add."""
+Chooser = Callable[[int, Record], tuple[int, ...]]
+"""Chooses records: given each one in turn, it returns the numbers to add, of that one or of earlier ones."""
 
 
 class Shown:
@@ -141,18 +134,16 @@ class Shown:
         return (number,) if line is None else (line, number)
 
 
-class Holding:
-    """Chooses those of the shown records that hold a text, in capitals or not."""
+def holding(text: str, records: Records, shown: Chooser | None) -> Chooser:
+    """Choose those of the shown records that hold a text, in capitals or not. `shown`: None shows all."""
+    wanted = text.casefold()
 
-    def __init__(self, text: str, records: Records, shown: Chooser | None) -> None:
-        """`shown` chooses the records that are shown; None: all are."""
-        self._text, self._records, self._shown = text.casefold(), records, shown
+    def holds(number: int, record: Record) -> tuple[int, ...]:
+        if shown is None:
+            return (number,) if wanted in record.text.casefold() else ()
+        return tuple(each for each in shown(number, record) if wanted in records[each].text.casefold())
 
-    def __call__(self, number: int, record: Record) -> tuple[int, ...]:
-        if self._shown is None:
-            return (number,) if self._text in record.text.casefold() else ()
-        shown = self._shown(number, record)
-        return tuple(each for each in shown if self._text in self._records[each].text.casefold())
+    return holds
 
 
 class Index:
@@ -308,7 +299,7 @@ class Search:
         """Search for a text: the newest record from the bottom of the view upwards, else the next one below."""
         self.text = text
         sight = self._sight
-        self._index = Index(sight.records, Holding(text, sight.records, sight.shown())) if text else None
+        self._index = Index(sight.records, holding(text, sight.records, sight.shown())) if text else None
         numbers = self.numbers
         place = bisect_right(numbers, self._from)
         self.at = numbers[max(place - 1, 0)] if numbers else None
