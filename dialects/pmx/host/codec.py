@@ -29,8 +29,8 @@ Neither is what is left of several: no value has these letters alone, and none i
 STORED, TOKEN = re.compile(r"SA\d+", re.ASCII), "(?![OK]+$).*"
 """A read of a line of a program, and its reply, which is empty where nothing is stored."""
 WRITES_FLASH = re.compile(r"STORE|SA\d+=", re.ASCII)
-MARKED = re.compile(r"\?Q(\d\d)?\d{3}", re.ASCII)
-"""The reply to a sync mark (`exchange`)."""
+MARKED = re.compile(r"\?(?:Q(?:\d\d)?\d{3}|~~~)", re.ASCII)
+"""The reply to a sync mark (`exchange`), and to what ends a half-sent line before a stop."""
 NO_TEXT = b"\n\0"
 """Bytes that some gateways and drivers add."""
 

@@ -109,6 +109,7 @@ def test_an_answer_is_the_same_whole_and_byte_by_byte(text, data):
         ("V1", b"K\r7\r", "7"),
         ("V1", b"OOK\r7\r", "7"),
         ("V1", b"\r7\r", "7"),
+        ("X1000", b"?~~~\rOK\r", "OK"),
     ],
 )
 def test_a_late_answer_of_the_other_kind_is_none(text, heard, found):
