@@ -101,6 +101,7 @@ async def test_a_held_enter_plays_once_and_the_end_of_a_macro_waits_for_no_line_
         await pilot.press("down", *["enter"] * 20, "ctrl+b")
         await until(pilot, lambda: [line for line, _ in session.lines] == ["/play shuttle", "/play stop shuttle"])
         session.time += 1
+        await settle(pilot)
         await pilot.press("enter")  # the session says that it plays
         await until(pilot, lambda: len(session.lines) == 3)
         session.gate.set()
