@@ -56,9 +56,9 @@ def running(program: str) -> MCodeDevice:
 
 def rate(device: MCodeDevice, until: float) -> float:
     """Lines a second up to a time of the drive's."""
-    before, begin = device.interpreter.executed, time.process_time()
+    before, begin = device.thread.executed, time.process_time()
     device.advance(until)
-    return (device.interpreter.executed - before) / (time.process_time() - begin)
+    return (device.thread.executed - before) / (time.process_time() - begin)
 
 
 def calls(count: int = 1_000_000) -> float:

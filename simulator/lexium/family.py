@@ -10,9 +10,10 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from difflib import get_close_matches
 from fractions import Fraction
+from functools import partial
 
 from multidrop.dialects.family import Motion
-from multidrop.dialects.mcode.manual.grammar import LineError, is_name, parse
+from multidrop.dialects.mcode.manual.grammar import is_name, parsed
 from multidrop.dialects.mcode.manual.statements import UNNAMED, canonical, size_of
 from multidrop.dialects.mcode.manual.table import lookup, words
 from multidrop.dialects.units import Scale
@@ -20,7 +21,6 @@ from multidrop.dialects.values import VARIABLES, Reading, Scalar, Snapshot, Valu
 from multidrop.simulator.cell.drive_keys import (
     WORLD_KEYS,
     AxisScale,
-    Check,
     common_keys,
     read_identity,
     read_settings,
@@ -55,7 +55,7 @@ def read_drive(table: Table, folder: Folder) -> DriveSpec:
     counters = ["position", *(name for name in ("C1", "C2") if name in known and personality in known[name].products)]
     world = table.table("world", "[bus.drive.world]")
     world.only(*WORLD_KEYS)
-    settings, scales = read_settings(table.table("set", "set"), _checker(personality)), read_units(table)
+    settings, scales = read_settings(table.table("set", "set"), partial(_check, personality)), read_units(table)
 
     def valid(name: str) -> bool:
         return is_name(name) and lookup(name, personality) is None and len(name) <= model.longest_name
@@ -81,26 +81,23 @@ def _axis_scale(personality: str, settings: Mapping[str, Value], scales: Mapping
     return AxisScale(scales.get(""), Fraction(REVOLUTION), Fraction(REVOLUTION) / Fraction(turn))
 
 
-def _checker(personality: str) -> Check:
-
-    def check(table: Table, word: str, value: Value) -> None:
-        if (key := KEY_OF.get(word.upper())) is not None:
-            raise table.wrong(word, "has a key of its own", f'use "{key}"')
-        row = lookup(word, personality)
-        if row is None:
-            settable = [name for name, each in words(personality).items() if "W" in each.access and name.isalnum()]
-            near = get_close_matches(word.upper(), settable, n=1)
-            hint = f'did you mean "{near[0]}"?' if near else ""
-            raise table.wrong(quoted(word), f"is not an MCode mnemonic of an {personality}", hint)
-        if "W" not in row.access:
-            raise table.wrong(word, f"cannot be set ({row.title})")
-        encoder = table.values.get("EE") == 1 and not table.values.get("AS")
-        if isinstance(value, (int, float)) and not row.accepts(value, encoder):
-            low, high = row.bounds(encoder)
-            wanted = f"one of {', '.join(map(str, row.values))}" if row.values else f"from {low} to {high}"
-            raise table.wrong(word, f"must be {wanted}, not {shown(value)}")
-
-    return check
+def _check(personality: str, table: Table, word: str, value: Value) -> None:
+    """Refuse a mnemonic of `set` that the product does not have, and a value that it does not take."""
+    if (key := KEY_OF.get(word.upper())) is not None:
+        raise table.wrong(word, "has a key of its own", f'use "{key}"')
+    row = lookup(word, personality)
+    if row is None:
+        settable = [name for name, each in words(personality).items() if "W" in each.access and name.isalnum()]
+        near = get_close_matches(word.upper(), settable, n=1)
+        hint = f'did you mean "{near[0]}"?' if near else ""
+        raise table.wrong(quoted(word), f"is not an MCode mnemonic of an {personality}", hint)
+    if "W" not in row.access:
+        raise table.wrong(word, f"cannot be set ({row.title})")
+    encoder = table.values.get("EE") == 1 and not table.values.get("AS")
+    if isinstance(value, (int, float)) and not row.accepts(value, encoder):
+        low, high = row.bounds(encoder)
+        wanted = f"one of {', '.join(map(str, row.values))}" if row.values else f"from {low} to {high}"
+        raise table.wrong(word, f"must be {wanted}, not {shown(value)}")
 
 
 TRIPS = frozenset({"TA", "TC", "TI", "TM", "TP", "TR", "TT"})
@@ -245,7 +242,8 @@ def _placed(rows: Sequence[Row], personality: str, variables: Iterable[str]) -> 
             following = address
         moved += address not in (0, following)
         lines.append(text)
-        following += _size(text, names, personality) if address else 0
+        statement = parsed(text, names) if address else None
+        following += size_of(statement, personality) if statement is not None else 0
     if lines:
         lines.append("PG")
     return lines, [f"{moved} lines of its program have other addresses in the simulator"] if moved else []
@@ -260,14 +258,6 @@ def _remarked(snapshot: Snapshot) -> list[Row]:
         rows.append((int(place) if place.isdecimal() else 0, text))
     known = [address for address, _ in rows if address]
     return rows if known == list(addresses) else []
-
-
-def _size(text: str, names: frozenset[str], personality: str) -> int:
-    try:
-        statement = parse(text, names)
-    except LineError:
-        return 0
-    return size_of(statement, personality) if statement is not None else 0
 
 
 def _names(rows: Iterable[Row], variables: Iterable[str]) -> frozenset[str]:

@@ -19,7 +19,7 @@ from multidrop.dialects.files import split_lines
 from multidrop.dialects.mcode.manual import program_file
 from multidrop.dialects.mcode.manual.errors import ErrorNumber
 from multidrop.dialects.mcode.manual.errors import text as text_of_error
-from multidrop.dialects.mcode.manual.grammar import LineError, Name, Number, Statement, parse, words
+from multidrop.dialects.mcode.manual.grammar import Name, Number, parsed, words
 from multidrop.dialects.mcode.manual.help import remedy
 from multidrop.dialects.mcode.manual.program_file import ProgramLine
 from multidrop.dialects.mcode.manual.statements import size_of
@@ -349,16 +349,9 @@ def refusals(text: str, file: str, personality: str, found: Sequence[Problem]) -
     return problems
 
 
-def _statement(text: str) -> Statement | None:
-    try:
-        return parse(text)
-    except LineError:
-        return None
-
-
 def _too_big(line: ProgramLine, lines: Sequence[ProgramLine], personality: str) -> Problem:
     inside = [each for each in lines if each.section == "program" and each.mark is None]
-    size = sum(size_of(statement, personality) for each in inside if (statement := _statement(each.text)) is not None)
+    size = sum(size_of(statement, personality) for each in inside if (statement := parsed(each.text)) is not None)
     what = f"program too big: {len(inside)} lines take {size} bytes, the drive holds {SPACE}"
     return Problem(line.number, line.column, what, "shorten the program; this line is the first without room")
 

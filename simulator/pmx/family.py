@@ -12,6 +12,7 @@ from __future__ import annotations
 import struct
 from collections import deque
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field
 from fractions import Fraction
 
@@ -131,19 +132,14 @@ def program(spec: DriveSpec) -> StoredProgram:
 
 def _program(snapshot: Snapshot) -> list[str]:
     """The program as its file, or as A-SCRIPT, where that gives the same memory; else as compiled lines."""
-    tokens = [token for _, token in snapshot.program]
-    for script in (list(snapshot.remarked), _script(snapshot)):
+    tokens, scripts = [token for _, token in snapshot.program], [list(snapshot.remarked)]
+    with suppress(Undecodable):
+        scripts.append(program_file.readable([f"SA{at}={token}" for at, token in snapshot.program]))
+    for script in scripts:
         text = "\n".join(script)
         if script and not errors(program_file.check(text)) and program_file.memory(text, "program") == tokens:
             return script
     return [f"SA{at}={token}" for at, token in snapshot.program if token != ERASED]
-
-
-def _script(snapshot: Snapshot) -> list[str]:
-    try:
-        return program_file.readable([f"SA{at}={token}" for at, token in snapshot.program])
-    except Undecodable:
-        return []
 
 
 def _worlds(snapshot: Snapshot) -> dict[str, dict[str, object]]:

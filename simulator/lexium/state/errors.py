@@ -9,8 +9,6 @@ from collections.abc import Callable, Mapping, MutableMapping
 from dataclasses import dataclass
 from operator import itemgetter
 
-from multidrop.simulator.wire import BITS_A_BYTE
-
 Event = tuple[float, Callable[[float], None]]
 """When something happens, s, and what carries it out then."""
 when = itemgetter(0)
@@ -36,8 +34,8 @@ class Timeline:
 
 
 CRLF = "\r\n"
-TRANSMIT_BUFFER = 256
-"""Bytes that wait to be sent when the next print waits, or is lost (the manual names the error, not the size)."""
+BITS_A_BYTE, TRANSMIT_BUFFER = 10, 256
+"""Bits on the wire for a byte; bytes that wait to be sent when the next print waits, or is lost (not in the manual)."""
 
 
 class Printer:

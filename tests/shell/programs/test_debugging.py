@@ -28,7 +28,7 @@ async def test_each_step_executes_one_line_and_shows_what_it_changed(tmp_path: P
         rows = await run(it, "/step G1")
         assert [row for row in rows if row.startswith("->")] == ["->  6  VA Q1=0"]
         device = it.device("line:!")
-        assert device.stepping and keys(it) == 0
+        assert device.thread.stepping and keys(it) == 0
         assert await run(it, "/step") == shown(6)
         assert await run(it, "/watch Q1 P") == ["Q1=0   P=0"]
         assert not it.moving()
@@ -37,7 +37,7 @@ async def test_each_step_executes_one_line_and_shows_what_it_changed(tmp_path: P
         await run(it, "/wait stopped")
         assert await run(it, "/step") == ["26  H   P=51200"]
         assert await run(it, "/step") == ["28  IC Q1   Q1=1"]
-        assert device.stepping
+        assert device.thread.stepping
 
 
 @pytest.mark.parametrize("drive", [serial("!", party=False), serial("!", party=False, product="MDI"), ethernet()])
@@ -56,7 +56,7 @@ async def test_a_traced_program_waits_at_its_break_point(tmp_path: Path, drive: 
             "   33  BR K1,Q1<3",
         ]
         assert any("waits at the break point K1" in text and "P=51200" in text for text in it.told())
-        assert it.device("line:!").stepping and not it.moving()
+        assert it.device("line:!").thread.stepping and not it.moving()
         assert (await run(it, "/step"))[0].startswith("19  MR 51200") and it.moving()
 
 
@@ -91,9 +91,9 @@ async def test_no_key_is_sent_while_a_motion_is_waited_for(it: CellSession) -> N
 
 async def test_enter_runs_on_and_a_break_shows_where_it_is(it: CellSession) -> None:
     await run(it, "/step K3", "/step", "/continue")
-    assert it.device("line:!").running and not it.device("line:!").stepping
+    assert it.device("line:!").running and not it.device("line:!").thread.stepping
     await run(it, "/sleep 1", "/break now")
-    assert it.device("line:!").stepping
+    assert it.device("line:!").thread.stepping
     assert (await run(it, "/step"))[0].split("  ")[1] in ("IC R1", "BR K3")
 
 
@@ -161,7 +161,7 @@ async def test_a_stop_ends_program_and_single_step_and_says_so(it: CellSession) 
     await run(it, "/break K1", "/step G1", "/step", "/step")
     it.session.stop()
     await asyncio.sleep(2)
-    assert not it.moving() and not it.device("line:!").stepping
+    assert not it.moving() and not it.device("line:!").thread.stepping
     assert any("no program runs, and single step is over" in text for text in it.told())
     it.events.clear()
     with pytest.raises(Refused, match="none was sent|no key was sent"):
@@ -234,10 +234,10 @@ async def test_what_is_refused_before_it_is_sent_counts_as_no_start(it: CellSess
 )
 async def test_wrong_words_are_one_line_and_nothing_is_sent(it: CellSession, line: str, told: str) -> None:
     await run(it, "/list")
-    witness = it.device("line:!").interpreter.executed
+    witness = it.device("line:!").thread.executed
     with pytest.raises(Diagnostic, match=told):
         await it.session.run(line)
-    assert it.device("line:!").interpreter.executed == witness and not it.device("line:!").running
+    assert it.device("line:!").thread.executed == witness and not it.device("line:!").running
 
 
 async def test_a_label_that_is_not_there_is_refused_by_the_drive(it: CellSession) -> None:

@@ -35,7 +35,7 @@ class Taken:
 
     @property
     def executed(self) -> int:
-        return int(self._device.interpreter.executed)
+        return int(self._device.thread.executed)
 
 
 async def test_nothing_but_step_and_continue_presses_a_key(tmp_path: Path) -> None:
