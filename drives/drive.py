@@ -341,8 +341,9 @@ class Drive:
     def starts_now(self) -> None:
         """Note that something that can start it is being sent; with a global address, note it for all drives."""
         if self.link.away is None:
+            at = self.link.stamp()
             for each in self._meant:
-                each.started_at = each.commanded_at = self.link.now()
+                each.started_at = each.commanded_at = at
                 each._judged.still.clear()
 
     @property

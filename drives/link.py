@@ -8,6 +8,7 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from math import inf, nextafter
 
 from multidrop.dialects import End, Kind, Priority, Request
 from multidrop.drives import events
@@ -68,6 +69,7 @@ class Link:
         """The port was still open when it was shut."""
         self._loop = running_loop()
         self.now = self._loop.time
+        self._stamped = -inf
         self._waiting: dict[int, OnAnswer] = {}
         self._advancing = self._further = False
         self._news = events.EventQueue(name)
@@ -93,6 +95,11 @@ class Link:
     def cut(self) -> str:
         """The command that was on its way as the transport broke; the drives may hold a part of it."""
         return self.departure.under_way
+
+    def stamp(self) -> float:
+        """The time now, s, or hardly more: each stamp is later than the one before, so stops and starts have an order."""
+        self._stamped = max(self.now(), nextafter(self._stamped, inf))
+        return self._stamped
 
     def resume(self, transport: Transport) -> None:
         self.line.overtaken = False  # a stop that met the loss went to the old transport

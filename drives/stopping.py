@@ -218,7 +218,7 @@ class Stopping:
         `follows`: it may be the one that follows a call of `ahead`. Failures go to `Halt.trouble`.
         """
         drives = tuple(self._roster.all_drives if only is None else only)
-        halt = Halt(self._link, self._link.now(), self._link.stops, only is None, drives)
+        halt = Halt(self._link, self._link.stamp(), self._link.stops, only is None, drives)
         if halt.whole:
             self.last = halt
             self._missed = self._missed and not follows

@@ -121,6 +121,18 @@ async def test_a_drive_that_is_started_again_after_a_stop_is_left_to_its_operato
     assert halt.fate(shop.bus.drives["a"]) is Fate.STARTED
 
 
+async def test_a_drive_that_is_started_in_the_moment_of_a_stop_is_left_to_its_operator_if_it_came_after_it():
+    shop = await SimulatedBus(party("a")).open("a")
+    drive = shop.bus.drives["a"]
+    drive.starts_now()
+    halt = shop.bus.stop()
+    assert drive.commanded_at < halt.at == pytest.approx(drive.link.now()) and halt.not_started == (drive,)
+    drive.starts_now()
+    assert halt.started_since(drive) and halt.not_started == ()
+    assert shop.bus.stop().not_started == (drive,)
+    await shop.bus.stopped()
+
+
 async def test_a_line_that_is_refused_after_a_stop_does_not_end_its_confirmation():
     shop = await SimulatedBus(party("a"), party("b")).open("a", "b")
     await shop.send("b", "SL 50000")

@@ -162,7 +162,7 @@ def _only_ended_by(world: World, run: Run, started: Executed) -> bool:
         return False
     others = (each for each in told.runs.values() if each is not run and each.failure and each.ended >= started.at)
     return not (
-        any(each >= started.at for each in told.halts)
+        any(each >= started.at for each in (*told.halts, *(stop.at for stop in world.history.stops)))
         or any(others)
         or started.line in told.raw_written  # ESC and ^C are typed there
         or world.climate.wire.harmful
