@@ -97,7 +97,7 @@ class Link:
         return self.departure.under_way
 
     def stamp(self) -> float:
-        """The time now, s, or hardly more: each stamp is later than the one before, so stops and starts have an order."""
+        """The time now, s; always later than the stamp before, so that stops and starts have an order."""
         self._stamped = max(self.now(), nextafter(self._stamped, inf))
         return self._stamped
 
