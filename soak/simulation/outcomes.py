@@ -109,7 +109,10 @@ def _refused(world: World) -> Iterator[str | Granted]:
         if times and command.outcome is Outcome.REFUSED:
             bare = not world.place(command.line).checked
             noise = _damage(world.history, command.line, command.began - AFTER, command.ended)
-            yield Granted(BARE_REFUSAL, words) if bare and noise else words
+            if _astray(world, command.line, command.began - AFTER, command.ended):
+                yield Granted(ASTRAY, words)
+            else:
+                yield Granted(BARE_REFUSAL, words) if bare and noise else words
 
 
 def _lost(world: World) -> Iterator[str | Granted]:
@@ -282,7 +285,7 @@ OUTCOMES = (
         (BARE_COMMAND, NOISY_NAK, ASTRAY),
     ),
     Rule("denied", "What was said to be not sent was not executed.", NOISE, _denied, (BARE_COMMAND,)),
-    Rule("refused", "What was said to be refused was not executed.", NOISE, _refused, (BARE_REFUSAL,)),
+    Rule("refused", "What was said to be refused was not executed.", NOISE, _refused, (BARE_REFUSAL, ASTRAY)),
     Rule(
         "lost",
         "What was said to be done was executed.",

@@ -16,7 +16,6 @@ from multidrop.dialects import Diagnostic, DriveError
 from multidrop.drives.stopping import stop_forms
 from multidrop.shell.events import By
 from multidrop.shell.line_syntax import DriveLine, VerbLine
-from multidrop.shell.programs import transfers
 from multidrop.shell.session import LinePath
 from soak.simulation.acts.phrases import PHRASES
 from soak.simulation.told import Put, Run
@@ -75,7 +74,7 @@ class WatchedPath(LinePath):
                 history.told.raw.append(put)
                 return put
             drive = session.drive(bus.name, parsed.address)
-            waits = drive in transfers._under_way or bus._stopping.tasks  # for the end of program mode
+            waits = not drive.stores or bus._stopping.tasks  # for the end of program mode
             if drive.programming and (command := history.commands.pop(typed, None)) is not None:
                 if waits:  # it may be stored or executed, once
                     history.told.repeated[command.line, command.drive, command.text] = 1
