@@ -28,7 +28,7 @@ DONE, VALUE = "OK", "(?![OK]+$).*"
 Neither is what is left of several: no value has these letters alone."""
 WRITES_FLASH = re.compile(r"STORE|SA\d+=", re.ASCII)
 MARKED = re.compile(r"\?Q(\d\d)?\d{3}", re.ASCII)
-"""The reply to a sync mark (`exchange`)."""
+"""The reply to a sync mark (`exchange`). A line that begins with it and goes on is two replies: its end was lost."""
 NO_TEXT = b"\n\0"
 """Bytes that some gateways and drivers add."""
 
@@ -78,7 +78,7 @@ class Pmx(Codec):
                 continue
             if request.gather:
                 return Decoded(Reply((*strays, text), acknowledged=True), at)
-            if any(not " " <= c <= "~" for c in text):
+            if any(not " " <= c <= "~" for c in text) or (MARKED.match(text) and text != f"?{request.text}"):
                 reply = Reply(end=End.DAMAGED, detail=f"heard {text[:48]!r}")
             elif text.startswith("?"):
                 reply = Reply((text,), End.REFUSED)
