@@ -47,6 +47,10 @@ FIXED = {
     100155: "a datagram that came late, and confirmed a command that was lost (of the simulation itself)",
     100924: "a datagram that came twice, and was shown as the next value (of the simulation itself)",
     100531: "a late reply of a PMX to a stop, which confirmed a command that was lost (of the simulation itself)",
+    495: "a stop whose rest the next one dropped, among those of a key that is held down (of the simulation itself)",
+    669: "the last value of another drive, which `log judge` took for one that a mark signs",
+    762: "the reply to a mark without its end, which was shown as the refusal of the next line",
+    1320: "a question that noise gave the number of another controller (of the simulation itself)",
     200066: "the rest of a Modbus message that was half-sent at a stop (of the simulation itself)",
 }
 DERIVED = 12
