@@ -29,13 +29,13 @@ class Word(Enum):
 
 MISDEEDS = ("twice", "denied", "lost", "credited to the wrong drive", "an older value", "taken for a reply")
 """Misdeeds. `denied`: the host said that it was not executed, and it was. `lost`: the opposite."""
-DENIED = re.compile(r"was not (sent|executed)|not executed|nothing was sent|is not sent")
+BEFORE = re.compile(r"' was executed before the stop")
 PERHAPS = re.compile(r"may have been executed|it was executed|not known whether|it was sent once|may be its running")
 UNCONFIRMED = re.compile(r"not confirmed|not known whether")
 
 
 def word(result: tuple[str, ...] | BaseException, notices: list[str]) -> Word:
-    """Read what the host says."""
+    """Read what the host says. A failure that leaves no doubt says that it was not executed."""
     if not isinstance(result, BaseException):
         return Word.UNCONFIRMED if any(UNCONFIRMED.search(each) for each in notices) else Word.DONE
     text = str(result)
@@ -43,7 +43,7 @@ def word(result: tuple[str, ...] | BaseException, notices: list[str]) -> Word:
         return Word.UNKNOWN
     if isinstance(result, Refused):
         return Word.REFUSED
-    return Word.NOT_EXECUTED if DENIED.search(text) else Word.UNKNOWN
+    return Word.DONE if BEFORE.search(text) else Word.NOT_EXECUTED
 
 
 class Witness:

@@ -13,9 +13,12 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Act:
-    """Something that can happen in a step. `fault`: never in a calm seed. `weight`: how often, beside the others."""
+    """Something that can happen in a step. `fault`: never in a calm seed. `weight`: how often, beside the others.
+
+    `do` returns how long the story waits for its end, s; None: not at all.
+    """
 
     name: str
     weight: float
-    do: Callable[[World, Random], None]
+    do: Callable[[World, Random], float | None]
     fault: bool = False

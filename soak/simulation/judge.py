@@ -49,9 +49,11 @@ def _first(world: World) -> Iterator[str | Granted]:
                 ends = next((at for at in following if at > first), None)  # where the next stop drops the rest of it
                 own = [(at, data) for at, port, data in history.written[first:ends] if port == line]
                 begun = b"".join(data for at, data in own if at <= stop.at + SOON)
-                if len(begun) <= rest:  # nothing of what follows the message has left so soon
-                    begun = b"".join(data for _, data in after)
-                begins = [begun, *filter(None, [begun[rest:]])]
+                begins = [begun, begun[rest:]]
+                if len(begun) <= rest:  # nothing of what follows the message has left so soon, or its rest was dropped
+                    whole = b"".join(data for _, data in after)
+                    begins = [begun, whole, whole[rest:]]
+                begins = [each for each in begins if each]
                 if world.place(line[:2]).kind == "ssh":
                     begins = [*_behind_one_drop(world, line, first, begins)]
                 if not any(form.startswith(each) or each.startswith(form) for form in forms for each in begins):

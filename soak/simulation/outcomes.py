@@ -84,12 +84,19 @@ def _twice(world: World) -> Iterator[str | Granted]:
             continue
         if any(became(world, command.line, at) for at in times):
             yield Granted(BARE_COMMAND, words)
-        elif _made(world.history, command, NAK) and _took(world.history, command, ACK):
+        elif _made(world.history, command, NAK) and _took(world.history, command, ACK) and _no_error(world, command):
             yield Granted(NOISY_NAK, words)
         elif _doubled(world, command):
             yield Granted(ASTRAY, words)
         else:
             yield words
+
+
+def _no_error(world: World, command: Command) -> bool:
+    """Whether the host read ER=0 in the time of a command: a signed print of 0."""
+    received = world.history.received.get(command.line, [])
+    heard = b"".join(data for at, data in received if command.began <= at <= command.ended)
+    return re.search(rb'(?<!\d)0["~]', heard) is not None
 
 
 def _doubled(world: World, command: Command) -> bool:
@@ -228,6 +235,8 @@ def _credited(world: World) -> Iterator[str | Granted]:
         breach: str | Granted = ""
         if origin := _origin(shown, numbers):
             breach = f"{words}: {origin}"
+            if world.place(shown.line).language == "pmx" and _damage(history, shown.line, shown.began, shown.at):
+                breach = Granted(BARE_VALUE, words)  # noise made the number of another controller of that of the first
         elif own and all(each.restarts == shown.restarts for each in own if each.until > shown.began):
             breach = _never_held(world, shown, f"{words}: it never held that")
         if breach:

@@ -50,7 +50,8 @@ class Place:
     @property
     def checked(self) -> bool:
         """Whether a checksum protects its lines."""
-        return LANGUAGES[self.language].checked and (self.checksum > 0 or not self.noisy)
+        always = self.language == "tmcl" or not self.noisy
+        return LANGUAGES[self.language].checked and (self.checksum > 0 or always)
 
     @property
     def noisy(self) -> bool:

@@ -60,6 +60,10 @@ FIXED = {
     200663: "the error of a Modbus command before, whose flag was not read, which the next line was blamed for",
     200726: "a drive that a stop without a name reached, which the session said (of the simulation itself)",
     201394: "a stop that was typed before the terminal hung up, and read after it (of the simulation itself)",
+    495: "a stop whose rest the next one dropped, among those of a key that is held down (of the simulation itself)",
+    669: "the last value of another drive, which `log judge` took for one that a mark signs",
+    762: "the reply to a mark without its end, which was shown as the refusal of the next line",
+    1320: "a question that noise gave the number of another controller (of the simulation itself)",
     200066: "the rest of a Modbus message that was half-sent at a stop (of the simulation itself)",
 }
 DERIVED = 12

@@ -18,6 +18,7 @@ from soak.simulation.acts.automation import AUTOMATION
 from soak.simulation.acts.files import FILES
 from soak.simulation.acts.hand import HAND
 from soak.simulation.acts.meetings import MEETINGS
+from soak.simulation.acts.operators import OPERATORS
 from soak.simulation.acts_kill import files, kill, power_cut
 from soak.simulation.bounds import sample
 from soak.simulation.cut_ins import drawn_aim
@@ -145,11 +146,17 @@ ACTS = (
 
 MEETING = 0.3
 """How many seeds have the acts of `MEETINGS`, and how many of their steps: the other stories are without them."""
+AT_WORK = 0.2, 0.1
+"""How many seeds have the acts of `OPERATORS`, and how many of their steps."""
 
 
 def _drawn(world: World, step: int, rng: Random) -> Act:
     """Draw the act of a step."""
     act = rng.choices(ACTS, [each.weight for each in ACTS])[0]
+    seeds, steps = AT_WORK
+    apart = Random(f"{world.seed} work {step}")
+    if Random(f"{world.seed} work").random() < seeds and apart.random() < steps:
+        return apart.choices(OPERATORS, [each.weight for each in OPERATORS])[0]
     apart = Random(f"{world.seed} meeting {step}")
     if Random(f"{world.seed} meetings").random() < MEETING and apart.random() < MEETING:
         return apart.choices(MEETINGS, [each.weight for each in MEETINGS])[0]
@@ -166,6 +173,6 @@ async def tell(world: World, step: int) -> None:
     if not act.fault or not world.climate.calm:
         world.history.count(act.name)
         world.history.note(world.loop.now, "step", f"{step}: {act.name}")
-        act.do(world, rng)
+        pause = max(pause, act.do(world, rng) or 0.0)
     await asyncio.sleep(pause)
     sample(world)

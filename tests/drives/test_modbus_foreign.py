@@ -20,6 +20,7 @@ from multidrop.drives.bus import Bus
 from multidrop.drives.drive import still
 from multidrop.drives.events import Notice, Traffic, Unsolicited
 from multidrop.drives.stopping import Fate
+from multidrop.transports import TransportLost
 from multidrop.transports.sockets import open_tcp
 from tests.support.until import PATIENCE
 
@@ -143,6 +144,25 @@ async def test_a_late_answer_is_never_credited_to_the_next_request():
                 await drive.send("PR P")
             assert await drive.send("PR V") == (str(REGISTERS["V"].address << 16),)
         assert not [event for event in told if isinstance(event, Unsolicited)]
+    finally:
+        await bus.close()
+        server.close()
+        await server.wait_closed()
+
+
+async def test_a_write_is_in_doubt_until_the_error_is_read_although_the_server_has_answered_it():
+    async def writes_only(reader, writer):
+        while len(head := await reader.read(260)) > 7 and head[7] == framing.WRITE_REGISTERS:
+            writer.write(head[:5] + bytes([6]) + head[6:12])
+        writer.close()
+
+    server = await asyncio.start_server(writes_only, "127.0.0.1", 0)
+    bus = Bus("eth", await open_tcp(*server.sockets[0].getsockname()), family="modbus")
+    bus.start()
+    try:
+        with pytest.raises(TransportLost, match="; it is not known whether 'MA 700' was executed") as lost:
+            await bus.at("").send("MA 700")
+        assert (lost.value.unproven, lost.value.executed) == ("MA 700", "")
     finally:
         await bus.close()
         server.close()

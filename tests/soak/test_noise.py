@@ -109,7 +109,8 @@ def judged(said, *executed, asks=False, checked=True):
         (NoAnswer("'MR 5' was not sent"), ["MR 5"], ["denied"]),
         (NoAnswer("it is not known whether 'MR 5' was executed"), ["MR 5"], []),
         (NoAnswer("it is not known whether 'MR 5' was executed"), ["MR 5", "MR 5"], ["twice"]),
-        (TransportLost("the line was lost"), ["MR 5"], []),
+        (TransportLost("the line was lost"), ["MR 5"], ["denied"]),
+        (TransportLost("the line was lost; it is not known whether 'MR 5' was executed"), ["MR 5"], []),
     ],
 )
 def test_the_judge_sees_each_misdeed(said, executed, kinds):
@@ -127,6 +128,9 @@ def test_without_a_checksum_a_lost_command_may_have_been_damaged():
         ("a: it may have been executed and was not sent again", Word.UNKNOWN),
         ("a does not reply: it is not known whether 'S' was executed; it was sent once", Word.UNKNOWN),
         ("a does not reply: 'S' was not sent", Word.NOT_EXECUTED),
+        ("a: stopped before it was sent", Word.NOT_EXECUTED),
+        ("the line was lost", Word.NOT_EXECUTED),
+        ("a: 'S' was executed before the stop", Word.DONE),
     ],
 )
 def test_the_judge_reads_what_the_host_says(text, expected):

@@ -112,10 +112,13 @@ def found(history: History, checksum: int = 1, *astray: tuple[float, str]) -> di
     return {rule.name: list(rule.check(world)) for rule in OUTCOMES if list(rule.check(world))}
 
 
-def told(outcome: Outcome, executions: int, noise: tuple[bytes, bytes] | None = None) -> History:
-    """A command from 1 s to 2 s, executed so often; `noise`: what it changed meanwhile."""
+def told(
+    outcome: Outcome, executions: int, noise: tuple[bytes, bytes] | None = None, heard: bytes = b'0"a"\r\n'
+) -> History:
+    """A command from 1 s to 2 s, executed so often; `noise`: what it changed meanwhile; `heard`: what came."""
     command = Command("MR 7", "l", "a", 0.9, 0, outcome, began=1.0, ended=2.0)
     history = History(commands={"@l:a MR 7": command}, executed=[Executed(1.5, "l", "a", "MR 7")] * executions)
+    history.received["l"] = [(1.6, heard)]
     if noise is not None:
         history.damage["l"] = [Damage(1.4, *noise)]
     return history
@@ -173,7 +176,8 @@ def test_a_datagram_that_arrives_late_or_twice_is_granted(what: History) -> None
 
 def test_with_a_checksum_noise_alone_excepts_nothing() -> None:
     inserted = told(Outcome.UNKNOWN, 2, (b"", b"\x15"))  # and the ACK was there
-    for history in (inserted, told(Outcome.NOT_SENT, 1, (b"8", b"7")), told(Outcome.OK, 0, (b"7", b"8"))):
+    unread = told(Outcome.UNKNOWN, 2, (b"\x06", b"\x15"), b'10"a"\r\n')  # ER was not read as 0
+    for history in (inserted, unread, told(Outcome.NOT_SENT, 1, (b"8", b"7")), told(Outcome.OK, 0, (b"7", b"8"))):
         [[each]] = found(history).values()
         assert isinstance(each, str)
 

@@ -21,6 +21,8 @@ if TYPE_CHECKING:
 NUMBERS = 0xFFF0
 """Requests have numbers below this; the messages of a stop have numbers above it."""
 END_NUMBER, SLEW_NUMBER = 0xFFFE, 0xFFFF
+WRITES = (framing.WRITE_COIL, framing.WRITE_REGISTERS, framing.WRITE_SPECIFIC)
+"""Their replies do not confirm the execution: the drive's error flag shows that it refused one."""
 
 
 @cache
@@ -101,7 +103,7 @@ def _reply(asked: bytes, answer: bytes) -> Reply:
         return Reply(end=End.DAMAGED, detail=f"{answer[:16].hex(' ')} is not a reply to it")
     if answer[0] & framing.EXCEPTION:
         return Reply(end=End.REFUSED, detail=framing.EXCEPTIONS.get(answer[1], ""), body=answer)
-    return Reply(acknowledged=True, body=answer)
+    return Reply(acknowledged=asked[0] not in WRITES, body=answer)
 
 
 def _whole(buffer: bytes) -> tuple[int, bool]:

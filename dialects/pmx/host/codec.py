@@ -30,7 +30,8 @@ STORED, TOKEN = re.compile(r"SA\d+", re.ASCII), "(?![OK]+$).*"
 """A read of a line of a program, and its reply, which is empty where nothing is stored."""
 WRITES_FLASH = re.compile(r"STORE|SA\d+=", re.ASCII)
 MARKED = re.compile(r"\?(?:Q(?:\d\d)?\d{3}|~~~)", re.ASCII)
-"""The reply to a sync mark (`exchange`), and to what ends a half-sent line before a stop."""
+"""The reply to a sync mark (`exchange`), and to what ends a half-sent line before a stop. A line that begins with it and
+goes on is two replies: its end was lost."""
 NO_TEXT = b"\n\0"
 """Bytes that some gateways and drivers add."""
 
@@ -81,7 +82,7 @@ class Pmx(Codec):
                 continue
             if request.gather:
                 return Decoded(Reply((*strays, text), acknowledged=True), at)
-            if any(not " " <= c <= "~" for c in text):
+            if any(not " " <= c <= "~" for c in text) or (MARKED.match(text) and text != f"?{request.text}"):
                 reply = Reply(end=End.DAMAGED, detail=f"heard {text[:48]!r}")
             elif text.startswith("?"):
                 reply = Reply((text,), End.REFUSED)

@@ -368,3 +368,11 @@ def test_words_of_a_motor_status():
     assert table.status_words(0) == ("at rest",)
     assert table.status_words(0b1) == ("accelerating",)
     assert table.status_words(1 << 7 | 1 << 4) == ("at rest", "plus limit error", "plus limit switch on")
+
+
+def test_a_mark_that_lost_its_end_is_no_refusal_of_the_line_whose_reply_it_swallowed():
+    codec = Pmx()
+    found = codec.decode(codec.request("01", "X5"), b"?Q03001OK\r")
+    assert found is not None and (found.reply.end, found.reply.detail) == (End.DAMAGED, "heard '?Q03001OK'")
+    typed = codec.decode(codec.request("01", "Q1234"), b"?Q1234\r")
+    assert typed is not None and typed.reply.end is End.REFUSED

@@ -186,6 +186,14 @@ def test_a_gap_or_a_new_session_begins_anew(gap: dict[str, Any], tmp_path: Path)
     assert ("after a stop", where + 3) not in found(rows, tmp_path)
 
 
+def test_the_end_of_a_longer_value_of_another_drive_is_not_taken_for_the_printed_one(tmp_path: Path) -> None:
+    sent = {"kind": "sent", "bus": "l", "drive": "b", "text": 'bPR R1,"~b"\n'}
+    received = {"kind": "received", "bus": "l", "drive": "b", "text": "0~b\r\n"}
+    printed = {"kind": "printed", "bus": "l", "drive": "b", "text": "0"}
+    assert found([*HEAD, typed("PR R1", "b"), sent, received, *asked("BY,P", "0110"), printed], tmp_path) == []
+    assert found([*HEAD, typed("PR R1", "b"), sent, received, *asked("EF", "0"), printed], tmp_path) == []
+
+
 def test_a_reply_to_what_was_typed_before_the_log_began_is_not_judged(tmp_path: Path) -> None:
     printed = {"kind": "printed", "bus": "l", "drive": "a", "text": "384112"}
     assert found([*HEAD, *asked("V", "0"), printed], tmp_path) == []
