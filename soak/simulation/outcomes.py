@@ -22,6 +22,8 @@ REPEATED = 2.0
 AFTER = 2.0
 """The longest time, s, between a damaged byte of a line and the end of that line: late bytes, and a slow wire."""
 
+PROMPTLY = 0.1
+"""The longest time, s, from a datagram's arrival to its execution."""
 OUTAGE = 10.0
 """The longest time, s, in which a drive is without power, starts again, or owes a reply that was cut off."""
 
@@ -86,8 +88,8 @@ def _twice(world: World) -> Iterator[str | Granted]:
             yield Granted(BARE_COMMAND, words)
         elif _made(world.history, command, NAK) and _took(world.history, command, ACK) and _no_error(world, command):
             yield Granted(NOISY_NAK, words)
-        elif _doubled(world, command):
-            yield Granted(ASTRAY, words)
+        elif _doubled(world, command) or _astray(world, command.line, times[-1] - PROMPTLY, times[-1]):
+            yield Granted(ASTRAY, words)  # a line of a download that came once program mode had ended, too
         else:
             yield words
 
