@@ -30,8 +30,9 @@ STORED, TOKEN = re.compile(r"SA\d+", re.ASCII), "(?![OK]+$).*"
 """A read of a line of a program, and its reply, which is empty where nothing is stored."""
 WRITES_FLASH = re.compile(r"STORE|SA\d+=", re.ASCII)
 MARKED = re.compile(r"\?(?:Q(?:\d\d)?\d{3}|~~~)", re.ASCII)
-"""The reply to a sync mark (`exchange`), and to what ends a half-sent line before a stop. A longer line that begins with
-it is two replies: its end was lost."""
+"""The reply to a sync mark (`exchange`), and to what ends a half-sent line before a stop.
+
+A longer line that begins with it is two replies: its end was lost."""
 NO_TEXT = b"\n\0"
 """Bytes that some gateways and drivers add."""
 
