@@ -18,6 +18,7 @@ class FakeDrive:
     product: str = "LMDCM"
     version: str = "6.002"
     programming: bool = False
+    stores: bool = False
     family: object = FAMILIES[DEFAULT]
     state: object = field(default_factory=lambda: MCodeState(MCode()))
 

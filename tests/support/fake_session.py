@@ -50,6 +50,7 @@ class FakeDrive:
     product: str = "LMDCM"
     version: str = "6.002"
     programming: bool = False
+    stores: bool = False
     unreferenced: frozenset[str] = frozenset()
 
     @property

@@ -361,6 +361,7 @@ def _name_and_serial(state: MCodeState) -> Procedure[None]:
             values = found.groupdict()
             _record(state, values.get("name", ""), values.get("serial", ""))
             return
+        state.error_possible()  # the drive refused the question, or noise made one of it that it refuses
     if state.codec.escape in NAMED:
         state.note(
             f"{who(state)}: its name could not be read, and a stop with ES={state.codec.escape} needs it; open it again"
