@@ -146,6 +146,15 @@ def _state_folder(_states, request):
     os.environ["MULTIDROP_STATE_DIR"] = f"{_states}/{zlib.crc32(request.node.nodeid.encode()):08x}"
 
 
+if sys.platform == "win32":
+
+    @pytest.fixture(autouse=True)
+    def _own_configuration(tmp_path_factory, monkeypatch):
+        """A folder of its own for what a person configures: Windows asks no HOME and no XDG_CONFIG_HOME."""
+        for name in ("APPDATA", "LOCAL_APPDATA"):
+            monkeypatch.setenv(f"WIN_PD_OVERRIDE_{name}", str(tmp_path_factory.mktemp(name.lower())))
+
+
 @pytest.fixture
 def bench() -> type[Bench]:
     """The class; its argument is drives as tables of a cell file."""

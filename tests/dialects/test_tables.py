@@ -8,7 +8,14 @@ from multidrop.dialects.files import rows
 from tests.support.paths import ROOT
 
 TABLES = sorted(each for room in ("dialects", "simulator") for each in (ROOT / room).rglob("*.csv"))
-PAIRS = (["group", "number"], ["name", "each"], ["name", "asks"], ["word", "form"], ["of", "value"])
+PAIRS = (
+    ["group", "number"],
+    ["name", "each"],
+    ["name", "asks"],
+    ["word", "form"],
+    ["of", "value"],
+    ["product", "point"],
+)
 """The heads of the two cells that are the key of a row together."""
 
 
