@@ -249,7 +249,7 @@ def _named(sent: str, received: str, printed: str) -> set[str] | None:
         return set() if own or printed in received else None
     if printed not in received:
         return None
-    whole = rf'(?:\A|[\r\n\x06\x15>?]){re.escape(printed)}["~]([!\w])'  # not the end of a longer value
+    whole = rf'(?:\A|[\r\n\x06\x15>?]){re.escape(printed)}["~]([!0-9A-Za-z])'  # not the end of a longer value
     return set(re.findall(whole, received))
 
 

@@ -315,7 +315,7 @@ class Served(asyncio.Transport):
             yield 0.0, self._before
         self._before = data
         if network.drawn("reply of another"):
-            number = (int.from_bytes(data[:2]) + network.rng.choice((-2, -1, 0x100, 0x200))) % 0x10000
+            number = (int.from_bytes(data[:2]) + network.rng.choice((-0x200, -0x100, 0x100, 0x200))) % 0x10000
             yield 0.0, number.to_bytes(2) + data[2:]
         else:
             yield network.rng.random() * LATER if network.drawn("reply late") else 0.0, data

@@ -259,3 +259,10 @@ def test_a_session_whose_commands_are_not_marked_is_not_judged(tmp_path: Path) -
     after_a_stop(rows)
     assert found(rows, tmp_path) == []
     assert "marks" not in json.loads(line_of(Entry(datetime.now(UTC), "log", "session")))
+
+
+def test_a_checksum_behind_the_mark_of_a_drive_alone_names_no_drive(tmp_path: Path) -> None:
+    sent = {"kind": "sent", "bus": "l", "drive": "!", "text": 'PR "v",R1,"~"\u00b5\r'}
+    heard = {"kind": "received", "bus": "l", "drive": "!", "text": "\u0006v73882858~\u00db\r\n"}
+    shown = {"kind": "printed", "bus": "l", "drive": "!", "text": "v73882858"}
+    assert found([*HEAD, typed('PR "v",R1', "!"), sent, heard, shown], tmp_path) == []
