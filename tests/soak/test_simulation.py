@@ -108,7 +108,7 @@ def found(history: History, checksum: int = 1, *astray: tuple[float, str]) -> di
     place = Place("l", "mcode", ("a", "b"), 1, checksum, 9600, True)
     network = SimpleNamespace(doubled=[], astray=astray)
     calm = SimpleNamespace(calm=False)
-    world: Any = SimpleNamespace(history=history, network=network, place=lambda line: place, climate=calm)
+    world: Any = SimpleNamespace(history=history, network=network, cut={}, place=lambda line: place, climate=calm)
     return {rule.name: list(rule.check(world)) for rule in OUTCOMES if list(rule.check(world))}
 
 
