@@ -233,7 +233,7 @@ def _credited(world: World) -> Iterator[str | Granted]:
         own = [each for each in own if each.at <= shown.at]
         if any(shown.form.format(each.number) == shown.text for each in own if each.until > shown.began):
             continue
-        if shown.text == shown.form.format("0") and (shown.line, shown.drive) in world.cut:
+        if set(re.findall(r"\d", shown.text)) == {"0"} and (shown.line, shown.drive) in world.cut:
             continue  # what a power-up leaves
         words = f"{shown.line}:{shown.drive} printed {shown.text!r}, asked at {shown.began:.3f}"
         breach: str | Granted = ""

@@ -150,6 +150,8 @@ def examine(world: World, run: Run) -> None:
         if (line, drive, before.text) in run.moves and run.began <= before.at <= run.ended:
             if moves and not _said(world, line, run.began, TROUBLE):
                 told.unstopped.append(f"{text}: {before.text!r} goes on")
+        elif (line, drive) in {move[:2] for move in run.moves}:
+            continue  # a person's motion of a drive that the run had moved ends with it
         elif not moves and before.at < run.ended and _only_ended_by(world, run, before):
             told.stopped_too.append(f"{text}: {before.text!r} was not of it, and was stopped")
 
