@@ -118,12 +118,13 @@ soak: $(VENV)/.dev
 	SOAK=$(or $(SOAK),full) $(BIN)/python -m soak
 
 # Seeds of the whole program in simulated time: SEED=7 one; SEEDS=1-200 a range on all cores (JOBS=2: on two), which
-# RESUME=FILE takes up again; STEPS=60: longer. ONLY=3,9 WITHOUT=flip,late: what a failure was shrunk to.
+# RESUME=FILE takes up again, and SUM='FILE FILE' adds up; STEPS=60: longer. ONLY=3,9 WITHOUT=flip,late: what a failure was shrunk to.
 # SEEDS=1-2000 MUTANT=NAME (all: each): a planted defect, and the seed that catches it. See CONTRIBUTING.
 simulate: $(VENV)/.dev
 	$(BIN)/python -m soak.simulation $(if $(SEED),--seed $(SEED)) $(if $(SEEDS),--seeds $(SEEDS)) \
 	  $(if $(STEPS),--steps $(STEPS)) $(if $(ONLY),--only $(ONLY)) $(if $(WITHOUT),--without '$(WITHOUT)') \
-	  $(if $(JOBS),--jobs $(JOBS)) $(if $(RESUME),--resume $(RESUME)) $(if $(MUTANT),--mutant $(MUTANT))
+	  $(if $(JOBS),--jobs $(JOBS)) $(if $(RESUME),--resume $(RESUME)) $(if $(MUTANT),--mutant $(MUTANT)) \
+  $(if $(SUM),--sum $(SUM))
 
 snapshots: $(VENV)/.dev
 	$(BIN)/python -m pytest tests -k snapshot --snapshot-update

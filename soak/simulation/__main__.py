@@ -2,7 +2,7 @@
 
 A seed that breaks a rule is shrunk to the fewest steps and kinds of faults. Its trace follows, the command that lives
 just these again (ONLY=, WITHOUT=), and the one line of the seed. RESUME=FILE keeps the results of a range, so that it
-can be taken up again. MUTANT=NAME plants a defect first, and ends at the seed that catches it; MUTANT=all tries each.
+can be taken up again; SUM='FILE FILE' adds up such files. MUTANT=NAME plants a defect first, and ends at the seed that catches it; MUTANT=all tries each.
 """
 
 from __future__ import annotations
@@ -13,8 +13,9 @@ from pathlib import Path
 
 from soak.simulation import mutants
 from soak.simulation.climate import FAULTS
+from soak.simulation.figures import Figures
 from soak.simulation.judge import judged
-from soak.simulation.runs import STEPS, Figures, lives, run, verdict
+from soak.simulation.runs import STEPS, kept, lives, run, verdict
 from soak.simulation.shrinking import Life, shrunk
 from soak.simulation.trace import readable
 
@@ -29,6 +30,7 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--without", type=_kinds, default=(), help="kinds of faults that are left out: flip,late")
     parser.add_argument("--jobs", type=int, default=0, help="processes; one a core unless given")
     parser.add_argument("--resume", type=Path, help="a file of results to take up again")
+    parser.add_argument("--sum", type=Path, nargs="+", help="add up files of results, and live nothing")
     parser.add_argument("--mutant", default="", help="a defect of soak/mutants that is planted first; all: each")
     parser.add_argument("--until-broken", action="store_true", help="end at the first seed that breaks a rule")
     chosen = parser.parse_args(arguments)
@@ -37,6 +39,8 @@ def main(arguments: list[str] | None = None) -> int:
         return _one(Life(chosen.seed, steps, chosen.without), whole=chosen.only is None)
     first, _, last = chosen.seeds.partition("-")
     try:
+        if chosen.sum:
+            return _sum(chosen.sum)
         seeds = range(int(first), int(last or first) + 1)
         return _mutants(seeds, chosen) if chosen.mutant else _range(seeds, chosen)
     except ValueError as problem:
@@ -86,6 +90,17 @@ def _mutants(seeds: range, chosen: argparse.Namespace) -> int:
         sys.stdout.flush()
     print(f"{sum(bool(each.rule) for each in tried)} of {len(tried)} mutants caught")
     return int(not all(each.rule for each in tried))
+
+
+def _sum(files: list[Path]) -> int:
+    """Add up the results of files; say which seeds broke a rule."""
+    figures = Figures()
+    for each in (found for file in files for found in kept(file)):
+        figures.add(each)
+        if each.breaches:
+            print(each.line)
+    print("\n".join(figures.rows()))
+    return int(figures.broken > 0)
 
 
 def _range(seeds: range, chosen: argparse.Namespace) -> int:

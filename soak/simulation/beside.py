@@ -71,25 +71,40 @@ class Beside:
 
 
 class Lock:
-    """A lock between the loop's thread and the one beside it, which `beside` gives."""
+    """A lock between the loop's thread and the one beside it, which `beside` gives. `defect` takes note of a deadlock.
 
-    def __init__(self, beside: Callable[[], Beside | None]) -> None:
-        self._beside = beside
+    A wait that would never end is noted once, and ends: the rest of the story is lived.
+    """
+
+    def __init__(self, beside: Callable[[], Beside | None], defect: Callable[[str], None]) -> None:
+        self._beside, self._defect = beside, defect
         self._holder: object = None
 
     def __enter__(self) -> None:
         thread = self._beside()
         me: object = thread if thread is not None and thread.runs else "the loop"
         while self._holder is not None:
-            assert self._holder is not me and thread is not None, "a thread waits for a lock that it holds itself"
+            if problem := self._endless(me, thread):
+                self._defect(f"deadlock: {problem}")
+                break
+            assert thread is not None
             if thread.runs:
                 thread.waits = self
                 thread.rest()
                 thread.waits = None
             else:
-                assert thread.waits is None, "two threads wait for each other"
                 thread.go()  # it was held up with the lock
         self._holder = me
+
+    def _endless(self, me: object, thread: Beside | None) -> str:
+        """Say why nobody gives the lock back; empty where somebody may."""
+        if self._holder is me or thread is None:
+            return "a thread waits for a lock that it holds itself"
+        if thread.over:
+            return "a thread has ended with a lock"
+        if not thread.runs and thread.waits is not None:
+            return "two threads wait for each other"
+        return ""
 
     def __exit__(self, *_: object) -> None:
         self._holder = None

@@ -137,6 +137,8 @@ class CutIns:
     def __init__(self, passed: Callable[[str], None], loop: SimulatedLoop | None = None) -> None:
         self.thread: Beside | None = None
         """The stop's thread, once it has cut in."""
+        self.deadlocks: dict[str, None] = {}
+        """Waits for a lock that would never end, each once."""
         self._passed, self._loop = passed, loop
         self._files = {file for file, _ in points().values()}
         self._names = {place: name for name, place in points().items()}
@@ -147,7 +149,7 @@ class CutIns:
 
     def lock(self) -> Lock:
         """A lock of the code that is shared."""
-        return Lock(lambda: self.thread)
+        return Lock(lambda: self.thread, lambda problem: self.deadlocks.update({problem: None}))
 
     def begin(self, aim: Aim, work: Callable[[], None]) -> None:
         """Let the stop's thread do work at the aim, in place of what it was to do at the last one."""

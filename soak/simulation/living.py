@@ -85,6 +85,7 @@ def lived(seed: int, steps: Iterable[int], keep: bool = False, without: Collecti
                 runner.run(life())
             except Deadlock as defect:
                 history.defects.append(str(defect))
+        history.defects += cut_ins.deadlocks
         history.defects += [str(each.get("exception") or each.get("message")) for each in loop.defects]
     return world
 

@@ -6,7 +6,6 @@ import gc
 import json
 import multiprocessing
 import os
-import statistics
 import subprocess
 import time
 from collections import Counter
@@ -19,7 +18,6 @@ from pathlib import Path
 from typing import TextIO
 
 from multidrop import __version__
-from soak.simulation.climate import FAULTS
 from soak.simulation.judge import Judgement, judged
 from soak.simulation.shrinking import Life
 from soak.simulation.world import World
@@ -130,6 +128,14 @@ def _taken_up(lives: Sequence[Life], path: Path) -> tuple[list[Result], TextIO]:
     return [Result(**json.loads(row)) for row in whole[1:]][: len(lives)], file
 
 
+def kept(path: Path) -> list[Result]:
+    """The results that a file of a run has. Raises ValueError where it is no such file."""
+    head, *rows = path.read_text().splitlines(keepends=True) or [""]
+    if not head.startswith('{"of": '):
+        raise ValueError(f"{path}: has no results of a run (RESUME=FILE)")
+    return [Result(**json.loads(row)) for row in rows if row.endswith("\n")]
+
+
 def identity() -> str:
     """The commit of the tree; where it has none, the version."""
     git = ("git", "-C", str(ROOT), "rev-parse", "HEAD")
@@ -144,45 +150,6 @@ def derived(count: int) -> list[int]:
     """Seeds that follow from the commit, so that each commit tries others, and each run of it the same."""
     digest = sha256(identity().encode()).digest()
     return [int.from_bytes(sha256(digest + bytes([number])).digest()[:3], "big") for number in range(count)]
-
-
-class Figures:
-    """The sums of a run."""
-
-    def __init__(self) -> None:
-        self.broken = 0
-        self.counts: Counter[str] = Counter()
-        self.findings: Counter[str] = Counter()
-        """By rule, the seeds that broke it."""
-        self._rows: list[tuple[int, int, float, float]] = []
-
-    def add(self, each: Result) -> None:
-        """Add a result."""
-        self.broken += bool(each.breaches)
-        self.counts.update(each.counts)
-        self.findings.update({name for name, _ in each.breaches})
-        self._rows.append((each.commands, each.exchanges, each.virtual, each.took))
-
-    def rows(self) -> Iterator[str]:
-        """The figures, a row each."""
-        commands, exchanges, virtual, took = (list(each) for each in zip(*self._rows, strict=True))
-        yield (
-            f"{len(took)} seeds, {self.broken} broke a rule; {sum(commands)} commands, {sum(exchanges)} exchanges, "
-            f"{sum(virtual) / 3600:.1f} virtual hours"
-        )
-        yield "broken rules: " + (
-            ", ".join(f"{number} {name}" for name, number in sorted(self.findings.items())) or "none"
-        )
-        faults = {name: self.counts[name] for name in FAULTS if name in self.counts}
-        words = {name for name in self.counts if WORD in name}
-        others = self.counts.keys() - faults.keys() - words
-        for what, found in (("faults", faults), ("acts and exceptions", others), ("words about commands", words)):
-            text = ", ".join(f"{self.counts[name]} {name}" for name in sorted(found))
-            yield f"{sum(self.counts[name] for name in found)} {what}: {text}"
-        yield (
-            f"{sum(exchanges) / sum(took):.0f} exchanges a second of one core; "
-            f"a median seed has {statistics.median(commands):.0f} commands and takes {statistics.median(took):.3f} s"
-        )
 
 
 def lives(seeds: Sequence[int], steps: int = STEPS) -> list[Life]:

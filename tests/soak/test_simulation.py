@@ -13,6 +13,7 @@ from typing import Any
 
 import pytest
 
+from soak.languages import LANGUAGES
 from soak.simulation import living, shrinking, world
 from soak.simulation.__main__ import main
 from soak.simulation.climate import FAULTS
@@ -244,6 +245,26 @@ def test_a_run_is_taken_up_again(tmp_path: Path) -> None:
     assert len(file.read_text().splitlines()) == len(rows)
     with pytest.raises(ValueError, match="results of another run"):
         list(run(lives(range(1, 6), 6), resume=file))
+
+
+@pytest.mark.process
+def test_files_of_results_are_added_up_with_the_words_by_language(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    files = [str(tmp_path / name) for name in "ab"]
+    for file, first in zip(files, (1, 4), strict=True):
+        list(run(lives(range(first, first + 3), 5), jobs=1, resume=Path(file)))
+    assert main(["--sum", *files]) == 0
+    rows = capsys.readouterr().out.splitlines()
+    assert rows[0].startswith("6 seeds, 0 broke a rule; ")
+    head, _, commands, *words = [row.strip("|").split("|") for row in rows if row.startswith("|")]
+    assert set(map(str.strip, head[1:])) <= {
+        f"{name} with{out} a checksum" for name in LANGUAGES for out in ("", "out")
+    }
+    for total, *parts in zip(commands[1:], *(row[1:] for row in words), strict=True):
+        assert int(total) == sum(map(int, parts)) > 0
+    (tmp_path / "c").write_text("{}\n")
+    assert main(["--sum", str(tmp_path / "c")]) == 2
 
 
 def test_a_seed_ends_with_its_one_line(capsys: pytest.CaptureFixture[str]) -> None:
