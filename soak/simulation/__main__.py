@@ -2,7 +2,8 @@
 
 A seed that breaks a rule is shrunk to the fewest steps and kinds of faults. Its trace follows, the command that lives
 just these again (ONLY=, WITHOUT=), and the one line of the seed. RESUME=FILE keeps the results of a range, so that it
-can be taken up again; SUM='FILE FILE' adds up such files. MUTANT=NAME plants a defect first, and ends at the seed that catches it; MUTANT=all tries each.
+can be taken up again; SUM='FILE FILE' adds up such files. MUTANT=NAME plants a defect first, and ends at the seed that
+catches it; MUTANT=all tries each.
 """
 
 from __future__ import annotations
