@@ -255,7 +255,9 @@ class Conversation(Generic[T]):
             done = "stored" if self._request is not None and self._request.kind is Kind.PROGRAM else "executed"
             error = TransportLost(f"{error}; it is not known whether '{self._unproven}' was {done}")
             error.unproven = self._unproven
-        error.executed = self._executed
+        elif self._executed and not self._cleaning_up:
+            error = type(error)(f"{error}; '{self._executed}' was executed before that")
+            error.executed = self._executed
         self._fail(error)
 
     def _take(self, transaction: Transaction) -> Request | None:
@@ -267,8 +269,9 @@ class Conversation(Generic[T]):
         if self._all.witnesses.all:
             self._taken.append(transaction)
         if request.kind not in ASKING and (sent or reply.end is not End.STOPPED):
-            self._unproven = "" if reply.acknowledged else request.text
-            self._executed = request.text if reply.acknowledged and request.kind is not Kind.PROGRAM else ""
+            proven = reply.acknowledged and not reply.doubtful
+            self._unproven = "" if proven else request.text
+            self._executed = request.text if proven and request.kind is not Kind.PROGRAM else ""
         if reply.end is not End.STOPPED:
             return self._procedure.send(reply)
         if not self._cleaning_up:

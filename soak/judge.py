@@ -29,13 +29,15 @@ class Word(Enum):
 
 MISDEEDS = ("twice", "denied", "lost", "credited to the wrong drive", "an older value", "taken for a reply")
 """Misdeeds. `denied`: the host said that it was not executed, and it was. `lost`: the opposite."""
-BEFORE = re.compile(r"' was executed before the stop")
 PERHAPS = re.compile(r"may have been executed|it was executed|not known whether|it was sent once|may be its running")
 UNCONFIRMED = re.compile(r"not confirmed|not known whether")
 
 
-def word(result: tuple[str, ...] | BaseException, notices: list[str]) -> Word:
-    """Read what the host says. A failure that leaves no doubt says that it was not executed."""
+def word(result: tuple[str, ...] | BaseException, notices: list[str], line: str) -> Word:
+    """Read what the host says of a line. A failure that leaves no doubt says that it was not executed.
+
+    The host may say that a line of its own was executed, as it put back an echo mode first.
+    """
     if not isinstance(result, BaseException):
         return Word.UNCONFIRMED if any(UNCONFIRMED.search(each) for each in notices) else Word.DONE
     text = str(result)
@@ -43,7 +45,7 @@ def word(result: tuple[str, ...] | BaseException, notices: list[str]) -> Word:
         return Word.UNKNOWN
     if isinstance(result, Refused):
         return Word.REFUSED
-    return Word.DONE if BEFORE.search(text) else Word.NOT_EXECUTED
+    return Word.DONE if f"'{line}' was executed before " in text else Word.NOT_EXECUTED
 
 
 class Witness:
@@ -137,7 +139,7 @@ class Judge:
 
     def ends(self, command: Command, result: tuple[str, ...] | BaseException, notices: list[str]) -> None:
         """Note what the host said of it; judge the one before it."""
-        command.word, command.said = word(result, notices), str(result)
+        command.word, command.said = word(result, notices, command.text), str(result)
         self.ledger.words[command.word.value] += 1
         before = self._open.pop(command.drive, None)
         if not command.asks:

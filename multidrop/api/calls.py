@@ -45,8 +45,8 @@ def lost(error: TransportLost) -> TransportLost:
     """What a call raises for a loss."""
     if isinstance(error, Unreachable | Lost):
         return error
-    known = f"'{error.executed}' was executed" if error.executed else "no command of this call is in doubt"
-    found = Lost(str(error) if error.unproven else f"{error}; {known}")
+    known = error.unproven or error.executed
+    found = Lost(str(error) if known else f"{error}; no command of this call is in doubt")
     found.unproven, found.executed = error.unproven, error.executed
     for note in getattr(error, "__notes__", ()):
         found.add_note(note)

@@ -69,6 +69,7 @@ FIXED = {
     762: "the reply to a mark without its end, which was shown as the refusal of the next line",
     1320: "a question that noise gave the number of another controller (of the simulation itself)",
     200066: "the rest of a Modbus message that was half-sent at a stop (of the simulation itself)",
+    400424: "a reply that may have been another one's, taken for proof as the line was lost in the question after it",
 }
 DERIVED = 12
 """The number of seeds that follow from the commit."""

@@ -102,7 +102,7 @@ class WatchedSession(Session):
         notices = [
             text for at, text in self._world.history.notices if at >= command.began and f"'{command.text}'" in text
         ]
-        command.outcome = WORDS[word(result, notices)]
+        command.outcome = WORDS[word(result, notices, command.text)]
         if isinstance(result, Diagnostic) or str(result) == LATCHED:  # before anything is sent
             command.outcome = Outcome.NOT_SENT
         where = f"{command.line}:{command.drive} {command.text!r}"

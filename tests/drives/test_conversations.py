@@ -48,26 +48,26 @@ class Pipe(Transport):
 class Desk:
     """Conversations with one drive on such a pipe."""
 
-    def __init__(self, keeper: Keeper | None = None) -> None:
+    def __init__(self, keeper: Keeper | None = None, codec: MCode = CODEC) -> None:
         keeper = keeper or Keeper()
         self.pipe = Pipe()
-        self.link = Link("desk", self.pipe, Line(CODEC), keeper)
+        self.link = Link("desk", self.pipe, Line(codec), keeper)
         self.conversations = Conversations(self.link, keeper)
-        self.state = DriveState(CODEC)
+        self.state = DriveState(codec)
         self.sent: list[str] = []
         self.link.watch(lambda event: self.sent.append(event.request.text) if isinstance(event, Sent) else None)
         self.link.start()
 
     def run(self, *texts: str, after: tuple[str, ...] = ()) -> asyncio.Task[str]:
         """Print in turn; if that fails, print what is `after`."""
-        return asyncio.ensure_future(self.conversations.run(prints(texts, after), self.state))
+        return asyncio.ensure_future(self.conversations.run(prints(texts, after, self.state.codec), self.state))
 
 
-def prints(texts: tuple[str, ...], after: tuple[str, ...] = ()) -> Procedure[str]:
+def prints(texts: tuple[str, ...], after: tuple[str, ...] = (), codec: MCode = CODEC) -> Procedure[str]:
     reply = Reply()
     try:
         for text in texts:
-            reply = yield request(text)
+            reply = yield codec.request("", text)
     except BaseException:
         for text in after:
             yield request(text)
@@ -166,6 +166,34 @@ async def test_a_loss_ends_every_conversation_even_one_that_would_clean_up():
     ends = await asyncio.gather(*runs, return_exceptions=True)
     assert [str(end) for end in ends] == ["unplugged", "unplugged"] and desk.sent == ["PR P"]
     assert desk.conversations.under_way == []
+
+
+@pytest.mark.parametrize("how", ["lost", "stopped"])
+@pytest.mark.parametrize(("late", "known"), [(False, "was executed before"), (True, "not known whether")])
+async def test_what_ends_a_question_after_a_command_leaves_that_executed_or_after_a_doubtful_ack_not_known(
+    how: str, late: bool, known: str
+) -> None:
+    desk = Desk(codec=MCode(em=1, checksum=1))
+    desk.pipe.silent = True
+    if late:
+        await desk.run("PR A")  # it times out, and its ACK may come yet
+        await asyncio.sleep(0.5)
+    running = desk.run("MR 5", "PR P")
+    await asyncio.sleep(0.01)
+    desk.pipe.received(b"\x06")
+    await asyncio.sleep(0.01)
+    assert desk.sent[-2:] == ["MR 5", "PR P"]
+    if how == "lost":
+        desk.pipe.lost(TransportLost("unplugged"))
+    else:
+        desk.conversations.stop(None)
+        desk.link.line.stop(desk.link.now())
+        desk.link.advance()
+    with pytest.raises((TransportLost, Stopped), match="'MR 5' was ") as end:
+        await running
+    assert known in str(end.value)
+    if isinstance(end.value, TransportLost):
+        assert (end.value.unproven, end.value.executed) == (("MR 5", "") if late else ("", "MR 5"))
 
 
 class SlowKeeper(Keeper):

@@ -131,8 +131,10 @@ def test_without_a_checksum_a_lost_command_may_have_been_damaged():
         ("a: stopped before it was sent", Word.NOT_EXECUTED),
         ("the line was lost", Word.NOT_EXECUTED),
         ("a: 'S' was executed before the stop", Word.DONE),
+        ("the line was lost; 'S' was executed before that", Word.DONE),
+        ("the line was lost; 'EM=1' was executed before that", Word.NOT_EXECUTED),
     ],
 )
 def test_the_judge_reads_what_the_host_says(text, expected):
-    assert word(NoAnswer(text), []) is expected
-    assert word((), ["a: 'S' was sent once and not refused; its execution is not confirmed"]) is Word.UNCONFIRMED
+    assert word(NoAnswer(text), [], "S") is expected
+    assert word((), ["a: 'S' was sent once and not refused; its execution is not confirmed"], "S") is Word.UNCONFIRMED
