@@ -17,7 +17,8 @@ from report import Row, alone, main
 
 from multidrop.dialects.mcode.manual import program_file
 from multidrop.simulator.cell.spec import DriveSpec, WorldSpec
-from multidrop.simulator.lexium.program_run import Printed, ProgramRun, Summary
+from multidrop.simulator.lexium.program_run import ProgramRun
+from multidrop.simulator.program_run import Summary
 
 AIM = 1.0
 MINUTES = 10
@@ -57,7 +58,7 @@ def run(text: str) -> tuple[float, Summary, int]:
     seconds = time.process_time() - begin
     end = events[-1]
     assert isinstance(end, Summary) and end.ended == "until" and not end.errors, end
-    return seconds, end, sum(isinstance(each, Printed) for each in events)
+    return seconds, end, sum("print" in each.facts for each in events)
 
 
 if __name__ == "__main__":

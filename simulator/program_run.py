@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from math import inf
+from types import MappingProxyType
 from typing import Any, NamedTuple, Protocol
 
 from multidrop.dialects import Diagnostic
@@ -49,9 +50,16 @@ NO_DEBUGGING = Debugging()
 
 @dataclass(frozen=True)
 class Event:
-    """Something that a run reports at a time, s. The last event is the summary, which alone may be `failed`."""
+    """Something that a run reports at a time, s: its facts, and a line for a person. The last event is the Summary.
+
+    `line`: that of the file which it is about. `problem`: it belongs on standard error, where the file is named first.
+    """
 
     t: float
+    facts: Mapping[str, Any] = field(default_factory=lambda: MappingProxyType({}))
+    text: str = ""
+    line: int | None = None
+    problem: bool = False
 
     @property
     def failed(self) -> bool:
@@ -59,10 +67,12 @@ class Event:
 
     def fact(self, real: float) -> dict[str, Any]:
         """Return the JSON object; `real` is how many seconds the run has taken."""
-        raise NotImplementedError
+        return {"t": round(self.t, 6), **self.facts}
 
     def lines(self, file: str, real: float) -> Iterator[Line]:
-        raise NotImplementedError
+        place = f"{file}: " if self.problem else ""
+        place = place if self.line is None else f"{file}:{self.line}: "
+        yield Line(f"{'' if self.problem else f'{self.t:10.4f}  '}{place}{self.text}", self.problem)
 
 
 ENDS = {
@@ -184,55 +194,26 @@ Values = Mapping[str, Value]
 
 
 @dataclass(frozen=True)
-class Traced(Event):
-    """A line that was executed: when it began, its number, the program of a controller, and the values it changed."""
-
-    line: int
-    text: str
-    changed: Values
-    program: int | None = None
-
-    def fact(self, real: float) -> dict[str, Any]:
-        number = {} if self.program is None else {"program": self.program}
-        return {"t": round(self.t, 6), **number, "line": self.line, "text": self.text, "changed": dict(self.changed)}
-
-    def lines(self, file: str, real: float) -> Iterator[Line]:
-        number = "" if self.program is None else f" (program {self.program})"
-        yield Line(f"{self.t:10.4f}  {file}:{self.line}: {self.text}{number}{shown(self.changed)}")
-
-
-@dataclass(frozen=True)
 class Broken(Event):
-    """The end of a run before the line of a break point: its name as given, and the values that are watched."""
+    """The end of a run before the line of a break point: its place as given, and the lines of the file."""
 
-    place: str
-    line: int
-    text: str
-    values: Values
+    place: str = ""
     source: Sequence[str] = field(default=(), repr=False)
 
-    def fact(self, real: float) -> dict[str, Any]:
-        place = {"break": self.place, "line": self.line, "text": self.text}
-        return {"t": round(self.t, 6), **place, "values": dict(self.values)}
-
     def lines(self, file: str, real: float) -> Iterator[Line]:
-        yield Line(f"{self.t:10.4f}  break point {self.place}: {file}:{self.line}: {self.text}{shown(self.values)}")
+        assert self.line is not None
+        yield Line(f"{self.t:10.4f}  break point {self.place}: {file}:{self.line}: {self.text}")
         first, last = max(self.line - AROUND, 1), min(self.line + AROUND, len(self.source))
         width = len(str(last))
         for n in range(first, last + 1):
             yield Line(f"{'->' if n == self.line else '  '} {n:{width}}  {self.source[n - 1]}".rstrip())
 
 
-@dataclass(frozen=True)
-class TraceFull(Event):
+def _trace_full(t: float) -> Event:
     """The end of a trace that has become too long. The run goes on."""
-
-    def fact(self, real: float) -> dict[str, Any]:
-        return {"t": round(self.t, 6), "trace": f"ends after {MOST_TRACED} lines"}
-
-    def lines(self, file: str, real: float) -> Iterator[Line]:
-        hint = "--until and --break end the run earlier, --watch shows fewer lines"
-        yield Line(f"{file}: the trace ends after {MOST_TRACED} lines; {hint}", problem=True)
+    ends = f"ends after {MOST_TRACED} lines"
+    hint = "--until and --break end the run earlier, --watch shows fewer lines"
+    return Event(t, {"trace": ends}, f"the trace {ends}; {hint}", problem=True)
 
 
 def shown(values: Values) -> str:
@@ -298,7 +279,9 @@ class Recorder:
             return False
         self.broken = True
         values = self._values() if self._debugging.watch else {}
-        self._events.append(Broken(t, point.place, line, self._text(line), dict(values), self._source))
+        text = self._text(line)
+        facts = {"break": point.place, "line": line, "text": text, "values": dict(values)}
+        self._events.append(Broken(t, facts, text + shown(values), line, place=point.place, source=self._source))
         return True
 
     def after(self, t: float, line: int, changed: Values | None = None, program: int | None = None) -> None:
@@ -308,8 +291,13 @@ class Recorder:
         changed = self.changed() if changed is None else changed
         if self._debugging.trace or changed:
             self._traced += 1
-            traced = Traced(t, line, self._text(line), changed, program)
-            self._events.append(TraceFull(t) if self.full else traced)
+            self._events.append(_trace_full(t) if self.full else self._executed(t, line, changed, program))
+
+    def _executed(self, t: float, line: int, changed: Values, program: int | None) -> Event:
+        text, number = self._text(line), {} if program is None else {"program": program}
+        facts = {**number, "line": line, "text": text, "changed": dict(changed)}
+        of = "" if program is None else f" (program {program})"
+        return Event(t, facts, f"{text}{of}{shown(changed)}", line)
 
     def _text(self, line: int) -> str:
         return self._shown(self._source[line - 1]) if 0 < line <= len(self._source) else ""

@@ -10,9 +10,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from math import inf
-from typing import Any
 
 from multidrop.dialects import Diagnostic
 from multidrop.dialects.files import split_lines
@@ -36,7 +35,6 @@ from multidrop.simulator.program_run import (
     BreakPoint,
     Debugging,
     Event,
-    Line,
     Load,
     Programs,
     Recorder,
@@ -53,60 +51,12 @@ LAST_ADDRESS = 99_999
 LAST_LINE = 999_999
 
 
-@dataclass(frozen=True)
-class Printed(Event):
-    """A line that the drive has printed, and when it was complete; seconds from the start of the program."""
-
-    text: str
-
-    def fact(self, real: float) -> dict[str, Any]:
-        return {"t": round(self.t, 6), "print": self.text}
-
-    def lines(self, file: str, real: float) -> Iterator[Line]:
-        """Yield the line, with what would act on a terminal escaped."""
-        text = "".join(each if each.isprintable() or each == "\t" else f"\\x{ord(each):02x}" for each in self.text)
-        yield Line(f"{self.t:10.4f}  {text}")
-
-
-@dataclass(frozen=True)
-class Failed(Event):
-    """An error of the drive: its time, its code, the line of the file; whether a subroutine of OE handled it.
-
-    `loading`: the drive refused the line when the file was loaded.
-    """
-
-    code: int
-    line: int
-    text: str
-    handled: bool = False
-    loading: bool = False
-    personality: str = field(default="LMDCM", compare=False)
-
-    def fact(self, real: float) -> dict[str, Any]:
-        more = {"handled": True} if self.handled else {}
-        return {"t": round(self.t, 6), "error": self.code, "line": self.line, **more}
-
-    def lines(self, file: str, real: float) -> Iterator[Line]:
-        when = "refused" if self.loading else f"at {self.t:.4f} s"
-        handled = " (OE has handled it)" if self.handled else ""
-        yield Line(f"{file}:{self.line}: {self.text}: {when}: {self.meaning}{handled}", problem=True)
-
-    @property
-    def meaning(self) -> str:
-        return f"error {self.code}, {text_of_error(self.code, self.personality)}"
-
-
-@dataclass(frozen=True)
-class Output(Event):
-    """The outputs that the program has made active, after a line that changed them."""
-
-    active: tuple[int, ...]
-
-    def fact(self, real: float) -> dict[str, Any]:
-        return {"t": round(self.t, 6), "outputs": list(self.active)}
-
-    def lines(self, file: str, real: float) -> Iterator[Line]:
-        yield Line(f"{self.t:10.4f}  active outputs: {', '.join(map(str, self.active)) or 'none'}")
+def printed(t: float, text: str) -> Event:
+    """A line that the drive has printed, and when it was complete; what would act on a terminal is escaped."""
+    shown = text
+    if not text.isprintable():
+        shown = "".join(each if each.isprintable() or each == "\t" else f"\\x{ord(each):02x}" for each in text)
+    return Event(t, {"print": text}, shown)
 
 
 class ProgramRun:
@@ -149,13 +99,13 @@ class ProgramRun:
             self._interpreter.watch(None, self._outputs)
         yield from self._execute(until)
 
-    def refusals(self) -> Iterator[Failed]:
+    def refusals(self) -> Iterator[Event]:
         """Load the file without running it; return the refused lines. A refused PG counts as PG 1."""
-        return (each for each in self._load(anywhere=True) if isinstance(each, Failed))
+        return (each for each in self._load(anywhere=True) if each.problem)
 
     # Loading.
 
-    def _load(self, anywhere: bool = False) -> Iterator[Printed | Failed]:
+    def _load(self, anywhere: bool = False) -> Iterator[Event]:
         device = self._device
         for line in self._lines:
             if anywhere and device.programming is None and line.section == "program" and line.mark is None:
@@ -165,12 +115,12 @@ class ProgramRun:
                 continue
             answer = device.execute(line.text, 0.0)
             for text in answer.lines:
-                yield Printed(0.0, text)
+                yield printed(0.0, text)
             self._held += answer.tail
             if answer.refused:
                 code = self._failures[-1].code
                 self._errors.append(code)
-                yield Failed(0.0, code, line.number, line.text, loading=True, personality=self._personality)
+                yield self._failed(Failure(0.0, code, 0), line, "refused")
                 if address is None and line.section == "program" and not anywhere:
                     return
             elif address is not None:
@@ -250,7 +200,8 @@ class ProgramRun:
         active = tuple(n for n, on in device.output_lines.driven.items() if on)
         if active != self._active:
             self._active = active
-            self._switched.append(Output(device.now, active))
+            text = f"active outputs: {', '.join(map(str, active)) or 'none'}"
+            self._switched.append(Event(device.now, {"outputs": list(active)}, text))
 
     # Running.
 
@@ -262,7 +213,7 @@ class ProgramRun:
             if self._recorder is not None and self._recorder.done:
                 self._interpreter.watch(None, None)
         if self._held:
-            yield Printed(device.now, self._held)
+            yield printed(device.now, self._held)
         if device.running:
             yield self._summary("until", given_up=until is None)
         elif self._recorder is not None and self._recorder.broken:
@@ -278,18 +229,22 @@ class ProgramRun:
         self._switched.clear()
         for t, text in self._device.prints():
             *whole, self._held = (self._held + text).split(CRLF)
-            news += [Printed(t, each) for each in whole]
+            news += [printed(t, each) for each in whole]
         for failure in self._failures:
-            line = self._at(failure.line)
-            news.append(
-                Failed(failure.t, failure.code, line.number, line.text, failure.handled, personality=self._personality)
-            )
+            news.append(self._failed(failure, self._at(failure.line), f"at {failure.t:.4f} s"))
             if not failure.handled:
                 self._errors.append(failure.code)
         self._last = self._failures[-1] if self._failures else self._last
         self._failures.clear()
         news.sort(key=lambda each: each.t)
         yield from news
+
+    def _failed(self, failure: Failure, line: ProgramLine, when: str) -> Event:
+        """An error of the drive; `handled` is one that a subroutine of OE took."""
+        facts = {"error": failure.code, "line": line.number, **({"handled": True} if failure.handled else {})}
+        handled = " (OE has handled it)" if failure.handled else ""
+        text = f"{line.text}: {when}: {meaning(failure.code, self._personality)}{handled}"
+        return Event(failure.t, facts, text, line.number, problem=True)
 
     def _at(self, index: int) -> ProgramLine:
         """Find the line of the file for a line of the interpreter; after the program's end, the last one before."""
@@ -322,6 +277,10 @@ class ProgramRun:
         )
 
 
+def meaning(code: int, personality: str) -> str:
+    return f"error {code}, {text_of_error(code, personality)}"
+
+
 def read(text: str, file: str) -> Load:
     lines, source = program_file.read(text, file), split_lines(text)
     return lambda spec: ProgramRun(spec, lines, file, source)
@@ -338,13 +297,13 @@ def refusals(text: str, file: str, personality: str, found: Sequence[Problem]) -
     missing = {line.declares for line in lines if line.number in wrong}
     problems, numbered = [], {line.number: line for line in lines}
     for failed in ProgramRun(DriveSpec(personality=personality), tried, file).refusals():
-        line = numbered[failed.line]
-        if failed.code == ErrorNumber.PROGRAM_MEMORY_FULL:  # the drive takes none of the others either
+        line, code = numbered[failed.facts["line"]], failed.facts["error"]
+        if code == ErrorNumber.PROGRAM_MEMORY_FULL:  # the drive takes none of the others either
             problems.append(_too_big(line, lines, personality))
             break
         if line.number not in wrong and not missing & words(line.text):
-            what = f"{failed.text}: {failed.meaning}"
-            problems.append(Problem(line.number, line.column, what, remedy(failed.code, failed.text, personality)))
+            what = f"{line.text}: {meaning(code, personality)}"
+            problems.append(Problem(line.number, line.column, what, remedy(code, line.text, personality)))
         missing.add(line.declares)
     return problems
 

@@ -12,7 +12,6 @@ from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import partial
 from math import inf
-from typing import Any
 
 from multidrop.dialects import Diagnostic
 from multidrop.dialects.files import SourceLine, split_lines
@@ -22,17 +21,16 @@ from multidrop.dialects.pmx.manual.table import lookup
 from multidrop.dialects.text import counted, whole
 from multidrop.simulator.cell.spec import DriveSpec
 from multidrop.simulator.pmx.device import PmxDevice
+from multidrop.simulator.pmx.programs import Failure
 from multidrop.simulator.program_run import (
     NO_DEBUGGING,
     BreakPoint,
     Debugging,
     Event,
-    Line,
     Load,
     Programs,
     Recorder,
     Summary,
-    Traced,
     Value,
     Values,
     break_point,
@@ -135,42 +133,6 @@ class Watcher(Recorder):
         return number
 
 
-# What the run of a PMX's programs reports: as values, as JSON objects, and as lines for a person.
-
-
-@dataclass(frozen=True)
-class Output(Event):
-    """A program has switched outputs: the time, the program, all outputs as DO gives them."""
-
-    program: int
-    outputs: int
-
-    def fact(self, real: float) -> dict[str, Any]:
-        return {"t": round(self.t, 6), "program": self.program, "outputs": self.outputs}
-
-    def lines(self, file: str, real: float) -> Iterator[Line]:
-        yield Line(f"{self.t:10.4f}  DO={self.outputs} (program {self.program})")
-
-
-@dataclass(frozen=True)
-class Failed(Event):
-    """An error in a program: its time, the program, the line of the file, the cause; whether SUB 31 handled it."""
-
-    program: int
-    line: int
-    why: str
-    handled: bool
-
-    def fact(self, real: float) -> dict[str, Any]:
-        more = {"handled": True} if self.handled else {}
-        return {"t": round(self.t, 6), "program": self.program, "error": self.why, "line": self.line, **more}
-
-    def lines(self, file: str, real: float) -> Iterator[Line]:
-        handled = " (SUB 31 has handled it)" if self.handled else ""
-        where = f"{file}:{self.line}: program {self.program} at {self.t:.4f} s"
-        yield Line(f"{where}: {self.why}{handled}", problem=True)
-
-
 _MOTION = re.compile(r"X-?\d+(?:Y-?\d+)?|Y-?\d+|(?:J|HL?|L|ZH?)[XY][+-]", re.ASCII)
 
 
@@ -194,7 +156,7 @@ class ProgramRun:
         self._watcher: Watcher | None = None
         self._moves = 0
         self._last = self._device.controller.outputs
-        self._outputs: list[Output] = []
+        self._outputs: list[Event] = []
         self._later: list[Event] = []
         self._errors: list[str] = []
         self.now, self._stuck = 0.0, False
@@ -231,7 +193,8 @@ class ProgramRun:
         self._moves += _MOTION.fullmatch(text) is not None
         if self._device.controller.outputs != self._last:
             self._last = self._device.controller.outputs
-            self._outputs.append(Output(t, program, self._last))
+            facts = {"program": program, "outputs": self._last}
+            self._outputs.append(Event(t, facts, f"DO={self._last} (program {program})"))
 
     def _news(self, last: bool = False) -> Iterator[Event]:
         """Yield what was executed, switched and what failed since the last look, in the order of time.
@@ -246,14 +209,22 @@ class ProgramRun:
             news += self._watcher.take()
             begun = self._watcher.open_since
         for each in self._programs.failures:
-            news.append(Failed(each.t, each.program, self._source.get(each.line, 0), each.why, each.handled))
+            news.append(self._failed(each))
             if not each.handled:
                 self._errors.append(each.why)
         self._outputs.clear()
         self._programs.failures.clear()
-        news.sort(key=lambda each: (each.t, not isinstance(each, Traced)))
+        news.sort(key=lambda each: (each.t, each.problem or each.line is None))  # an executed line first
         self._later = [each for each in news if each.t >= begun]
         yield from (each for each in news if each.t < begun)
+
+    def _failed(self, failure: Failure) -> Event:
+        """An error in a program, its cause, and whether SUB 31 has handled it."""
+        line, more = self._source.get(failure.line, 0), {"handled": True} if failure.handled else {}
+        facts = {"program": failure.program, "error": failure.why, "line": line, **more}
+        handled = " (SUB 31 has handled it)" if failure.handled else ""
+        text = f"program {failure.program} at {failure.t:.4f} s: {failure.why}{handled}"
+        return Event(failure.t, facts, text, line, problem=True)
 
     def _summary(self, until: float | None) -> Summary:
         running = self._programs.running

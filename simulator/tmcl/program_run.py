@@ -7,9 +7,8 @@ any more, or when its time is over.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
-from typing import Any
 
 from multidrop.dialects import Diagnostic
 from multidrop.dialects.files import split_lines
@@ -23,7 +22,6 @@ from multidrop.simulator.program_run import (
     NO_DEBUGGING,
     Debugging,
     Event,
-    Line,
     Load,
     Programs,
     Recorder,
@@ -37,36 +35,6 @@ from multidrop.simulator.tmcl.program import ALL_PORTS, USERS
 
 _MOTIONS = frozenset({Command.ROR, Command.ROL, Command.MVP, Word.MVPA, Word.ROLA, Word.RORA})
 _SETS = frozenset({Command.SAP, Word.AAP})
-
-
-@dataclass(frozen=True)
-class Failed(Event):
-    """A line that was not carried out: the line of the file, and why."""
-
-    line: int
-    text: str
-    why: str
-
-    def fact(self, real: float) -> dict[str, Any]:
-        return {"t": round(self.t, 6), "error": self.why, "line": self.line, "text": self.text}
-
-    def lines(self, file: str, real: float) -> Iterator[Line]:
-        yield Line(f"{file}:{self.line}: {self.text} at {self.t:.4f} s: {self.why}", problem=True)
-
-
-@dataclass(frozen=True)
-class Output(Event):
-    """An output that the program has set: its port, 255 for all of them, and the value."""
-
-    port: int
-    value: int
-
-    def fact(self, real: float) -> dict[str, Any]:
-        return {"t": round(self.t, 6), "port": self.port, "value": self.value}
-
-    def lines(self, file: str, real: float) -> Iterator[Line]:
-        where = "all outputs" if self.port == ALL_PORTS else f"output {self.port}"
-        yield Line(f"{self.t:10.4f}  {where} = {self.value}")
 
 
 class ProgramRun:
@@ -158,7 +126,8 @@ class ProgramRun:
         self._moves += _begins_motion(call)
         failed = bool(self._program.failures) and self._program.failures[-1].t == t
         if call.command == Word.SIO and call.motor == USERS and not failed:
-            self._events.append(Output(t, call.type, call.value))
+            where = "all outputs" if call.type == ALL_PORTS else f"output {call.type}"
+            self._events.append(Event(t, {"port": call.type, "value": call.value}, f"{where} = {call.value}"))
         if self._recorder is not None:
             self._recorder.after(t, self._begun[1])
 
@@ -169,7 +138,9 @@ class ProgramRun:
             news += self._recorder.take()
         for each in self._program.failures:
             line = self._source.get(each.at, 0)
-            news.append(Failed(each.t, line, _shown(self._text[line - 1]) if line else "", each.why))
+            text = _shown(self._text[line - 1]) if line else ""
+            facts = {"error": each.why, "line": line, "text": text}
+            news.append(Event(each.t, facts, f"{text} at {each.t:.4f} s: {each.why}", line, problem=True))
             self._errors.append(each.why)
         self._program.failures.clear()
         yield from sorted(news, key=lambda each: each.t)

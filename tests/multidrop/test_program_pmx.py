@@ -13,7 +13,8 @@ import pytest
 from multidrop.dialects.pmx.manual import program_file
 from multidrop.simulator.cell.spec import DriveSpec
 from multidrop.simulator.cells import read
-from multidrop.simulator.pmx.program_run import Failed, Output, ProgramRun, Summary
+from multidrop.simulator.pmx.program_run import ProgramRun
+from multidrop.simulator.program_run import Event, Summary
 from tests.support import pmx_programs as shapes
 from tests.support.cell_session import bus, drive, pmx
 from tests.support.front_door import Command, Done
@@ -29,7 +30,7 @@ def program(multidrop: Command) -> Command:
     return partial(multidrop, "program", "test")
 
 
-def tried(text: str, until: float, inputs: str = "[]", more: str = "") -> tuple[list[Output | Failed], Summary]:
+def tried(text: str, until: float, inputs: str = "[]", more: str = "") -> tuple[list[Event], Summary]:
     (_, bus) = read(CELL.format(inputs=inputs) + more, "cell").buses
     trial = ProgramRun(bus.drives[0], program_file.read(text, "a.prg"), "a.prg")
     *events, end = trial.run("", until)
@@ -87,17 +88,17 @@ def test_a_watchdog_stops_the_motor_and_starts_it_again() -> None:
     events, held = tried(shapes.WATCHDOG, 7.0)
     assert not held.moving and not held.errors
     events, _ = tried(shapes.WATCHDOG, 9.0)  # the alarm stands, as no host speaks to it: 1 for a moment
-    assert [(round(each.t), each.outputs) for each in events if isinstance(each, Output)] == [(8, 1), (8, 0)]
+    assert [(round(each.t), each.facts["outputs"]) for each in events if "outputs" in each.facts] == [(8, 1), (8, 0)]
 
 
 def test_a_limit_calls_sub_31_and_without_it_ends_the_program() -> None:
     text = "HSPD=5000\nACC=50\nEO=1\nX1000\nWAITX\nV1=1\nEND\n"
     events, end = tried(text, 10.0, more=LIMIT)
     (failed,) = events
-    assert isinstance(failed, Failed) and (failed.line, failed.handled) == (5, False) and "axis X" in failed.why
+    assert (failed.line, "handled" in failed.facts) == (5, False) and "axis X" in failed.facts["error"]
     assert end.ended == "error" and 490 <= end.position[0] <= 520
     events, end = tried(text + "SUB 31\nECLEARX\nX0\nWAITX\nENDSUB\n", 10.0, more=LIMIT)
-    assert [each.handled for each in events if isinstance(each, Failed)] == [True]
+    assert [each.facts["handled"] for each in events if "error" in each.facts] == [True]
     assert end.ended == "END" and end.position[0] == 0 and not end.errors
 
 
