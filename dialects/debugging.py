@@ -8,7 +8,7 @@ from typing import Any, Generic, NamedTuple, TypeVar
 
 from multidrop.dialects.codec import Procedure
 from multidrop.dialects.errors import Inexpressible
-from multidrop.dialects.program_files import Held
+from multidrop.dialects.program_files import Held, Stored
 from multidrop.dialects.state import DriveState
 
 S = TypeVar("S", bound=DriveState)
@@ -18,17 +18,10 @@ Neighbours = Sequence[str]
 """The addresses of the drives on a line."""
 
 
-class Row(NamedTuple):
-    """A line of the program in a drive: its address, and its text."""
-
-    address: int
-    text: str
-
-
 class Stepped(NamedTuple):
     """A line that was executed, and the seconds for which it holds its program; None: they are not known."""
 
-    row: Row
+    row: Stored
     hold: float | None = 0.0
 
 
@@ -62,13 +55,11 @@ class Debugging(Generic[S]):
     What a family lacks raises Inexpressible and sends nothing.
     """
 
-    listing: Callable[[S], Procedure[tuple[Row, ...]]]
+    listing: Callable[[S], Procedure[tuple[Stored, ...]]]
     """Read the program in the drive."""
-    rows: Callable[[Held], Sequence[Row]]
-    """Return the lines of what was read from a drive, as `listing` does."""
-    entry: Callable[[Sequence[Row]], str]
+    entry: Callable[[Sequence[Stored]], str]
     """The place at which a program begins if none is named."""
-    address: Callable[[Sequence[Row], str], int | None]
+    address: Callable[[Sequence[Stored], str], int | None]
     """The address of the first line that is executed at a place; None where that is not known."""
     idle: Callable[[S, str, Neighbours | None], Procedure[None]]
     """Raise Refused unless a program can be started: traced beside these neighbours, or with None step by step."""
@@ -76,9 +67,9 @@ class Debugging(Generic[S]):
     """Start a program whose lines are shown."""
     begin: Callable[[S, str], Procedure[None]]
     """Start a program that waits for `step` before each line; a break point is removed before."""
-    waits: Callable[[S, str, Row | None], Procedure[None]]
+    waits: Callable[[S, str, Stored | None], Procedure[None]]
     """Raise Refused unless it is known that a program waits, after this last line, for a step or to go on."""
-    step: Callable[[S, Sequence[Row]], Procedure[Stepped]]
+    step: Callable[[S, Sequence[Stored]], Procedure[Stepped]]
     """Execute one line of this program. Call it after `waits`, with no other conversation in between."""
     go_on: Callable[[S, str], Procedure[None]]
     """Let a program run on at normal speed. Call it after `waits`."""
@@ -94,13 +85,15 @@ class Debugging(Generic[S]):
     """Check names to watch, without a request. Raises Diagnostic."""
     values: Callable[[S, Sequence[str]], Procedure[Mapping[str, str]]]
     """Read variables; one that the drive does not have now is left out. Clears nothing."""
+    rows: Callable[[Held], Sequence[Stored]] = lambda held: held.lines
+    """Return the lines of what was read from a drive, as `listing` does."""
     forget: Callable[[S], None] = lambda state: None
     """Forget what proves that a program waits: a stop came."""
-    broken: Callable[[S, Sequence[Row], Row, str], Procedure[int | None]] = _never_broken
+    broken: Callable[[S, Sequence[Stored], Stored, str], Procedure[int | None]] = _never_broken
     """Whether the drive waits at the break point after this last line of a quiet trace; its address, or None."""
     hold: Callable[[str], float | None] = lambda text: 0.0
     """Seconds for which a line holds its program, 0 for none and for motion; None: they are not known."""
-    traced: Callable[[str], Row | None] = lambda line: None
+    traced: Callable[[str], Stored | None] = lambda line: None
     """The executed line that a printed line shows; None for any other line."""
     no_step: str = ""
     """The reason why its drives have no single step; empty: they have."""

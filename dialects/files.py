@@ -209,6 +209,32 @@ def toml_of(text: str, where: str) -> dict[str, Any]:
         raise Diagnostic("not TOML: a number without end", where, "correct the line") from None
 
 
+Way = tuple[tuple[str, int], ...]
+"""The way to a table or a key: names, each with its number in a list of tables; 0: it is no list."""
+
+
+def toml_keys(text: str) -> Iterator[tuple[Way, int, bool]]:
+    """Yield the way to each head and key of a TOML text that begins a line, its line, and whether it is a key."""
+    counts: dict[str, int] = {}
+    here: Way = ()
+    for number, line in enumerate(split_lines(text), 1):
+        if head := re.match(r"\s*\[(\[?)\s*([^\]]+?)\s*\]", line):
+            names = toml_names(head[2])
+            if head[1]:
+                place = ".".join(names)
+                counts = {each: n for each, n in counts.items() if not each.startswith(f"{place}.")}
+                counts[place] = counts.get(place, 0) + 1
+            here = tuple((name, counts.get(".".join(names[: n + 1]), 0)) for n, name in enumerate(names))
+            yield here, number, False
+        elif pair := re.match(r"\s*([^=#]+?)\s*=", line):
+            yield (*here, *((name, 0) for name in toml_names(pair[1]))), number, True
+
+
+def toml_names(dotted: str) -> list[str]:
+    """The names of a head or a dotted key."""
+    return [part.strip().strip("\"'") for part in dotted.split(".")]
+
+
 def _check_nesting(text: str, where: str) -> None:
     """Raise Diagnostic for brackets and dotted keys deeper than `DEEPEST`, without parsing."""
     brackets = dots = 0

@@ -12,13 +12,10 @@ from collections import deque
 from collections.abc import Callable, Container, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, cast
+from typing import Any, NamedTuple, Protocol, cast
 
 from multidrop.dialects.errors import Diagnostic, Refused
 from multidrop.dialects.files import SourceLine
-
-if TYPE_CHECKING:
-    from pathlib import Path
 
 
 class Problem(NamedTuple):
@@ -157,9 +154,6 @@ class Converter(Protocol):
 class FileLanguage(Protocol):
     """The language of program files: a module of a family's manual."""
 
-    def load(self, path: str | Path) -> Sequence[SourceLine]:
-        """Read the lines to download. Raises Diagnostic."""
-
     def read(self, text: str, name: str) -> Sequence[SourceLine]:
         """Read the lines of a text; `name` is the file's name in a Diagnostic. Raises Diagnostic."""
 
@@ -197,7 +191,7 @@ class ProgramFiles(NamedTuple):
 
     @property
     def language(self) -> FileLanguage:
-        """Load, check, format and measure."""
+        """Read, check, format and measure."""
         return cast(FileLanguage, importlib.import_module(self.module))
 
     @property

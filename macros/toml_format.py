@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from multidrop.dialects.errors import Diagnostic
-from multidrop.dialects.files import split_lines, toml_of
+from multidrop.dialects.files import toml_keys, toml_of
 from multidrop.macros.model import FIRST_PAGE, At, Macro, Step, check
 
 _HEAD = "# a macro of multidrop: lines as typed, with the seconds after the line before\n"
@@ -39,10 +39,6 @@ _TYPE_NAMES = {
     "step": "[[step]] tables",
 }
 _TEXTS = 'texts in brackets: ["...", "..."]'
-
-
-_STEP = re.compile(r"\s*\[\[\s*[\"']?step[\"']?\s*\]\]")
-_KEY = re.compile(r"\s*[\"']?(?P<key>[A-Za-z_-]+)[\"']?\s*=")
 
 
 def format_macro(macro: Macro) -> str:
@@ -203,13 +199,10 @@ def _added(text: str, line: str) -> str:
 def in_text(text: str, where: str) -> At:
     """The place of each key in a text, as far as its layout shows it; else the file."""
     lines: dict[tuple[str, int], int] = {}
-    step = 0
-    for number, line in enumerate(split_lines(text), 1):
-        if _STEP.match(line):
-            step += 1
-            lines.setdefault(("", step), number)
-        elif match := _KEY.match(line):
-            lines.setdefault((match["key"], step), number)
+    for (first, *rest), number, is_key in toml_keys(text):
+        step = first[1] if first[0] == "step" else 0
+        if is_key or step:
+            lines.setdefault(([first, *rest][-1][0] if is_key else "", step), number)
 
     def at(key: str, step: int) -> str:
         number = lines.get((key, step)) or lines.get(("", step))

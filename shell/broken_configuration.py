@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any, TypeVar
 
 from multidrop.dialects import Diagnostic
-from multidrop.dialects.files import split_lines, toml_of
+from multidrop.dialects.files import split_lines, toml_keys, toml_names, toml_of
 
 WAY = "--no-config goes on without the file"
 _HEADER = re.compile(r"\s*\[\[?([^\]]*)\]")
@@ -70,7 +70,7 @@ def _sections(text: str, where: str) -> tuple[dict[str, Any], list[Diagnostic], 
         except Diagnostic as problem:
             header = _HEADER.match(lines[start]) if lines else None
             at = f"{where}:{start + 1}" if problem.where == where else problem.where
-            lost.append((tuple(_parts(header[1])) if header else (), Diagnostic(problem.message, at, problem.hint)))
+            lost.append((tuple(toml_names(header[1])) if header else (), Diagnostic(problem.message, at, problem.hint)))
     lost = lost or [((), whole)]  # a section that is there twice
     return document, [problem for _, problem in lost], lost
 
@@ -117,22 +117,11 @@ def placed(message: str, text: str, where: str, hint: str = "") -> Diagnostic:
 
 def line_of(text: str, key: Sequence[str]) -> int:
     """The number of the line with a key, given with its tables (`screen`, `theme`), or the nearest table's; 0: none."""
-    table: tuple[str, ...] = ()
     best = depth = 0
-    for number, line in enumerate(split_lines(text), 1):
-        if header := re.match(r"\s*\[\[?([^\]]+)\]", line):
-            table = _parts(header[1])
-            found = table
-        elif pair := re.match(r"\s*([^=#]+?)\s*=", line):
-            found = (*table, *_parts(pair[1]))
-        else:
-            continue
-        if found == tuple(key):
+    for way, number, _ in toml_keys(text):
+        found = [name for name, _ in way]
+        if found == list(key):
             return number
-        if len(found) > depth and found == tuple(key[: len(found)]):
+        if len(found) > depth and found == list(key[: len(found)]):
             best, depth = number, len(found)
     return best
-
-
-def _parts(dotted: str) -> tuple[str, ...]:
-    return tuple(part.strip().strip("\"'") for part in dotted.split("."))

@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any
 
 from multidrop.dialects import Diagnostic, SourceLine
-from multidrop.dialects.debugging import Row
 from multidrop.dialects.family import Programs
 from multidrop.dialects.program_files import Held, Stored
 from multidrop.dialects.text import counted
@@ -28,25 +27,25 @@ _LISTED = re.compile(r"\s*(\d+)\s+(\S.*)")
 class Listing:
     """The lines of the program in a drive. `state`: the folder with the copies of downloaded files."""
 
-    def __init__(self, state: Path, programs: Programs[Any], rows: Sequence[Row] = ()) -> None:
+    def __init__(self, state: Path, programs: Programs[Any], rows: Sequence[Stored] = ()) -> None:
         self.rows = tuple(rows)
-        held = Held(tuple(Stored(*row) for row in self.rows))
+        held = Held(self.rows)
         source = Sources(state).find(held) if rows else None
         lines = () if source is None else programs.annotated(source.text, held)
         self._remarks = {int(found[1]): found[2] for line in lines if (found := _LISTED.fullmatch(line))}
 
-    def row(self, address: int) -> Row:
+    def row(self, address: int) -> Stored:
         """The line at an address, or the one whose compiled lines hold that address."""
-        return next((each for each in reversed(self.rows) if each.address <= address), Row(address, ""))
+        return next((each for each in reversed(self.rows) if each.at <= address), Stored(address, ""))
 
     @property
     def lines(self) -> tuple[tuple[int, str], ...]:
         """Every line with its address, and with its remark."""
-        return tuple((row.address, self._text(row)) for row in self.rows)
+        return tuple((row.at, self._text(row)) for row in self.rows)
 
-    def shown(self, row: Row) -> str:
+    def shown(self, row: Stored) -> str:
         """A line with its address and its remark."""
-        return f"{row.address}  {self._text(row)}".rstrip()
+        return f"{row.at}  {self._text(row)}".rstrip()
 
     def around(self, address: int | None) -> list[str]:
         """The lines around one, which an arrow marks; none where there is no such line."""
@@ -55,12 +54,12 @@ class Listing:
             return []
         at = self.rows.index(current)
         shown = self.rows[max(at - AROUND, 0) : at + AROUND + 1]
-        width = len(str(shown[-1].address))
-        return [f"{'->' if row == current else '  '} {row.address:{width}}  {self._text(row)}" for row in shown]
+        width = len(str(shown[-1].at))
+        return [f"{'->' if row == current else '  '} {row.at:{width}}  {self._text(row)}" for row in shown]
 
-    def _text(self, row: Row) -> str:
+    def _text(self, row: Stored) -> str:
         """The text of a line, with its remark if it is of this program."""
-        return self._remarks.get(row.address, row.text) if row in self.rows else row.text
+        return self._remarks.get(row.at, row.text) if row in self.rows else row.text
 
 
 class Sight:

@@ -75,11 +75,10 @@ class Floor:
                 heard[name] = data
         return heard
 
-    def command(self, text: str, now: float) -> str | None:
+    def command(self, text: str, now: float) -> None:
         """Move the world: `/sim input b 1 0` (`/sim` may be left out). Raises Diagnostic and changes nothing.
 
-        Returns a remark for a person, or None. A drive is called `b`, or `press:b` where its name is on
-        several buses.
+        A drive is called `b`, or `press:b` where its name is on several buses.
         """
         words = text.split()
         if words[:1] == ["/sim"]:
@@ -97,7 +96,6 @@ class Floor:
         finally:
             for wire in self.wires.values():
                 wire.look_again()
-        return None
 
     def _carry_out(self, verb: str, words: list[str], where: str, now: float) -> None:
         """Carry out a command of the right length. Raises Diagnostic and changes nothing."""

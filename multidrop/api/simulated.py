@@ -88,11 +88,12 @@ class SimulatedCell:
     def world(self, command: str) -> str:
         """Move the world as `/sim` does: `input b 1 0`, `push b 100`, `power b off`, `unplug press`. Raises Diagnostic.
 
-        Returns a remark for a person, mostly empty.
+        Returns an empty text: no command has a remark.
         """
 
         async def move() -> str:
-            return self._floor.command(command) or ""
+            self._floor.command(command)
+            return ""
 
         if not self._thread.alive:
             raise Diagnostic("the simulated cell is closed", command)

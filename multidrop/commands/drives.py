@@ -129,7 +129,7 @@ def _check(file: str) -> None:
     """Raise Diagnostic for a file that is correct in no language: the error in the language of its name."""
     own, text = program_languages()[program_language_of(file)], program_text_of(file)
     if all(errors(source.language.check(text)) for source in program_languages().values() if source is not own):
-        own.language.load(file)
+        own.language.read(text, file)
 
 
 def _with_drive(

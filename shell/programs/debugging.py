@@ -12,7 +12,8 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from multidrop.dialects import Diagnostic, DriveError, Inexpressible, Procedure, Refused
-from multidrop.dialects.debugging import Debugging, Look, Neighbours, Row
+from multidrop.dialects.debugging import Debugging, Look, Neighbours
+from multidrop.dialects.program_files import Stored
 from multidrop.drives.drive import Drive
 from multidrop.drives.events import Lost
 from multidrop.shell.events import OnBus, Phase, SessionEvent
@@ -28,7 +29,7 @@ QUIET = 0.5
 """The time without a traced line after which a break point may be the reason, s."""
 LONGEST_HOLD = 65.0
 """The longest time of an H, which counts where its time is not known, s."""
-MAYBE_HELD = Row(0, "H")
+MAYBE_HELD = Stored(0, "H")
 """The last line of a program that was broken somewhere: it may be an H."""
 WAYS = "/step executes one line, /continue all the rest"
 LEFT = "the break point at {} stays in the drive until /break off or power-off"
@@ -50,7 +51,7 @@ class Debugger:
         self._place = ""
         self._waits = False
         """The program was seen to wait, and nothing was sent that lets it go on."""
-        self._last: Row | None = None
+        self._last: Stored | None = None
         self._last_at = float("-inf")
         """The time of the last executed line, s of the session's clock."""
         self._free_at = float("-inf")
@@ -114,7 +115,7 @@ class Debugger:
             changed = await self._changed()
         finally:  # the line was executed, whatever becomes of the values
             self._session.output(self._listing.shown(stepped.row) + changed)
-            self._sight.seen(stepped.row.address, Phase.AFTER)
+            self._sight.seen(stepped.row.at, Phase.AFTER)
         if not (await self._look()).runs:
             self.say("the program has ended")
 
@@ -145,7 +146,7 @@ class Debugger:
             if look.address is not None and (row := self._listing.row(look.address)) != self._last:
                 self._session.output(self._listing.shown(row))
                 self._last = row
-                self._sight.seen(row.address)
+                self._sight.seen(row.at)
             if not look.runs:
                 return self.say(f"the program has ended{await self._changed()}")
             if look.paused:
@@ -184,10 +185,10 @@ class Debugger:
         if row is None or row not in self._listing.rows:
             return line
         self._executed(row, self._debugging.hold(row.text))
-        self._sight.seen(row.address)
+        self._sight.seen(row.at)
         return self._listing.shown(row)
 
-    def _executed(self, row: Row, hold: float | None) -> None:
+    def _executed(self, row: Stored, hold: float | None) -> None:
         self._last, self._last_at = row, self._session.now()
         self._free_at = self._last_at + (LONGEST_HOLD if hold is None else hold)
 

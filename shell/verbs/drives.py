@@ -255,6 +255,4 @@ async def sim(call: Call) -> None:
     cell = simulated_cell(call.session)
     if cell is None:
         raise Diagnostic("no simulated bus is selected", "/sim", "/open sim: opens the demo cell")
-    remark = cell.command(f"/sim {call.rest}")
-    if remark:
-        call.session.notify(remark)
+    cell.command(f"/sim {call.rest}")

@@ -11,7 +11,7 @@ import dataclasses
 import getpass
 import json
 import socket
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from enum import Enum
 from functools import cache
 from types import NoneType, UnionType
@@ -128,73 +128,41 @@ class Items:
     def _item(self, row: Any) -> Item:
         match row:
             case [str(name), str(bus), value] if name in self._types:
-                return Item(_reader(self._types[name])(value), bus)
+                return Item(_read(self._types[name], value), bus)
         raise Garbled("an item of no known type")
 
 
-Reader = Callable[[Any], Any]
+def _read(kind: Any, value: Any) -> Any:
+    """Make a value of a type from JSON. Raises Garbled for any other value."""
+    form, inner, taken = _form(kind)
+    if form is None:
+        if isinstance(value, taken) and (kind is bool or not isinstance(value, bool)):
+            return value
+    elif form is UnionType:
+        return None if value is None else _read(inner[0], value)
+    elif form is Enum:
+        if isinstance(value, str) and value in kind.__members__:
+            return kind[value]
+    elif isinstance(value, list):
+        kinds = inner * len(value) if form is Sequence else inner
+        if len(kinds) == len(value):
+            fields = map(_read, kinds, value)
+            return tuple(fields) if form is tuple or form is Sequence else kind(*fields)
+    raise Garbled(f"{str(value)[:NAME]!r} is no {getattr(kind, '__name__', 'tuple')}")
 
 
 @cache
-def _reader(kind: Any) -> Reader:
-    """The function that makes a value of a type from JSON. It raises Garbled for any other value."""
-    origin, arguments = get_origin(kind), get_args(kind)
+def _form(kind: Any) -> tuple[Any, list[Any], tuple[type, ...]]:
+    """How a type is read, the types in it, and those of JSON that it takes: a scalar has the form None."""
+    origin, inner = get_origin(kind), list(get_args(kind))
     if origin is UnionType:
-        return _optional(_reader(next(each for each in arguments if each is not NoneType)))
-    if origin is tuple and arguments[1:] == (...,):
-        return _several(_reader(arguments[0]))
+        return UnionType, [each for each in inner if each is not NoneType], ()
     if origin is tuple:
-        return _fields(tuple, [_reader(each) for each in arguments], lambda *values: values)
+        return (Sequence, inner[:1], ()) if inner[1:] == [...] else (tuple, inner, ())
     if issubclass(kind, Enum):
-        return _member(kind)
+        return Enum, [], ()
     if kind in (str, bool, int, float):
-        return _scalar(kind)
+        return None, [], (float, int) if kind is float else (kind,)
     hints = get_type_hints(kind)
     names = kind._fields if issubclass(kind, tuple) else [each.name for each in dataclasses.fields(kind)]
-    return _fields(kind, [_reader(hints[name]) for name in names], kind)
-
-
-def _wrong(kind: type, value: Any) -> Garbled:
-    return Garbled(f"{str(value)[:NAME]!r} is no {kind.__name__}")
-
-
-def _scalar(kind: type) -> Reader:
-    valid: tuple[type, ...] = (float, int) if kind is float else (kind,)
-
-    def read(value: Any) -> Any:
-        if isinstance(value, valid) and (kind is bool or not isinstance(value, bool)):
-            return value
-        raise _wrong(kind, value)
-
-    return read
-
-
-def _member(kind: type[Enum]) -> Reader:
-    def read(value: Any) -> Any:
-        if isinstance(value, str) and value in kind.__members__:
-            return kind[value]
-        raise _wrong(kind, value)
-
-    return read
-
-
-def _optional(inner: Reader) -> Reader:
-    return lambda value: None if value is None else inner(value)
-
-
-def _several(inner: Reader) -> Reader:
-    def read(value: Any) -> Any:
-        if isinstance(value, list):
-            return tuple(map(inner, value))
-        raise _wrong(tuple, value)
-
-    return read
-
-
-def _fields(kind: type, inner: list[Reader], make: Callable[..., Any]) -> Reader:
-    def read(value: Any) -> Any:
-        if isinstance(value, list) and len(value) == len(inner):
-            return make(*(each(field) for each, field in zip(inner, value, strict=True)))
-        raise _wrong(kind, value)
-
-    return read
+    return kind, [hints[name] for name in names], ()

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
@@ -12,6 +11,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from multidrop.dialects import Diagnostic
+from multidrop.dialects.files import Way, toml_keys
 
 Column = tuple[str, float, float]
 """A column of a row: its word, lowest and highest value; whole numbers only if the highest is an int."""
@@ -44,10 +44,6 @@ class Source(NamedTuple):
     text: str = ""
     name: str = ""
     own_units: tuple[str, ...] = ()
-
-
-Way = tuple[tuple[str, int], ...]
-"""The way to a table: names, each with its number in a list of tables; 0: it is no list."""
 
 
 @dataclass(frozen=True)
@@ -197,22 +193,11 @@ class Table:
 
 def line_of(text: str, way: Way, key: str) -> int:
     """The number of the line with a key of a table, with the inline table that has it, or of its head; 0: not found."""
-    counts: dict[str, int] = {}
     head = 0
-    here: Way = ()
-    for number, line in enumerate(text.splitlines(), 1):
-        if header := re.match(r"\s*\[(\[?)\s*([^\]]+?)\s*\]", line):
-            names = [each.strip().strip("\"'") for each in header[2].split(".")]
-            if header[1]:
-                place = ".".join(names)
-                counts = {each: n for each, n in counts.items() if not each.startswith(f"{place}.")}
-                counts[place] = counts.get(place, 0) + 1
-            here = tuple((name, counts.get(".".join(names[: n + 1]), 0)) for n, name in enumerate(names))
-            head = number if here == way else head
-        elif pair := re.match(r"\s*([^=#]+?)\s*=", line):
-            within = (*here, *((each.strip().strip("\"'"), 0) for each in pair[1].split(".")))
-            if within == (*way, (key, 0)) or (len(within) > len(here) and within == way[: len(within)]):
-                return number
+    for found, number, is_key in toml_keys(text):
+        if is_key and found in ((*way, (key, 0)), way[: len(found)]):
+            return number
+        head = number if found == way else head
     return head
 
 

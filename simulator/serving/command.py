@@ -111,12 +111,9 @@ def _carry_out(floor: RunningFloor, line: str) -> None:
             return
         if not line.startswith("/sim"):
             raise Diagnostic(f'not understood: "{line}"', INPUT, "only /sim lines are read here")
-        remark = floor.command(line)
+        floor.command(line)
     except Diagnostic as error:
         _warn(str(error))
-    else:
-        if remark:
-            print(visible(remark), file=sys.stderr, flush=True)
 
 
 def _on_signals(loop: asyncio.AbstractEventLoop, end: Callable[[], None]) -> Callable[[], None]:

@@ -177,12 +177,12 @@ class RunningFloor:
         """Drop what a source has written and what has not begun to go out; return the number of bytes."""
         return self.floor.wires[bus].retract(self.now(), source)
 
-    def command(self, text: str) -> str | None:
+    def command(self, text: str) -> None:
         if self._closed:
-            return None
+            return
         self._turn()
         try:
-            return self.floor.command(text, self.now())
+            self.floor.command(text, self.now())
         finally:
             self._turn()
             for listener in [each for listeners in self._listeners.values() for each in listeners]:

@@ -52,7 +52,7 @@ def test_each_row_leads_to_the_record_of_its_name_and_to_a_language_of_files() -
         assert (row.files is None) == (FAMILIES[name].programs is None)
         if row.files is not None:
             language = row.files.language
-            assert callable(language.load) and callable(language.check) and callable(language.measure)
+            assert callable(language.check) and callable(language.measure)
 
 
 def test_each_language_is_listed_once_and_each_ending_means_one_family() -> None:

@@ -19,6 +19,7 @@ from multidrop.dialects.files import (
     encoded_program_of,
     escaped_toml,
     lines_of,
+    program_text_of,
     split_lines,
     text_of,
     toml_of,
@@ -52,7 +53,9 @@ def store_of(file: str) -> MacroStore:
 
 READERS = {
     "bytes": bytes_of, "text": text_of, "program": encoded_program_of, "script": lambda file: read_script(file, {}),
-    "cell": cells.load, "settings": params_file.load, "MCode": program_file.load, "PMX": pmx_file.load,
+    "cell": cells.load, "settings": params_file.load,
+    "MCode": lambda file: program_file.read(program_text_of(file), str(file)),
+    "PMX": lambda file: pmx_file.read(program_text_of(file), str(file)),
     "log": lambda file: list(log_files.lines(Path(file))), "macro": lambda file: store_of(file).load("m"),
     "editor": lambda file: EditedFile(Path(file)),
 }  # fmt: skip

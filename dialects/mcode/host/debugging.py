@@ -16,7 +16,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from multidrop.dialects.codec import Decoded, End, Kind, Procedure, Reply, Request
-from multidrop.dialects.debugging import Debugging, Look, Neighbours, Row, Stepped
+from multidrop.dialects.debugging import Debugging, Look, Neighbours, Stepped
 from multidrop.dialects.errors import Diagnostic, Inexpressible, NoAnswer, Refused
 from multidrop.dialects.mcode.host.codec import MCode
 from multidrop.dialects.mcode.host.exchange import printed_value
@@ -26,7 +26,7 @@ from multidrop.dialects.mcode.host.state import MCodeState, who
 from multidrop.dialects.mcode.manual.grammar import Name, Number, parsed
 from multidrop.dialects.mcode.manual.mnemonic import MDRIVE_PLUS
 from multidrop.dialects.mcode.manual.table import lookup
-from multidrop.dialects.program_files import Held
+from multidrop.dialects.program_files import Stored
 
 # The keys of single step: one byte each, outside of any line.
 #
@@ -99,33 +99,29 @@ FIRST = "1"
 BEGIN = "/step LABEL begins single step, /break now breaks a program that runs"
 
 
-def rows(state: MCodeState) -> Procedure[tuple[Row, ...]]:
+def rows(state: MCodeState) -> Procedure[tuple[Stored, ...]]:
     """Read the program in the drive. LK is read first: a refusal would run an OE subroutine."""
     if (yield from flag(state, "LK")):
         raise Refused(f"{who(state)}: its program is locked (LK=1), so it is neither listed, traced nor stepped")
     lines = yield from listing(state, "")
     found = [each for line in lines if (each := _LISTED.fullmatch(line))]
-    return tuple(Row(int(each[1]), each[2]) for each in found)
+    return tuple(Stored(int(each[1]), each[2]) for each in found)
 
 
-def rows_of(held: Held) -> tuple[Row, ...]:
-    return tuple(Row(*line) for line in held.lines)
-
-
-def entry(program: Sequence[Row]) -> str:
+def entry(program: Sequence[Stored]) -> str:
     """Return SU where the program has it, else the first address."""
     return "SU" if _places(program).get("SU") else FIRST
 
 
-def address_of(program: Sequence[Row], place: str) -> int | None:
+def address_of(program: Sequence[Stored], place: str) -> int | None:
     """Return the address of the first line at a place that is not a label."""
     return _code_at(program, _places(program).get(place.upper(), -1))
 
 
-def traced(line: str) -> Row | None:
+def traced(line: str) -> Stored | None:
     """Return the executed line that a printed line shows."""
     found = TRACED.fullmatch(line)
-    return Row(int(found[1]), found[2]) if found else None
+    return Stored(int(found[1]), found[2]) if found else None
 
 
 # Starting
@@ -188,7 +184,7 @@ def _check_keys(state: MCodeState) -> None:
 # Keys
 
 
-def waits(state: MCodeState, place: str, last: Row | None) -> Procedure[None]:
+def waits(state: MCodeState, place: str, last: Stored | None) -> Procedure[None]:
     """Raise Refused unless it is known that the drive waits for a key now. `last`: an H may still hold for motion."""
     _check_keys(state)
     if state.stepping and not (yield from flag(state, "BY")):
@@ -206,7 +202,7 @@ def _check_steps(state: MCodeState) -> None:
         raise Refused(f"{who(state)}: it is not known that it waits for a key, so none was sent; {BEGIN}")
 
 
-def step(state: MCodeState, program: Sequence[Row]) -> Procedure[Stepped]:
+def step(state: MCodeState, program: Sequence[Stored]) -> Procedure[Stepped]:
     """Press the space bar once; return the line that it executed. Raises NoAnswer where that is not known."""
     _check_steps(state)
     state.may_not_step()
@@ -264,7 +260,7 @@ def break_now(state: MCodeState, place: str = "") -> Procedure[None]:
     yield from _waits_now(state)
 
 
-def broken(state: MCodeState, program: Sequence[Row], last: Row, place: str) -> Procedure[int | None]:
+def broken(state: MCodeState, program: Sequence[Stored], last: Stored, place: str) -> Procedure[int | None]:
     """Whether the drive waits at the break point, where the trace was quiet longer than `last` holds its program."""
     if not may_follow(program, last, place):
         return None
@@ -276,7 +272,7 @@ def broken(state: MCodeState, program: Sequence[Row], last: Row, place: str) -> 
     return address_of(program, place)
 
 
-def may_follow(program: Sequence[Row], last: Row, place: str) -> bool:
+def may_follow(program: Sequence[Stored], last: Stored, place: str) -> bool:
     """Whether the line at `place` can be the next one after `last`."""
     wanted = address_of(program, place)
     statement = parsed(last.text)
@@ -284,7 +280,7 @@ def may_follow(program: Sequence[Row], last: Row, place: str) -> bool:
         return False
     if statement.word == "RT":  # a trip's may return to a hold
         return not any(_is(row.text, "H") for row in program)
-    following = [_code_at(program, last.address + 1)]
+    following = [_code_at(program, last.at + 1)]
     if statement.word in JUMPS and statement.arguments:
         target = statement.arguments[0]
         name = str(int(target.value)) if isinstance(target, Number) else getattr(target, "word", "")
@@ -292,23 +288,23 @@ def may_follow(program: Sequence[Row], last: Row, place: str) -> bool:
     return wanted in following
 
 
-def _places(program: Sequence[Row]) -> Mapping[str, int]:
+def _places(program: Sequence[Stored]) -> Mapping[str, int]:
     """The addresses by label, and by themselves."""
-    found = {str(row.address): row.address for row in program}
+    found = {str(row.at): row.at for row in program}
     for row in program:
         statement = parsed(row.text)
         if statement is not None and statement.word == "LB" and statement.arguments:
             label = statement.arguments[0]
             if isinstance(label, Name):
-                found[label.word] = row.address
+                found[label.word] = row.at
     return found
 
 
-def _code_at(program: Sequence[Row], address: int) -> int | None:
+def _code_at(program: Sequence[Stored], address: int) -> int | None:
     """The address of the first line from there on that is not a label."""
     if address < 0:
         return None
-    return next((row.address for row in program if row.address >= address and not _is(row.text, "LB")), None)
+    return next((row.at for row in program if row.at >= address and not _is(row.text, "LB")), None)
 
 
 def _is(text: str, word: str) -> bool:
@@ -373,7 +369,6 @@ def values(state: MCodeState, names: Sequence[str]) -> Procedure[Mapping[str, st
 
 DEBUGGING = Debugging(
     listing=rows,
-    rows=rows_of,
     entry=entry,
     address=address_of,
     idle=idle,

@@ -102,12 +102,11 @@ def check_trips(read: Read, mentioned: Container[str]) -> Iterator[Problem]:
 
 TARGETS = {"BR": 0, "CL": 0, "OE": 0, "TA": 1}
 """Words with a target, and the position of the target among their arguments."""
-load = program_file.load
 read = program_file.read
 formatted = program_file.formatted
 parts = program_file.parts
 entries = program_file.entries
-"""With `load`, `read`, `check` and `measure` this module is a `FileLanguage`."""
+"""With `check` and `measure` this module is a `FileLanguage`."""
 
 
 def check(text: str, product: str = "") -> list[Problem]:

@@ -14,16 +14,12 @@ import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from math import inf
-from typing import TYPE_CHECKING
 
-from multidrop.dialects.files import program_text_of, split_lines, wrong_characters
+from multidrop.dialects.files import split_lines, wrong_characters
 from multidrop.dialects.mcode.manual.grammar import LineError, Token, check_groups, parse, tokens
 from multidrop.dialects.mcode.manual.statements import canonical
 from multidrop.dialects.mcode.manual.table import lookup
 from multidrop.dialects.program_files import Entry, Part, Problem, refuse, respelled
-
-if TYPE_CHECKING:
-    from pathlib import Path
 
 LONGEST = 64
 """Characters that a drive's receive buffer holds (5.1.102)."""
@@ -55,11 +51,6 @@ class ProgramLine:
         """The name that its LB or VA declares, in capitals; empty for any other line."""
         found = _DECLARES.match(self.text)
         return found[2].upper() if found else ""
-
-
-def load(path: str | Path) -> list[ProgramLine]:
-    """Read the lines of a file, UTF-8 or Latin-1. Raises Diagnostic, also for a file that is not text."""
-    return read(program_text_of(path), str(path))
 
 
 def read(text: str, name: str) -> list[ProgramLine]:

@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from multidrop.dialects.codec import End, Procedure
-from multidrop.dialects.debugging import Debugging, Look, Neighbours, Row, lacking
+from multidrop.dialects.debugging import Debugging, Look, Neighbours, lacking
 from multidrop.dialects.errors import Diagnostic, DriveError, NoAnswer, Refused, Stopped
 from multidrop.dialects.family import Programs, Progress
 from multidrop.dialects.files import SourceLine, lines_of_text
@@ -240,22 +240,22 @@ no_step = lacking(who, NO_STEP)
 no_break = lacking(who, "a PMX has no break points: /break now pauses a program; program test --break has them")
 
 
-def stored_rows(state: PmxState) -> Procedure[tuple[Row, ...]]:
+def stored_rows(state: PmxState) -> Procedure[tuple[Stored, ...]]:
     """Read the compiled lines in the controller; where they can be decompiled, the statements at their first lines."""
     lines = yield from listing(state)
-    return _rows(tuple(Row(int(found[1]), found[2]) for line in lines if (found := RAW.fullmatch(line))))
+    return _rows(tuple(Stored(int(found[1]), found[2]) for line in lines if (found := RAW.fullmatch(line))))
 
 
-def _rows(held: tuple[Row, ...]) -> tuple[Row, ...]:
+def _rows(held: tuple[Stored, ...]) -> tuple[Stored, ...]:
     try:
-        script = program_file.readable(f"SA{row.address}={row.text}" for row in held)
+        script = program_file.readable(f"SA{row.at}={row.text}" for row in held)
     except Undecodable:
         script = []
     if not script:
         return held
     source = script_checker.read("\n".join(script), "program").source
     first = {line: at for at, line in reversed(list(enumerate(source)))}
-    return tuple(Row(first[line], script[line - 1]) for line in sorted(first))
+    return tuple(Stored(first[line], script[line - 1]) for line in sorted(first))
 
 
 def idle(state: PmxState, program: str, neighbours: Neighbours | None) -> Procedure[None]:
@@ -276,7 +276,7 @@ def look(state: PmxState, program: str) -> Procedure[Look]:
     return Look(active, status == PAUSED, address)
 
 
-def waits(state: PmxState, program: str, last: Row | None) -> Procedure[None]:
+def waits(state: PmxState, program: str, last: Stored | None) -> Procedure[None]:
     if (yield from _status(state, program)) != PAUSED:
         raise Refused(f"{who(state)}: program {_program(program)} is not paused; nothing was sent")
 
@@ -319,7 +319,7 @@ def watched(state: PmxState, names: Sequence[str]) -> Procedure[Mapping[str, str
 
 DEBUGGING = Debugging(
     listing=stored_rows,
-    rows=lambda held: _rows(tuple(Row(*line) for line in held.lines)),
+    rows=lambda held: _rows(held.lines),
     entry=lambda program: "0",
     address=lambda program, place: None,
     idle=idle,

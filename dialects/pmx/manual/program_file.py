@@ -8,9 +8,8 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Mapping, Sequence
-from pathlib import Path
 
-from multidrop.dialects.files import SourceLine, program_text_of, split_lines, wrong_characters
+from multidrop.dialects.files import SourceLine, split_lines, wrong_characters
 from multidrop.dialects.pmx.manual import script_checker, script_compiler, script_parser
 from multidrop.dialects.pmx.manual.script_compiler import EMPTY, ERASED, LINES
 from multidrop.dialects.pmx.manual.script_parser import AXES, WORDS, parse
@@ -213,10 +212,6 @@ parts = script_parser.parts
 entries = script_parser.entries
 
 
-def load(path: str | Path) -> list[ProgramLine]:
-    return read(program_text_of(path), str(path))
-
-
 def read(text: str, name: str) -> list[ProgramLine]:
     refuse(check(text), name)
     return _lines(text)
@@ -253,7 +248,7 @@ def _placed(lines: Sequence[SourceLine]) -> bool:
 def compiled(lines: Sequence[SourceLine]) -> list[tuple[int, int, str]]:
     """Return the lines to store: line of the file, number in memory, content.
 
-    Raises Diagnostic for a program with errors, which `load` has reported.
+    Raises Diagnostic for a program with errors, which `read` has reported.
     """
     if is_raw(lines):
         refuse(_check_raw(lines), "program")

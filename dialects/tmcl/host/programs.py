@@ -14,7 +14,7 @@ from contextlib import suppress
 from typing import Any
 
 from multidrop.dialects.codec import Procedure
-from multidrop.dialects.debugging import Debugging, Look, Neighbours, Row, Stepped, lacking
+from multidrop.dialects.debugging import Debugging, Look, Neighbours, Stepped, lacking
 from multidrop.dialects.errors import Diagnostic, DriveError, Inexpressible, Refused, Stopped
 from multidrop.dialects.family import Programs, Progress
 from multidrop.dialects.files import SourceLine, lines_of_text
@@ -250,13 +250,8 @@ NO_PLACE = "does not report the address of its next line (global parameter 130)"
 no_break = lacking(who, "TMCL has no break points: /break now halts a program; program test --break has them")
 
 
-def stored_rows(state: TmclState) -> Procedure[tuple[Row, ...]]:
-    held = yield from read_held(state, (), lambda done, total: None)
-    return rows(held)
-
-
-def rows(held: Held) -> tuple[Row, ...]:
-    return tuple(Row(*line) for line in held.lines)
+def stored_rows(state: TmclState) -> Procedure[tuple[Stored, ...]]:
+    return (yield from read_held(state, (), lambda done, total: None)).lines
 
 
 def address_of(place: str) -> int:
@@ -303,17 +298,17 @@ def counter(state: TmclState) -> Procedure[int | None]:
         raise
 
 
-def waits(state: TmclState, place: str, last: Row | None) -> Procedure[None]:
+def waits(state: TmclState, place: str, last: Stored | None) -> Procedure[None]:
     if not state.halted or (yield from busy(state)):
         raise Refused(f"{who(state)}: its program is not known to be halted; nothing was sent")
 
 
-def step(state: TmclState, listed: Sequence[Row]) -> Procedure[Stepped]:
+def step(state: TmclState, listed: Sequence[Stored]) -> Procedure[Stepped]:
     """Execute the next line; a program that comes to STOP, or to its end, is over."""
     at = yield from counter(state)
     if at is None:
         raise Inexpressible(f"{who(state)} {NO_PLACE}; nothing was sent")
-    row = next((each for each in listed if each.address == at), Row(at, ""))
+    row = next((each for each in listed if each.at == at), Stored(at, ""))
     yield from perform(state, "130 0, 0, 0")
     state.program_halted(bool(row.text) and row.text != Word.STOP.name)
     return Stepped(row)
@@ -363,7 +358,6 @@ def watched(state: TmclState, names: Sequence[str]) -> Procedure[Mapping[str, st
 
 DEBUGGING = Debugging(
     listing=stored_rows,
-    rows=rows,
     entry=lambda listed: "0",
     address=lambda listed, place: whole(place, 0, MEMORY - 1),
     idle=idle,

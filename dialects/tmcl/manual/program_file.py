@@ -18,10 +18,9 @@ import difflib
 import re
 from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import NamedTuple
 
-from multidrop.dialects.files import SourceLine, program_text_of, split_lines, wrong_characters
+from multidrop.dialects.files import SourceLine, split_lines, wrong_characters
 from multidrop.dialects.program_files import Entry, Part, Problem, in_order, numbered, refuse, respelled, walk
 from multidrop.dialects.program_files import ProgramLine as ProgramLine
 from multidrop.dialects.text import counted
@@ -217,10 +216,6 @@ def _value(made: Assembled, line: Divided, given: Piece, wanted: Field) -> int |
 # The file language
 
 
-def load(path: str | Path) -> list[ProgramLine]:
-    return read(program_text_of(path), str(path))
-
-
 def read(text: str, name: str) -> list[ProgramLine]:
     refuse(check(text), name)
     return _lines(text)
@@ -231,7 +226,7 @@ def _lines(text: str) -> list[ProgramLine]:
 
 
 def compiled(lines: Sequence[SourceLine]) -> list[Placed]:
-    """The lines of the memory. Raises Diagnostic for a program with errors, which `load` has reported."""
+    """The lines of the memory. Raises Diagnostic for a program with errors, which `read` has reported."""
     made = assembled(lines)
     refuse(made.problems, "program")
     return made.lines

@@ -7,22 +7,22 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from multidrop.dialects.codec import Decoded, End
-from multidrop.dialects.debugging import Row
 from multidrop.dialects.mcode.host.codec import MCode
 from multidrop.dialects.mcode.host.debugging import ENTER, SPACE, entry, hold, key, may_follow, traced
 from multidrop.dialects.mcode.host.state import MCodeState
+from multidrop.dialects.program_files import Stored
 
 PROGRAM = [
-    Row(1, "LB SU"),
-    Row(6, "VA Q1=0"),
-    Row(14, "LB K1"),
-    Row(19, "MR 51200"),
-    Row(26, "CL K2"),
-    Row(31, "BR K1,Q1<3"),
-    Row(43, "E"),
-    Row(45, "LB K2"),
-    Row(50, "IC Q1"),
-    Row(55, "RT"),
+    Stored(1, "LB SU"),
+    Stored(6, "VA Q1=0"),
+    Stored(14, "LB K1"),
+    Stored(19, "MR 51200"),
+    Stored(26, "CL K2"),
+    Stored(31, "BR K1,Q1<3"),
+    Stored(43, "E"),
+    Stored(45, "LB K2"),
+    Stored(50, "IC Q1"),
+    Stored(55, "RT"),
 ]
 MODES = [MCode(em=em) for em in range(4)]
 
@@ -111,14 +111,14 @@ def test_enter_ends_with_quiet_and_prints_are_strays() -> None:
     ],
 )
 def test_what_can_follow_a_line(last: int, place: str, follows: bool) -> None:
-    row = next(each for each in PROGRAM if each.address == last)
+    row = next(each for each in PROGRAM if each.at == last)
     assert may_follow(PROGRAM, row, place) is follows
 
 
 def test_a_return_proves_nothing_where_it_may_lead_back_to_a_hold() -> None:
-    program = [*PROGRAM, Row(60, "LB K3"), Row(65, "H 10000")]
-    assert not may_follow(program, Row(55, "RT"), "31")
-    assert not may_follow([*PROGRAM[:5], Row(29, "LK=1"), *PROGRAM[5:]], Row(29, "LK=1"), "31")
+    program = [*PROGRAM, Stored(60, "LB K3"), Stored(65, "H 10000")]
+    assert not may_follow(program, Stored(55, "RT"), "31")
+    assert not may_follow([*PROGRAM[:5], Stored(29, "LK=1"), *PROGRAM[5:]], Stored(29, "LK=1"), "31")
 
 
 def test_the_time_of_a_hold() -> None:
@@ -132,13 +132,13 @@ def test_a_program_begins_at_su_or_at_address_1() -> None:
 @pytest.mark.parametrize(
     "line, row",
     [
-        ("19  MR 51200", Row(19, "MR 51200")),
-        (">19  MR 51200", Row(19, "MR 51200")),
-        ("19  MR 51200\x9f", Row(19, "MR 51200")),
+        ("19  MR 51200", Stored(19, "MR 51200")),
+        (">19  MR 51200", Stored(19, "MR 51200")),
+        ("19  MR 51200\x9f", Stored(19, "MR 51200")),
         ("19", None),
         ("at 19  MR", None),
         ("19 MR 51200", None),
     ],
 )
-def test_a_traced_line_is_told_from_a_print(line: str, row: Row | None) -> None:
+def test_a_traced_line_is_told_from_a_print(line: str, row: Stored | None) -> None:
     assert traced(line) == row

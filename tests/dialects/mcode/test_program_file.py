@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 
 from multidrop.dialects.errors import Diagnostic
 from multidrop.dialects.families import program_language_of, program_languages
+from multidrop.dialects.files import program_text_of
 from multidrop.dialects.mcode.manual import program_file
 from multidrop.dialects.mcode.manual.program_checker import check
 from multidrop.dialects.mcode.manual.program_file import ProgramLine, read
@@ -100,7 +101,7 @@ def test_a_file_is_read_in_utf8_with_or_without_a_mark_and_in_latin1(tmp_path: P
     for data in (PRESS.encode(), b"\xef\xbb\xbf" + PRESS.encode(), PRESS.replace("fast", "größe").encode("latin-1")):
         path = tmp_path / "press.mxt"
         path.write_bytes(data)
-        assert program_file.load(path) == read(PRESS, "x")
+        assert read(program_text_of(path), str(path)) == read(PRESS, "x")
 
 
 def test_a_file_that_is_no_text_is_missing_or_a_folder_is_refused_by_name(tmp_path: Path) -> None:
@@ -108,7 +109,7 @@ def test_a_file_that_is_no_text_is_missing_or_a_folder_is_refused_by_name(tmp_pa
     binary.write_bytes(b"PG 1\0E")
     for path, reason in ((binary, "not a text"), (tmp_path / "gone", "No such file"), (tmp_path, "cannot be read")):
         with pytest.raises(Diagnostic, match=reason) as caught:
-            program_file.load(path)
+            read(program_text_of(path), str(path))
         assert caught.value.where == str(path)
 
 
@@ -140,7 +141,7 @@ def test_any_bytes_are_read_or_refused_with_a_diagnostic(tmp_path_factory: pytes
     path = tmp_path_factory.getbasetemp() / "any.mxt"
     path.write_bytes(b"PG 1\n" + data + b"\nPG\n")
     try:
-        assert program_file.load(path)[0].text == "PG 1"
+        assert read(program_text_of(path), str(path))[0].text == "PG 1"
     except Diagnostic as error:
         assert error.where.startswith(str(path))
 

@@ -8,18 +8,24 @@ import pytest
 
 from multidrop.dialects import Diagnostic, NoAnswer, Refused
 from multidrop.dialects.codec import End, Reply
+from multidrop.dialects.files import program_text_of
 from multidrop.dialects.pmx.host import programs
 from multidrop.dialects.pmx.host.codec import Pmx, PmxState
 from multidrop.dialects.pmx.manual import program_file
+from multidrop.dialects.program_files import ProgramLine
 from tests.support.pmx_programs import EXAMPLES, TEN_TIMES, plain
+
+
+def load(file: Path) -> list[ProgramLine]:
+    return program_file.read(program_text_of(file), str(file))
 
 
 def test_a_file_of_a_script_is_its_lines_without_remarks(tmp_path: Path) -> None:
     file = tmp_path / "a.prg"
     file.write_bytes(b"\xef\xbb\xbf; first\r\nX1000 ; far\r\n\r\n  WAITX\r\nEND\r\n\x1a")
-    assert [(each.number, each.text) for each in program_file.load(file)] == [(2, "X1000"), (4, "WAITX"), (5, "END")]
+    assert [(each.number, each.text) for each in load(file)] == [(2, "X1000"), (4, "WAITX"), (5, "END")]
     file.write_bytes(b"X1 ; \xb5\nEND\n")
-    assert len(program_file.load(file)) == 2
+    assert len(load(file)) == 2
 
 
 @pytest.mark.parametrize("text", EXAMPLES)
@@ -55,10 +61,10 @@ def test_what_is_wrong_with_a_file_is_told(text: str, says: str) -> None:
 
 def test_a_file_that_cannot_be_read_is_told(tmp_path: Path) -> None:
     with pytest.raises(Diagnostic, match="cannot be read"):
-        program_file.load(tmp_path / "gone.prg")
+        load(tmp_path / "gone.prg")
     (tmp_path / "b.prg").write_bytes(b"X1\0")
     with pytest.raises(Diagnostic, match="not a text file"):
-        program_file.load(tmp_path / "b.prg")
+        load(tmp_path / "b.prg")
 
 
 def test_each_compiled_line_knows_its_line_of_the_file() -> None:

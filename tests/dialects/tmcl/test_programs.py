@@ -163,7 +163,7 @@ def test_a_program_is_stepped_from_its_first_line() -> None:
         shop.run(observed.idle(state, "1", None))
     shop.run(observed.begin(state, "0"))
     for at, speed in ((0, "7"), (1, "8")):
-        assert shop.run(observed.step(state, rows)).row.address == at
+        assert shop.run(observed.step(state, rows)).row.at == at
         assert shop.type(state, "GAP 4, 0") == (speed,)
         assert shop.run(observed.look(state, "0")).paused
     shop.run(observed.step(state, rows))
