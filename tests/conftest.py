@@ -23,7 +23,12 @@ from multidrop.simulator.floor import Floor
 from tests.support.faults import disturb
 from tests.support.procedure import ProcedureRunner
 
-pytest_plugins = ["tests.support.marks", "tests.support.front_door", "tests.support.served_cell"]
+pytest_plugins = [
+    "tests.support.marks",
+    "tests.support.measuring",
+    "tests.support.front_door",
+    "tests.support.served_cell",
+]
 
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 sys.dont_write_bytecode = False

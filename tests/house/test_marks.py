@@ -14,7 +14,8 @@ import pytest
 
 from tests.support import marks
 from tests.support.choose_measured import choose
-from tests.support.marks import NIGHTLY, UNMEASURED, is_taken, places
+from tests.support.marks import NIGHTLY, is_taken, places
+from tests.support.measuring import UNMEASURED
 from tests.support.paths import ROOT
 from tests.support.tools import PROMISED, tool
 

@@ -32,13 +32,6 @@ from tests.support.virtual import VirtualLoop
 STARTS = frozenset({"subprocess.Popen", "os.fork", "os.forkpty", "os.posix_spawn", "os.system"})
 """Audit events of the interpreter, each of which is the start of a process."""
 
-REPEATING = ("wide", "nightly", "slow", "hypothesis")
-"""Markers of products of parameters, floods and generated cases, which go the same ways again. Coverage is not measured
-in them: measuring makes the product two to three times slower. So the share that is measured is a lower bound."""
-
-UNMEASURED = Path(__file__).with_name("unmeasured.txt")
-"""Test functions that take long and go the ways of cheaper ones (`tests.support.choose_measured`)."""
-
 NIGHTLY = frozenset(Path(__file__).with_name("nightly.txt").read_text(encoding="utf-8").splitlines())
 """Cases that take long and differ from others of their test, which every run takes, in a value only."""
 
@@ -53,9 +46,8 @@ LEFT = pytest.StashKey[list[str]]()
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    """Add `--nightly` and `--measure-all`."""
+    """Add `--nightly`."""
     parser.addoption("--nightly", action="store_true", help="run the whole of every product of parameters")
-    parser.addoption("--measure-all", action="store_true", help="measure coverage in the first case of every test")
 
 
 def pytest_configure(config: pytest.Config) -> None:
@@ -214,23 +206,7 @@ def nightly(pytestconfig: pytest.Config) -> bool:
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     """Leave out what only the nightly run takes, and spread what waits."""
     _leave_out(config, items)
-    unmeasured = set() if config.getoption("measure_all") else set(UNMEASURED.read_text().split())
-    for item in _repeating(items, unmeasured):
-        item.add_marker("no_cover")
     items[:] = _spread(items)
-
-
-def _repeating(items: list[pytest.Item], unmeasured: set[str]) -> Iterator[pytest.Item]:
-    """The tests that go ways of others again: those marked or listed so, and the cases of a test but its first one."""
-    cases: dict[str, list[pytest.Item]] = {}
-    for item in items:
-        function = item.nodeid.partition("[")[0]
-        if function in unmeasured or any(item.get_closest_marker(name) for name in REPEATING):
-            yield item
-        else:
-            cases.setdefault(function, []).append(item)
-    for each in cases.values():
-        yield from each[1:]
 
 
 def _spread(items: list[pytest.Item]) -> list[pytest.Item]:
