@@ -335,7 +335,7 @@ async def _opened(far: FarPort, baud: int, within: float, way: str) -> Transport
             return await greeted(session, far, baud, way)
     except TimeoutError:
         why = session.last_words() or "no reply"
-        await asyncio.to_thread(session.close, True)
+        await asyncio.shield(asyncio.to_thread(session.close, True))
         raise Unreachable(f"{far.name}: not reached within {within:g} s: {why}; try `ssh {far.login}`") from None
     except BaseException:
         await asyncio.shield(asyncio.to_thread(session.close, True))

@@ -70,6 +70,7 @@ FIXED = {
     1320: "a question that noise gave the number of another controller (of the simulation itself)",
     200066: "the rest of a Modbus message that was half-sent at a stop (of the simulation itself)",
     400424: "a reply that may have been another one's, taken for proof as the line was lost in the question after it",
+    403738: "a program `ssh` that was left as its login was cancelled in the moment of its time-out",
 }
 DERIVED = 12
 """The number of seeds that follow from the commit."""

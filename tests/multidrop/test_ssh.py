@@ -8,7 +8,9 @@ import os
 import signal
 import subprocess
 import sys
+import threading
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from pathlib import Path
 
@@ -19,7 +21,7 @@ from multidrop.__main__ import main
 from multidrop.shell.configuration import Settings
 from multidrop.shell.session import Session
 from multidrop.shell.signals import early_ends
-from multidrop.transports import Transport, TransportLost, Unreachable
+from multidrop.transports import Transport, TransportLost, Unreachable, ssh_session
 from multidrop.transports.serial_ports import lock_owner
 from multidrop.transports.ssh import FarPort
 from multidrop.transports.ssh_session import open_ssh, reason
@@ -124,6 +126,38 @@ async def test_what_goes_wrong_before_the_greeting_is_one_line_that_quotes_it(tm
     with pytest.raises(Unreachable, match="the program ssh cannot be started"):
         await open_ssh(FarPort("pc", "/dev/tty9"))
     assert len(os.listdir("/dev/fd")) == before
+
+
+class Unanswered:
+    """A program `ssh` that never replies; every worker of the loop is busy by then."""
+
+    closed = False
+
+    def __init__(self, far: FarPort, baud: int, way: str) -> None:
+        self.free = threading.Event()
+
+    async def read_some(self) -> bytes:
+        asyncio.get_running_loop().run_in_executor(None, self.free.wait)
+        return await asyncio.get_running_loop().create_future()
+
+    def last_words(self) -> str:
+        asyncio.get_running_loop().call_soon(asyncio.current_task().cancel)  # in the moment of the time-out
+        return ""
+
+    def close(self, lost: bool) -> None:
+        self.closed = True
+
+
+async def test_a_login_that_is_cancelled_in_the_moment_of_its_time_out_leaves_no_program(monkeypatch) -> None:
+    begun: list[Unanswered] = []
+    monkeypatch.setattr(ssh_session, "SshSession", lambda *given: begun.append(Unanswered(*given)) or begun[0])
+    loop = asyncio.get_running_loop()
+    loop.set_default_executor(ThreadPoolExecutor(1))
+    opening = asyncio.create_task(open_ssh(FarPort("pc", "/dev/tty9"), within=0.001))
+    await asyncio.wait([opening])
+    begun[0].free.set()
+    await loop.shutdown_default_executor()  # once it has done its work
+    assert opening.cancelled() and begun[0].closed
 
 
 @pytest.mark.process
