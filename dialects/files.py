@@ -11,7 +11,8 @@ import re
 import stat
 from codecs import BOM_UTF8
 from collections.abc import Iterable, Iterator
-from typing import IO, TYPE_CHECKING, Any, Protocol
+from dataclasses import dataclass
+from typing import IO, TYPE_CHECKING, Any
 
 from multidrop.dialects.errors import Diagnostic
 
@@ -37,16 +38,12 @@ _NAMES = {
 }  # fmt: skip
 
 
-class SourceLine(Protocol):
-    """A line of a program file, without comments."""
+@dataclass(frozen=True)
+class SourceLine:
+    """A line of a program file, without its remark: its number from 1, and the text to send to the drive."""
 
-    @property
-    def number(self) -> int:
-        """Its line in the file, from 1."""
-
-    @property
-    def text(self) -> str:
-        """The text to send to the drive."""
+    number: int
+    text: str
 
 
 def bytes_of(path: str | Path, largest: int = LARGEST) -> bytes:

@@ -200,17 +200,9 @@ class ProgramFiles(NamedTuple):
         return cast("EditingLanguage", importlib.import_module(self.editing_module))
 
 
-@dataclass(frozen=True)
-class ProgramLine:
-    """A line of a file, without its remark: its number from 1, and its text."""
-
-    number: int
-    text: str
-
-
-def numbered(lines: Sequence[str]) -> list[ProgramLine]:
+def numbered(lines: Sequence[str]) -> list[SourceLine]:
     """Return the lines of a file that are not empty."""
-    return [ProgramLine(number, line) for number, line in enumerate(lines, 1) if line]
+    return [SourceLine(number, line) for number, line in enumerate(lines, 1) if line]
 
 
 BLANKS = " \t"

@@ -66,7 +66,8 @@ def play(chosen: argparse.Namespace) -> int:
     async def body(session: Session) -> None:
         await report.watched(session, chosen.on, chosen.role)
         with report.noting():
-            await play_macro(session, macro, values, times=chosen.times, fast=chosen.fast, watcher=report)
+            given = {"times": chosen.times, "fast": chosen.fast}
+            await play_macro(session, macro, values, **given, executed=report.executed, ended=report.ended)
 
     code = runner.run([], body, agreed=chosen.yes, beyond=chosen.beyond, asks=False, replies=not chosen.json)
     return report.finish(code)

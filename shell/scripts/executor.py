@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-from collections.abc import AsyncIterator, Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import AsyncIterator, Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import islice
 
@@ -22,7 +22,7 @@ from multidrop.shell.events import FAILURES, By, OnBus, SessionEvent
 from multidrop.shell.playing import NO_ROLES, cast
 from multidrop.shell.scripts.captured_prints import hearing
 from multidrop.shell.scripts.execution import CUT, Execution, Frame, Unfinished
-from multidrop.shell.scripts.model import Ending, Executed, Result, Script, ScriptLine, Watcher
+from multidrop.shell.scripts.model import Ended, Ending, Executed, Result, Script, ScriptLine
 from multidrop.shell.scripts.planning import bind, macro_claims, script_claims
 from multidrop.shell.scripts.reading import read_macro
 from multidrop.shell.session import Session
@@ -76,14 +76,6 @@ async def ended_by_loss(execution: Execution, buses: Collection[str]) -> AsyncIt
             timer.cancel()
 
 
-class _Nobody:
-    def executed(self, result: Result) -> None:
-        """Take no notice."""
-
-    def ended(self, ending: Ending) -> None:
-        """Take no notice."""
-
-
 async def run_script(session: Session, script: Script, executed: Executed = lambda result: None) -> None:
     """Execute a script. `executed` gets the result of each line. Raises the first failure."""
     own = script_claims(session, script)
@@ -92,7 +84,7 @@ async def run_script(session: Session, script: Script, executed: Executed = lamb
         async with (
             session.automations.run(f"script {script.file}", own),
             ended_by_loss(execution, {link.name for link, _ in own}),
-            ending(execution, _Nobody().ended),
+            ending(execution, lambda end: None),
         ):
             await execution.block(script.body, Frame(dict(script.values), By.SCRIPT))
     execution.check_verified()
@@ -116,7 +108,8 @@ async def play(
     times: int | None = 1,
     fast: bool = False,
     roles: Mapping[str, str] = NO_ROLES,
-    watcher: Watcher | None = None,
+    executed: Executed = lambda result: None,
+    ended: Ended = lambda end: None,
 ) -> None:
     """Play a macro to its end as one automation, listed in `session.playing` meanwhile. Raises the first failure.
 
@@ -128,29 +121,27 @@ async def play(
     played = read_macro(macro, values, session.macros)
     if session.latched:
         raise Stopped(LATCHED)
-    watcher = watcher or _Nobody()
     roles = bind(session, macro, roles)
     name, begun = macro.name, session.now()
     own = macro_claims(session, played, roles)
     claimed = sorted({link.name for link, _ in own})  # a set of links has another order in each run
     state, ports = session.settings.state, {bus: session.of(session.buses[bus]).port for bus in claimed}
     with hearing(session.subscribe) as heard, crash_marks.playing(state, ports.values(), name, session.wall(begun)):
-        execution = Execution(session, heard, watcher.executed)
+        execution = Execution(session, heard, executed)
         async with (
             session.automations.run(f"macro {name}", own),
             ended_by_loss(execution, ports),
-            ending(execution, watcher.ended),
+            ending(execution, ended),
         ):
             playing = await execution.play(played, dict(played.values), times, fast, roles)
     rounds = counted(playing.rounds, "round") + ", ended by /quit" * session.quitting
     session.notify(f"macro {name}: {rounds} played in {session.now() - begun:.1f} s", outcome=True)
-    watcher.ended(Ending(name, playing.rounds))
+    ended(Ending(name, playing.rounds))
     execution.check_verified()
 
 
 SHOWN = 3
 """The number of printed lines that the report of a step shows."""
-Ended = Callable[[Ending], None]
 
 
 @contextlib.asynccontextmanager

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import datetime
-from typing import Any, Protocol
+from typing import Any
 
 from multidrop.macros import Macro
 from multidrop.shell.secrets import without_secrets
@@ -192,11 +192,5 @@ class Ending:
         return {"macro": self.macro, "rounds": self.rounds} | early
 
 
-class Watcher(Protocol):
-    """Takes the results of a run."""
-
-    def executed(self, result: Result) -> None:
-        """Take the result of a line."""
-
-    def ended(self, ending: Ending) -> None:
-        """Take the end of a macro."""
+Ended = Callable[[Ending], None]
+"""Takes the end of a macro."""

@@ -17,7 +17,7 @@ from functools import partial
 from struct import Struct
 
 from multidrop.dialects.family import Motion
-from multidrop.dialects.files import split_lines
+from multidrop.dialects.files import SourceLine, split_lines
 from multidrop.dialects.program_files import errors
 from multidrop.dialects.tmcl.manual import program_file
 from multidrop.dialects.tmcl.manual.commands import Axis, Call, Command, Global, Status, setting_name
@@ -32,7 +32,6 @@ from multidrop.dialects.tmcl.manual.modules import (
     Parameter,
     module_of,
 )
-from multidrop.dialects.tmcl.manual.program_file import ProgramLine
 from multidrop.dialects.units import Scale
 from multidrop.dialects.values import Snapshot, Value
 from multidrop.simulator.cell.drive_keys import (
@@ -201,7 +200,7 @@ def _program(snapshot: Snapshot) -> list[str]:
     held = dict(snapshot.program)
     if snapshot.remarked and not errors(program_file.check("\n".join(snapshot.remarked))):
         return list(snapshot.remarked)
-    made = program_file.assembled([ProgramLine(number, text) for number, text in enumerate(held.values(), 1)])
+    made = program_file.assembled([SourceLine(number, text) for number, text in enumerate(held.values(), 1)])
     return program_file.disassembled(dict(zip(held, (each.call for each in made.lines), strict=True)))
 
 

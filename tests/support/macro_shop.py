@@ -27,7 +27,7 @@ class Shop(CellSession):
         return macro
 
     async def play(self, macro: Macro, values: dict[str, str] | None = None, **manner: object) -> None:
-        await play(self.session, macro, values or {}, watcher=self, **manner)  # type: ignore[arg-type]
+        await play(self.session, macro, values or {}, executed=self.executed, ended=self.ended, **manner)  # type: ignore[arg-type]
 
     def executed(self, result: Result) -> None:
         self.results.append(result)

@@ -15,7 +15,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from math import inf
 
-from multidrop.dialects.files import split_lines, wrong_characters
+from multidrop.dialects.files import SourceLine, split_lines, wrong_characters
 from multidrop.dialects.mcode.manual.grammar import LineError, Token, check_groups, parse, tokens
 from multidrop.dialects.mcode.manual.statements import canonical
 from multidrop.dialects.mcode.manual.table import lookup
@@ -30,11 +30,9 @@ _DECLARES = re.compile(r"(LB|VA)\s*=?\s*([A-Z]\w{0,2})", re.IGNORECASE | re.ASCI
 
 
 @dataclass(frozen=True)
-class ProgramLine:
-    """A line to send: its number in the file from 1, its text without remark, and its section."""
+class ProgramLine(SourceLine):
+    """A line to send, and its section."""
 
-    number: int
-    text: str
     section: str
     """`variables` before the program, `program` from PG to PG, `save` after it."""
     column: int = field(default=1, compare=False)

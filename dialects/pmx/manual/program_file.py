@@ -13,7 +13,7 @@ from multidrop.dialects.files import SourceLine, split_lines, wrong_characters
 from multidrop.dialects.pmx.manual import script_checker, script_compiler, script_parser
 from multidrop.dialects.pmx.manual.script_compiler import EMPTY, ERASED, LINES
 from multidrop.dialects.pmx.manual.script_parser import AXES, WORDS, parse
-from multidrop.dialects.program_files import Problem, ProgramLine, errors, in_order, numbered, refuse, respelled
+from multidrop.dialects.program_files import Problem, errors, in_order, numbered, refuse, respelled
 
 _OPERATIONS = {code: op for op, code in script_compiler.OPERATION.items()}
 _COMPARISONS = {code: op for op, code in script_compiler.COMPARISON.items()}
@@ -212,7 +212,7 @@ parts = script_parser.parts
 entries = script_parser.entries
 
 
-def read(text: str, name: str) -> list[ProgramLine]:
+def read(text: str, name: str) -> list[SourceLine]:
     refuse(check(text), name)
     return _lines(text)
 
@@ -275,7 +275,7 @@ def _held(stored: Mapping[int, str]) -> list[str]:
     return [stored.get(at, ERASED) for at in range(max(stored, default=-1) + 1)]
 
 
-def _lines(text: str) -> list[ProgramLine]:
+def _lines(text: str) -> list[SourceLine]:
     return numbered([line.partition(";")[0].strip() for line in split_lines(text)])
 
 

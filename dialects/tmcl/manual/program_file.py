@@ -22,7 +22,6 @@ from typing import NamedTuple
 
 from multidrop.dialects.files import SourceLine, split_lines, wrong_characters
 from multidrop.dialects.program_files import Entry, Part, Problem, in_order, numbered, refuse, respelled, walk
-from multidrop.dialects.program_files import ProgramLine as ProgramLine
 from multidrop.dialects.text import counted
 from multidrop.dialects.tmcl.manual import instructions
 from multidrop.dialects.tmcl.manual.commands import Call, Command
@@ -216,12 +215,12 @@ def _value(made: Assembled, line: Divided, given: Piece, wanted: Field) -> int |
 # The file language
 
 
-def read(text: str, name: str) -> list[ProgramLine]:
+def read(text: str, name: str) -> list[SourceLine]:
     refuse(check(text), name)
     return _lines(text)
 
 
-def _lines(text: str) -> list[ProgramLine]:
+def _lines(text: str) -> list[SourceLine]:
     return numbered([line[: remark_at(line)].strip() for line in split_lines(text)])
 
 

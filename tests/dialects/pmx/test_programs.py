@@ -8,15 +8,14 @@ import pytest
 
 from multidrop.dialects import Diagnostic, NoAnswer, Refused
 from multidrop.dialects.codec import End, Reply
-from multidrop.dialects.files import program_text_of
+from multidrop.dialects.files import SourceLine, program_text_of
 from multidrop.dialects.pmx.host import programs
 from multidrop.dialects.pmx.host.codec import Pmx, PmxState
 from multidrop.dialects.pmx.manual import program_file
-from multidrop.dialects.program_files import ProgramLine
 from tests.support.pmx_programs import EXAMPLES, TEN_TIMES, plain
 
 
-def load(file: Path) -> list[ProgramLine]:
+def load(file: Path) -> list[SourceLine]:
     return program_file.read(program_text_of(file), str(file))
 
 

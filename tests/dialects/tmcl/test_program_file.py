@@ -10,10 +10,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from multidrop.dialects.files import SourceLine
 from multidrop.dialects.program_files import errors
 from multidrop.dialects.tmcl.manual import editing, instructions, program_file
 from multidrop.dialects.tmcl.manual.commands import Call
-from multidrop.dialects.tmcl.manual.program_file import ProgramLine, assembled, check, compiled, disassembled, formatted
+from multidrop.dialects.tmcl.manual.program_file import assembled, check, compiled, disassembled, formatted
 from tests.support.cases import for_each
 from tests.support.examples import examples
 from tests.support.foreign_python import TABLES_ONLY, foreign_python
@@ -71,7 +72,7 @@ WORDS = [  # the worked examples of the TMCM-1290 manual, and each further word
 
 
 def only(text: str) -> Call:
-    (line,) = assembled([ProgramLine(1, text)]).lines
+    (line,) = assembled([SourceLine(1, text)]).lines
     return line.call
 
 
@@ -191,7 +192,7 @@ def test_the_file_of_a_memory_gives_the_same_memory(memory: list[Call]) -> None:
     text = "\n".join(disassembled(dict(enumerate(memory))))
     assert not errors(check(text))
     assert [
-        each.call for each in assembled([ProgramLine(*row) for row in enumerate(text.split("\n"), 1)]).lines
+        each.call for each in assembled([SourceLine(*row) for row in enumerate(text.split("\n"), 1)]).lines
     ] == memory
 
 

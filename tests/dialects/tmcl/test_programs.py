@@ -9,6 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from multidrop.dialects.errors import Inexpressible, NoAnswer, Refused, Stopped
+from multidrop.dialects.files import SourceLine
 from multidrop.dialects.tmcl.family import TMCL
 from multidrop.dialects.tmcl.host import programs
 from multidrop.dialects.tmcl.manual import instructions, program_file
@@ -24,7 +25,7 @@ def nothing(done: int, total: int) -> None:
     """Take no note of progress."""
 
 
-def lines(text: str) -> list[program_file.ProgramLine]:
+def lines(text: str) -> list[SourceLine]:
     return program_file.read(text, "a.tmc")
 
 

@@ -298,7 +298,7 @@ async def test_the_json_of_a_macro_names_macro_step_and_round_and_its_end(
         macro = shop.save("m", "@press:a PR 1", '/expect "2" 0', on_early_end=("/print x",))
         told = Report("macro m", as_json=True, junit=str(tmp_path / "r.xml"))
         with pytest.raises(DriveError):
-            await play(shop.session, macro, {}, times=None, watcher=told)
+            await play(shop.session, macro, {}, times=None, executed=told.executed, ended=told.ended)
         assert told.finish(1) == 1
         objects = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
     first, second, third, last = objects
