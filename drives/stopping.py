@@ -168,6 +168,17 @@ def stop_forms(roster: Roster, only: Iterable[Drive] | None = None) -> StopForms
     return StopForms(joined(immediate), joined(unterminated), tuple(repeats), joined(invalidate), framed, tuple(missed))
 
 
+class Written(NamedTuple):
+    """A stop that was written."""
+
+    forms: StopForms
+    data: bytes
+    invalidates: bool
+    """It makes a half-sent line harmless."""
+    before: bool = False
+    """A stop before it did so, of which the loop knows nothing yet."""
+
+
 class Stopping:
     """Stops the drives of one link."""
 
@@ -176,8 +187,8 @@ class Stopping:
         """The last stop of the whole link."""
         self._roster = roster
         self._link = roster.link
-        self._ahead: tuple[StopForms, bytes, bool] | None = None
-        """The stop that another thread has written and the loop has not yet taken over."""
+        self._ahead: Written | None = None
+        """The last stop that another thread has written and the loop has not yet taken over."""
         self._missed = False
         """Another thread's stop found the link lost, and the loop has not taken that over."""
         self._unconfirmed: list[Halt] = []
@@ -205,10 +216,11 @@ class Stopping:
         now = link.now()
 
         def stop(dropped: int) -> bytes:
-            data, whole = forms.written(bool(dropped or link.line.half_sent(now)))
-            self._ahead = forms, data, whole
+            last = self._ahead
+            before = last is not None and (last.invalidates or last.before)
+            self._ahead = Written(forms, *forms.written(bool(dropped or link.line.half_sent(now))), before)
             link.line.overtaken = True
-            return data
+            return self._ahead.data
 
         link.transport.preempt(forms.framed, stop)
 
@@ -241,33 +253,35 @@ class Stopping:
             at, ahead = link.now(), self._ahead
             if halt.whole and follows and link.transport.yielded():  # else another thread's stop has not been followed
                 self._ahead = None
-            forms, halt.data, whole = ahead or self._write_now(halt)
-            halt.missed.update(forms.missed)
+            written = ahead or self._write_now(halt)
+            halt.data = written.data
+            halt.missed.update(written.forms.missed)
             only = None
             if not halt.whole:  # the bytes may stop other drives as well
                 others = [drive for drive in self._roster.all_drives if drive not in halt.drives]
                 halt.others = tuple(drive for drive in others if _hears(drive.state, halt.data))
                 only = {*GLOBAL, *(drive.address for drive in halt.affected)}
-            link.line.stop(at, *forms.repeats, only=only)
-            link.line.wrote(halt.data, at, whole=whole)
+            link.line.stop(at, *written.forms.repeats, only=only)
+            link.line.wrote(halt.data, at, whole=written.invalidates)
             link.debris.stop_written(halt.data, link.line.transmitted)
             for drive in halt.affected:
                 drive.state.stopped()
-            if whole:  # every drive on the line has refused the rest of a line
+            # Every drive on the line has refused the rest of a line, or may have.
+            if written.invalidates or written.before or link.transport.may_invalidate:
                 for drive in self._roster.all_drives:
                     drive.state.line_invalidated()
         if not halt.whole:
             conversations.stop(drive.state for drive in halt.affected)
 
-    def _write_now(self, halt: Halt) -> tuple[StopForms, bytes, bool]:
+    def _write_now(self, halt: Halt) -> Written:
         """Drop what is unsent and write a stop, whatever fails."""
         link, forms = self._link, stop_forms(self._roster, None if halt.whole else halt.drives)
         dropped = 1
         with isolated(f"taking back what {link.name} has not sent", halt.trouble):
             dropped = link.transport.discard(whole=forms.framed)
-        data, whole = forms.written(bool(dropped or link.line.half_sent(link.now())))
-        link.transport.write(data)
-        return forms, data, whole
+        written = Written(forms, *forms.written(bool(dropped or link.line.half_sent(link.now()))))
+        link.transport.write(written.data)
+        return written
 
     # What follows
 

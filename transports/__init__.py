@@ -114,6 +114,8 @@ class Transport(ABC):
     """The promises of others that it cannot keep, for a person who opens it."""
     network = False
     """It leads to a network port, which may be a drive's own."""
+    may_invalidate = False
+    """At a stop its server drops unsent bytes, too, and may make a half-sent line harmless by itself."""
     identity = ""
     """What tells the device from another one that comes to its place; empty: nothing does."""
     round_trip: float | None = None

@@ -69,6 +69,8 @@ async def negotiated(inner: Transport, baud: int) -> Rfc2217Pipe:
 class Rfc2217Pipe(Transport):
     """One port of a device server."""
 
+    may_invalidate = True
+
     def __init__(self, inner: Transport) -> None:
         self._inner, self.name = inner, inner.name
         self._loop = asyncio.get_running_loop()

@@ -88,6 +88,8 @@ class _Session:
         """What was sent to a drive, and what was received on its bus until it was sent more."""
         self._unsent: set[tuple[str, str, str]] = set()
         """Commands that are said to be not sent, and not typed since."""
+        self._lines: set[tuple[str, str, str]] = set()
+        """All that was typed for drives: what fails beside is a command of multidrop's own, which comes again."""
         self._asked: dict[str, str] = {}
         """By bus, the drive that was asked last and has not replied."""
         self._replies: Counter[Place] = Counter()
@@ -156,6 +158,7 @@ class _Session:
             yield "silence", f"{before.text!r} was sent, nothing was received, and nothing was said of it"
         text = _text(entry.text)
         self._last[origin] = self._typed[entry.bus, entry.drive, text] = Typed(text, self._stops)
+        self._lines.add((entry.bus, entry.drive, text))
         self._unsent.discard((entry.bus, entry.drive, text))
 
     def _sent(self, entry: Entry) -> Iterator[tuple[str, str]]:
@@ -203,11 +206,12 @@ class _Session:
     def _said(self, entry: Entry) -> Iterator[tuple[str, str]]:
         self._report(entry.bus)
         for found in UNSENT.finditer(entry.text):
-            bus, drive, text = _target(found[1] or found[2], entry)
-            typed = self._typed.get((bus, drive, text))
+            target = _target(found[1] or found[2], entry)
+            typed = self._typed.get(target)
             if entry.kind == "failed" and typed is not None and typed.sent:
-                yield "not sent", f"{text!r} was sent"
-            self._unsent.add((bus, drive, text))
+                yield "not sent", f"{typed.text!r} was sent"
+            if entry.kind == "notice" or target in self._lines:
+                self._unsent.add(target)
         if entry.kind == "notice" and self._stop is not None and STOPPED.match(entry.text):
             drive = entry.text.removeprefix(f"{entry.bus}: ").rpartition("stopped, ")[0].removesuffix(": ")
             moment = entry.time - self._stop < MOMENT
@@ -249,6 +253,8 @@ def _named(sent: str, received: str, printed: str) -> set[str] | None:
         return set() if own or printed in received else None
     if printed not in received:
         return None
+    if '"~"' in sent:  # the mark of a drive alone: a value may follow it
+        return set()
     whole = rf'(?:\A|[\r\n\x06\x15>?]){re.escape(printed)}["~]([!0-9A-Za-z])'  # not the end of a longer value
     return set(re.findall(whole, received))
 

@@ -22,6 +22,7 @@ from multidrop.drives.drive import confirmed_motion
 from multidrop.drives.events import Ended, Sample, Sent, Silent, Unsolicited
 from multidrop.drives.stopping import Fate
 from multidrop.simulator.serving.in_process import SimPipe
+from multidrop.transports.rfc2217 import Rfc2217Pipe
 from tests.support.cell_session import party
 from tests.support.simulated_bus import SimulatedBus
 from tests.support.until import until
@@ -90,6 +91,38 @@ async def test_nothing_goes_out_between_two_stop_keys_that_the_loop_sees_after_b
     await shop.bus.stopped()
     await shop.send("a", "SL 70000")
     assert shop.moving("a")
+
+
+async def test_a_line_that_one_of_several_stop_keys_made_harmless_is_an_error_of_no_later_line():
+    shop = await SimulatedBus(ALONE, pipe=Preempted).open()
+    [drive] = shop.bus.drives.values()
+    asked = asyncio.ensure_future(confirmed_motion(drive))
+    await until(lambda: b"PR BY" in shop.written[-16:])
+    for _ in range(3):
+        shop.bus.stop_ahead()
+        await asyncio.sleep(0.2)  # the last ones find no half-sent line
+    for _ in range(3):
+        shop.bus.halt()
+    await refused_by_stop(asked)
+    await drive.send("MA 5000")
+    assert "an old error, now cleared: error 20" in shop.said
+
+
+class AtServer(SimPipe):
+    """A port of a server that may make a half-sent line harmless at a stop."""
+
+    may_invalidate = Rfc2217Pipe.may_invalidate
+
+
+async def test_an_error_that_the_server_of_a_port_makes_at_a_stop_is_no_refusal_of_the_next_line():
+    shop = await SimulatedBus(ALONE, pipe=AtServer).open()
+    [drive] = shop.bus.drives.values()
+    await drive.send("MR 24")
+    shop.bus.stop()
+    await shop.bus.stopped()
+    shop.devices["!"].fail(20, shop.floor.now())
+    await drive.send("MA 5000")
+    assert "an old error, now cleared: error 20" in shop.said
 
 
 async def test_what_a_preempted_pipe_drops_is_neither_published_as_sent_nor_taken_as_sent():

@@ -143,6 +143,12 @@ def may_displace(text: str) -> bool:
     return starts_motion(text) or written_word(text) in SCALE
 
 
+@lru_cache(maxsize=256)
+def uses_own_name(text: str) -> bool:
+    """Whether a line has a word that is none of the manual's: a label, or a user variable."""
+    return any(lookup(token.text) is None for token in tokens(text) if token.kind == "word")
+
+
 def written_word(text: str) -> str:
     """Return the variable to which a line gives a value, also by IC and DC; empty: it gives none."""
     statement = parsed(text)

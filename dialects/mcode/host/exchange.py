@@ -198,7 +198,7 @@ def _refused_unless_damaged(state: MCodeState, request: Request, stood: bool) ->
     if code is None:
         raise NoAnswer(f"{who(state)} replied NAK, and the reason could not be read: {once}")
     if request.kind not in (Kind.PRINT, Kind.LIST):
-        if stood or code in errors.BY_ITSELF:
+        if stood or _came_by_itself(request, code):
             raise NoAnswer(f"{who(state)} replied NAK, maybe for {described(code, state)}, now cleared: {once}")
         if (yield from _runs(state)):
             raise NoAnswer(
@@ -207,10 +207,11 @@ def _refused_unless_damaged(state: MCodeState, request: Request, stood: bool) ->
     raise Refused(f"{who(state)} refused '{request.text}': {described(code, state)}", code)
 
 
-def refused(state: MCodeState, request: Request) -> Procedure[None]:
+def refused(state: MCodeState, request: Request, acknowledged: bool = False) -> Procedure[None]:
     """Read and raise the error after `?` or EF=1.
 
-    The error need not come from this line: a limit, a stall or the running program sets EF too.
+    The error need not come from this line: a limit, a stall or the running program sets EF too. `acknowledged`: an ACK
+    of the line came late.
     """
     code = yield from read_error(state)
     if not code:
@@ -218,7 +219,12 @@ def refused(state: MCodeState, request: Request) -> Procedure[None]:
         raise NoAnswer(
             f"{who(state)} showed an error that {gone}: it is not known whether '{request.text}' was executed"
         )
-    if code in errors.BY_ITSELF:
+    if acknowledged:
+        raise NoAnswer(
+            f"{who(state)}: {described(code, state)}, now cleared; an ACK of '{request.text}' came, too: it is not "
+            "known whether it was executed"
+        )
+    if _came_by_itself(request, code):
         raise Refused(
             f"{who(state)}: {described(code, state)}; it refused '{request.text}', or that came by itself and it was "
             "executed",
@@ -226,6 +232,12 @@ def refused(state: MCodeState, request: Request) -> Procedure[None]:
         )
     caveat = "; a program runs, whose error it may be" if (yield from _runs(state)) else ""
     raise Refused(f"{who(state)} refused '{request.text}': {described(code, state)}{caveat}", code)
+
+
+def _came_by_itself(request: Request, code: int) -> bool:
+    """Whether an error may be none of a request: a fault of the machine, or a trip whose label was erased."""
+    lacks_name = code == ErrorNumber.NO_SUCH_NAME
+    return code in errors.BY_ITSELF or (lacks_name and not classify.uses_own_name(request.text))
 
 
 def _runs(state: MCodeState) -> Procedure[bool]:
@@ -258,12 +270,12 @@ def check_error_flag(state: MCodeState, request: Request, silent: bool = False) 
             "may be in program mode; open it again to find out"
         )
     printed = value(state, reply)
+    late = silent and not reply.doubtful and _came_late(state, reply)
     if printed[:1] == "1":
-        yield from refused(state, request)
+        yield from refused(state, request, acknowledged=late and state.codec.checksum > 0)
     state.error_flag_read(False)
     runs, ends = printed[1:] == " 1", classify.word_of(request.text)[0] == "E"
     taken = not runs if ends else runs and state.codec.checksum == 2
-    late = silent and not reply.doubtful and _came_late(state, reply)
     if silent and not taken and not late:
         state.settings_may_have_changed()  # or its settings make it silent
         raise unanswered(who(state), request)

@@ -142,6 +142,18 @@ def test_an_error_that_came_by_itself_is_not_told_as_a_refusal(bench, em, party)
     assert len(desk.witness.executed("R1=5")) == 1
 
 
+@pytest.mark.parametrize("em", range(4))
+def test_an_error_of_a_name_is_no_refusal_of_a_line_that_uses_none(bench, em):
+    """An input calls a label that CP has erased."""
+    desk = Desk(bench, (em, 0))
+    desk.device.execute("EX G1", desk.bench.now)
+    with pytest.raises(Refused, match="error 30: .* or that came by itself and it was executed"):
+        desk.type("MA 100")
+    assert len(desk.witness.executed("MA 100")) == 1
+    with pytest.raises(Refused, match="refused 'EX G1': error 30"):
+        desk.type("EX G1")
+
+
 @pytest.mark.wide
 @pytest.mark.parametrize(("em", "check"), [(em, check) for em in range(4) for check in range(3)])
 @pytest.mark.parametrize("line", ["PR 1", "PR 0", "PR I1", 'PR "0 1"', 'PR "?"', 'PR ">ok"', "PR R1"])

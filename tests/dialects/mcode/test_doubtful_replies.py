@@ -69,6 +69,19 @@ def test_an_error_is_not_read_twice_where_it_may_have_been_read_once():
         talk.send(Reply(end=End.NAK, detail="prints follow the NAK"))
 
 
+def test_a_line_whose_ack_came_late_is_not_blamed_for_an_error_that_came_beside_it():
+    state = MCodeState(MCode(em=1, checksum=1, escape=1))
+    talk = MCODE.perform(state, "MR 1")
+    next(talk)
+    assert talk.send(Reply(end=End.SILENT)).text.startswith("PR EF")
+    read = ACK + ACK + sealed(b"1 0~") + b"\r\n"
+    assert talk.send(Reply(lines=("1 0~",), raw=read)).text.startswith("PR ER")
+    with pytest.raises(
+        NoAnswer, match="error 60.* an ACK of 'MR 1' came, too: it is not known whether it was executed"
+    ):
+        talk.send(Reply(lines=("60~",)))
+
+
 def test_a_prompt_in_front_of_a_print_may_be_a_part_of_it_and_acknowledges_nothing():
     for data in (b"MR 51200\r\n>hello\r\n", b"MR 51200\r\n>hello\r\nhello\r\n", b"MR 51200\r\n\r\n>> a\r\nb\r\n"):
         found = answer(0, 0, data)

@@ -261,6 +261,24 @@ def test_a_session_whose_commands_are_not_marked_is_not_judged(tmp_path: Path) -
     assert "marks" not in json.loads(line_of(Entry(datetime.now(UTC), "log", "session")))
 
 
+def test_a_velocity_behind_the_mark_of_a_drive_alone_names_no_drive(tmp_path: Path) -> None:
+    sent = {"kind": "sent", "bus": "l", "drive": "!", "text": 'PR BY,P,"~",V\r'}
+    heard = {"kind": "received", "bus": "l", "drive": "!", "text": "00~0\r\n"}
+    asks = {**sent, "text": 'PR R1 R4,"~"\r'}
+    reply = {**heard, "text": "00~\r\n"}
+    shown = {"kind": "printed", "bus": "l", "drive": "!", "text": "00"}
+    assert found([*HEAD, typed("PR R1 R4", "!"), sent, heard, asks, reply, shown], tmp_path) == []
+
+
+@pytest.mark.parametrize(("first", "breaches"), [([], []), ([typed("EM=0")], ["not sent"])])
+def test_what_multidrop_sends_by_itself_may_be_stopped_and_come_again(
+    first: Rows, breaches: list[str], tmp_path: Path
+) -> None:
+    rows = [*HEAD, *first, typed("PG 1"), {**said("a: stopped; 'EM=0' was not sent", "failed"), "drive": "a"}]
+    rows += [typed("PG 1"), *command("EM=0")]
+    assert [rule for rule, _ in found(rows, tmp_path)] == breaches
+
+
 def test_a_checksum_behind_the_mark_of_a_drive_alone_names_no_drive(tmp_path: Path) -> None:
     sent = {"kind": "sent", "bus": "l", "drive": "!", "text": 'PR "v",R1,"~"\u00b5\r'}
     heard = {"kind": "received", "bus": "l", "drive": "!", "text": "\u0006v73882858~\u00db\r\n"}
