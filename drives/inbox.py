@@ -113,8 +113,13 @@ class Doubt:
         return Weight(doubtful)
 
     def with_evidence(self, request: Request, reply: Reply) -> Reply:
-        """A mark with all lines that came since the doubtful reply for which it was printed."""
+        """A mark with all lines that came since the doubtful reply for which it was printed.
+
+        What came before the mark of another drive may be the reply that this one owes.
+        """
         evidence = self._evidence.pop(request.address, None)
+        if request.gather:
+            self.stray(reply.lines)
         if evidence and request.gather and reply.end is End.DONE:
             return replace(reply, lines=(*evidence, *reply.lines))
         if reply.doubtful and reply.lines:

@@ -10,7 +10,7 @@ import re
 from collections import Counter, deque
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
-from datetime import datetime, timedelta
+from datetime import UTC, datetime, timedelta
 from typing import NamedTuple
 
 from multidrop.dialects import Diagnostic
@@ -32,6 +32,8 @@ KEPT = 20
 REPEATS = 3
 """How often a command that was rejected as damaged is sent again."""
 READINGS = 2
+AT_ONCE = timedelta(seconds=5)
+"""The time in which a line may be typed in another tab, while the one before waits for its reply."""
 MOMENT = timedelta(seconds=0.1)
 """The time after a stop in which the confirmation of an earlier one may still be said."""
 NAK = "\x15"
@@ -68,6 +70,8 @@ class Typed:
     heard: str = ""
     """What was received since it was sent last."""
     reported: bool = False
+    at: datetime = datetime.min.replace(tzinfo=UTC)
+    """When it was sent last."""
 
 
 class _Session:
@@ -84,6 +88,8 @@ class _Session:
         """By bus, drive and text: the last of each."""
         self._last: dict[tuple[str, str, str], Typed] = {}
         """The last line for a drive of each origin; a person and a macro may have one at a time."""
+        self._silent: list[tuple[Place, Typed]] = []
+        """Commands to which nothing was received as another tab typed a line for their drive."""
         self._exchanges: dict[Place, deque[list[str]]] = {}
         """What was sent to a drive, and what was received on its bus until it was sent more."""
         self._unsent: set[tuple[str, str, str]] = set()
@@ -134,6 +140,8 @@ class _Session:
                 del self._asked[entry.bus]
             for (bus, *_), typed in self._last.items():
                 typed.heard += entry.text * (bus == entry.bus)
+            for (bus, _), typed in self._silent:
+                typed.heard += entry.text * (bus == entry.bus)
             for (bus, _), exchanges in self._exchanges.items():
                 exchanges[-1][1] += entry.text * (bus == entry.bus)
         elif entry.kind == "printed":
@@ -145,17 +153,22 @@ class _Session:
         """Something was said of a bus; empty: of all."""
         for (each, *_), typed in self._last.items():
             typed.reported = typed.reported or bus in ("", each)
+        self._silent = [(place, typed) for place, typed in self._silent if bus not in ("", place[0])]
 
     def _line_typed(self, entry: Entry) -> Iterator[tuple[str, str]]:
         if not entry.bus:  # a verb may send the same texts by itself
             self._last.clear()
             self._typed.clear()
+            self._silent.clear()
         if entry.raw or not entry.bus:
             return
         origin = entry.bus, entry.drive, entry.by
         before = self._last.get(origin) if entry.by == By.OPERATOR.value else None  # several macros may play at once
         if before is not None and before.sent and not (before.heard or before.reported or entry.drive in EVERYONE):
-            yield "silence", f"{before.text!r} was sent, nothing was received, and nothing was said of it"
+            if entry.time - before.at < AT_ONCE:
+                self._silent.append(((entry.bus, entry.drive), before))
+            else:
+                yield _silence(before)
         text = _text(entry.text)
         self._last[origin] = self._typed[entry.bus, entry.drive, text] = Typed(text, self._stops)
         self._lines.add((entry.bus, entry.drive, text))
@@ -177,6 +190,7 @@ class _Session:
             each.asked += not entry.command
         if not entry.command:
             return
+        yield from self._over(place)
         self._commanded.add(place)
         key = (*place, entry.command)
         if key in self._unsent:
@@ -190,6 +204,14 @@ class _Session:
         if typed.sent and not again:
             yield "twice", f"{entry.command!r} was sent {typed.sent + 1} times"
         typed.sent, typed.asked, typed.heard = typed.sent + 1, 0, ""
+        typed.at = entry.time
+
+    def _over(self, place: Place) -> Iterator[tuple[str, str]]:
+        """The next command leaves for a drive: what was sent to it before is over."""
+        for at, typed in self._silent:
+            if at == place and not typed.heard:
+                yield _silence(typed)
+        self._silent = [(at, typed) for at, typed in self._silent if at != place]
 
     def _printed(self, entry: Entry) -> Iterator[tuple[str, str]]:
         exchanges = self._exchanges.get((entry.bus, entry.drive))
@@ -220,6 +242,10 @@ class _Session:
             earlier = self._earlier[entry.bus, drive] * moment
             if (replies := max(self._replies[entry.bus, drive], earlier)) < READINGS:
                 yield "stopped", f"{entry.text!r}, after {replies} replies"
+
+
+def _silence(typed: Typed) -> tuple[str, str]:
+    return "silence", f"{typed.text!r} was sent, nothing was received, and nothing was said of it"
 
 
 def _text(typed: str) -> str:

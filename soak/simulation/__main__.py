@@ -18,6 +18,7 @@ from soak.simulation.figures import Figures
 from soak.simulation.judge import judged
 from soak.simulation.runs import STEPS, kept, lives, run, verdict
 from soak.simulation.shrinking import Life, shrunk
+from soak.simulation.story import whole
 from soak.simulation.trace import readable
 
 
@@ -35,8 +36,8 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--mutant", default="", help="a defect of soak/mutants that is planted first; all: each")
     parser.add_argument("--until-broken", action="store_true", help="end at the first seed that breaks a rule")
     chosen = parser.parse_args(arguments)
-    steps = chosen.only if chosen.only is not None else tuple(range(chosen.steps))
     if chosen.seed is not None:
+        steps = chosen.only if chosen.only is not None else whole(chosen.seed, chosen.steps)
         return _one(Life(chosen.seed, steps, chosen.without), whole=chosen.only is None)
     first, _, last = chosen.seeds.partition("-")
     try:
@@ -119,7 +120,7 @@ def _range(seeds: range, chosen: argparse.Namespace) -> int:
         name = each.breaches[0][0]
         if name not in seen:
             seen.add(name)
-            print(f"  again: {shrunk(Life(each.seed, tuple(range(chosen.steps))), name).command}")
+            print(f"  again: {shrunk(Life(each.seed, whole(each.seed, chosen.steps)), name).command}")
         sys.stdout.flush()
     print("\n".join(figures.rows()))
     return int(figures.broken > 0)

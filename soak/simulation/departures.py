@@ -101,9 +101,34 @@ def _owed(world: World) -> Iterator[str]:
                 yield f"{line}: stop at {stop.at:.3f}, back at {first.at:.3f} with {first.data[:WHOLE]!r}"
 
 
+def _repeated(world: World) -> Iterator[str]:
+    """Each piece of a stop leaves again, unless another stop, a loss or an end comes before the line was quiet."""
+    history = world.history
+    for stop in history.stops:
+        ends = (*history.deaths, *history.told.halts, *(each.at for each in history.stops if each is not stop))
+        for line, pieces in stop.pieces.items():
+            first = stop.own[line][0]
+            begins = next(
+                (index for index in range(first, len(history.written)) if history.written[index][1] == line), -1
+            )
+            again = any(name == line and at >= stop.at for at, name, _ in history.opened)
+            lost = any(at >= stop.at and LOST.match(text) for at, text in history.notices)
+            if begins < 0 or again or lost or any(at > stop.at + TAKEN_OVER for at in ends):
+                continue
+            left = b"".join(data for _, port, data in history.written[begins + 1 :] if port == line)
+            left = left.replace(b"\xff\xff", b"\xff") if world.place(line[:2]).kind == "rfc2217" else left
+            yield from (
+                f"{line}: stop at {stop.at:.3f}, {each!r} did not leave again" for each in pieces if each not in left
+            )
+
+
+LOST = re.compile(r"l\d: .* was lost|l\d: .*; trying again")
+TAKEN_OVER = 1e-9
+"""The time in which the loop has taken over a stop, at the time of its key, s."""
 PROMISE = "What a stop promises"
 DEPARTURES = (
     Rule("after a stop", "Nothing that was typed before a stop leaves after it.", PROMISE, _nothing_before),
+    Rule("repeated", "A stop leaves again, piece by piece, once its line is quiet.", PROMISE, _repeated),
     Rule("sent again", "No command leaves again on another connection.", "What is never done twice", _never_again),
     Rule("owed", "What leaves first on a line that was lost at a stop is the stop.", PROMISE, _owed),
 )

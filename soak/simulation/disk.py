@@ -150,7 +150,7 @@ class Disk:
             self.noted(what, path)
             return result
 
-        return operate(noted, part)
+        return operate(noted, part, "disk")
 
     def _changed(self, path: str, change: dict[str, Node | None]) -> None:
         self.pending.setdefault(os.path.dirname(path), []).append(change)

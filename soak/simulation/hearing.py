@@ -6,7 +6,7 @@ import re
 from typing import TYPE_CHECKING
 
 from multidrop.drives.bus import Bus
-from multidrop.drives.events import Ended
+from multidrop.drives.events import Ended, Sent
 from multidrop.drives.stopping import stop_forms
 from multidrop.shell.events import Failed, Notified, OnBus, Output, Printed
 from multidrop.shell.session import Session
@@ -29,6 +29,8 @@ def heard(world: World, event: object, who: str = "") -> None:
         return
     if isinstance(event, OnBus):
         world.history.exchanges += isinstance(event.event, Ended)
+        if isinstance(event.event, Sent):
+            world.history.sent.add((event.bus, event.event.request.text))
         return
     if isinstance(event, Notified | Failed | Printed | Output):
         world.history.note(world.loop.now, type(event).__name__, event.text)
@@ -76,6 +78,8 @@ def typed(world: World, data: bytes, session: Session, who: str = "") -> None:
                 world.history.full.append((world.loop.now, f"{name}{who}"))
         lost = tuple(name + who for name, bus in session.buses.items() if bus.link.lost and name in trying)
         world.history.stops.append(Stop(world.loop.now, forms, who, len(world.history.written), lost=lost))
+        pieces = {name + who: stop_forms(bus.roster).repeats for name, bus in buses.items() if name not in session.raw}
+        world.history.stops[-1].pieces = {name: tuple(each.data for each in found) for name, found in pieces.items()}
 
 
 def _forms(world: World, bus: Bus) -> tuple[bytes, ...]:

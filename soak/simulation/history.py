@@ -35,6 +35,8 @@ class Stop:
     which leave before it."""
     lost: tuple[str, ...] = ()
     """The lines that were lost, and being tried again."""
+    pieces: dict[str, tuple[bytes, ...]] = field(default_factory=dict)
+    """By line that could be written, what has to leave again once it is quiet."""
 
 
 class Outcome(Enum):
@@ -160,6 +162,8 @@ class History:
     """Breaches that the session logs show."""
     told: Told = field(default_factory=Told)
     """What was told to run by itself."""
+    sent: set[tuple[str, str]] = field(default_factory=set)
+    """The lines of drives and texts of requests that a session has passed to a port."""
     defects: list[str] = field(default_factory=list)
     counts: dict[str, int] = field(default_factory=dict)
     lines: list[tuple[float, str, str]] = field(default_factory=list)

@@ -20,6 +20,7 @@ from typing import NamedTuple
 
 from soak.simulation.runs import result
 from soak.simulation.shrinking import Life
+from soak.simulation.story import whole
 
 ROOT = Path(__file__).parents[2]
 PATCHES = ROOT / "soak" / "mutants"
@@ -104,7 +105,7 @@ def caught(name: str, seeds: range, steps: int, jobs: int = 0) -> Caught:
             if (found := BROKE.search(text)) is None:
                 return Caught(name, "", 0, len(seeds), took, (problem or text).strip())
             seed, rule = int(found[1]), found[2]
-            if not result(Life(seed, tuple(range(steps)))).breaches:
+            if not result(Life(seed, whole(seed, steps))).breaches:
                 return Caught(name, rule, seed, seed - seeds.start + 1, took, "\n".join(text.splitlines()[:2]))
             left = range(seed + 1, seeds.stop)
     return Caught(name, "", 0, len(seeds), took, f"seed {seed} breaks a rule without it too")

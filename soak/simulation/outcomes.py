@@ -231,7 +231,7 @@ def _credited(world: World) -> Iterator[str | Granted]:
     for shown in history.shown:
         own = [each for each in history.held if (each.line, each.drive) == (shown.line, shown.drive)]
         own = [each for each in own if each.at <= shown.at]
-        if any(shown.form.format(each.number) == shown.text for each in own if each.until > shown.began):
+        if any(shown.form.format(each.number) == shown.text for each in own if each.until >= shown.began):
             continue
         if set(re.findall(r"\d", shown.text)) == {"0"} and (shown.line, shown.drive) in world.cut:
             continue  # what a power-up leaves
@@ -241,7 +241,7 @@ def _credited(world: World) -> Iterator[str | Granted]:
             breach = f"{words}: {origin}"
             if world.place(shown.line).language == "pmx" and _damage(history, shown.line, shown.began, shown.at):
                 breach = Granted(BARE_VALUE, words)  # noise made the number of another controller of that of the first
-        elif own and all(each.restarts == shown.restarts for each in own if each.until > shown.began):
+        elif own and all(each.restarts == shown.restarts for each in own if each.until >= shown.began):
             breach = _never_held(world, shown, f"{words}: it never held that")
         if breach:
             yield Granted(ASTRAY, words) if _astray(world, shown.line, shown.began, shown.at) else breach
@@ -251,7 +251,7 @@ def _origin(shown: Shown, numbers: dict[str, Held]) -> str:
     """Say whose value was shown, if it is another drive's, an older one, or a program's."""
     for number in re.findall(NUMBER, shown.text):
         held = numbers.get(number)
-        own = held is not None and (held.line, held.drive) == (shown.line, shown.drive) and held.until > shown.began
+        own = held is not None and (held.line, held.drive) == (shown.line, shown.drive) and held.until >= shown.began
         if held is not None and not own:
             return f"{held.line}:{held.drive} held it from {held.at:.3f} to {held.until:.3f}"
         if TICKS <= int(number) < TICKS + 1_000_000:

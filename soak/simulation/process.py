@@ -41,7 +41,7 @@ class Process:
         self._loop = loop
         self._left = 0
         """The number of operations until the kill that is armed; 0: none is."""
-        self._moment = ""
+        self._moment = self._of = ""
 
     def run(self, work: Callable[..., T], *arguments: Any) -> T:
         """Call something as this process."""
@@ -51,15 +51,18 @@ class Process:
         """Begin a task of this process."""
         return self._loop.create_task(work, context=self.context.copy())
 
-    def arm(self, operations: int, moment: str) -> None:
-        """Kill it `before`, `within` or `after` an operation, the first one being 1. 0: never."""
-        self._left, self._moment = operations, moment
+    def arm(self, operations: int, moment: str, of: str = "") -> None:
+        """Kill it `before`, `within` or `after` an operation, the first one being 1. 0: never.
 
-    def operate(self, work: Callable[[], T], part: Callable[[], object] | None = None) -> T:
+        `of`: only operations on the `disk` count; empty: all.
+        """
+        self._left, self._moment, self._of = operations, moment, of
+
+    def operate(self, work: Callable[[], T], part: Callable[[], object] | None = None, of: str = "") -> T:
         """Do one operation on a disk or a wire, unless it is dead. `part`: does a part of it, as a kill within does."""
         if self.dead:
             raise Killed
-        if not self._left:
+        if not self._left or (self._of and of != self._of):
             return work()
         self._left -= 1
         if self._left:
@@ -117,10 +120,10 @@ def gone(context: Context) -> bool:
     return process is not None and process.dead
 
 
-def operate(work: Callable[[], T], part: Callable[[], object] | None = None) -> T:
+def operate(work: Callable[[], T], part: Callable[[], object] | None = None, of: str = "") -> T:
     """Do an operation of the process that runs now."""
     process = PROCESS.get()
-    return work() if process is None else process.operate(work, part)
+    return work() if process is None else process.operate(work, part, of)
 
 
 def outside(work: Callable[..., T], *arguments: Any) -> T:

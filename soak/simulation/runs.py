@@ -12,7 +12,6 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import asdict, dataclass, field
-from functools import partial
 from hashlib import sha256
 from pathlib import Path
 from typing import TextIO
@@ -20,6 +19,7 @@ from typing import TextIO
 from multidrop import __version__
 from soak.simulation.judge import Judgement, judged
 from soak.simulation.shrinking import Life
+from soak.simulation.story import CREW, whole
 from soak.simulation.world import World
 
 STEPS = 30
@@ -118,7 +118,7 @@ def _collected_seldom() -> Iterator[None]:
 
 def _taken_up(lives: Sequence[Life], path: Path) -> tuple[list[Result], TextIO]:
     """The results that a file has, and the file to append the others to; a row that was cut off goes."""
-    head = json.dumps({"of": identity(), "first": lives[0].seed, "steps": len(lives[0].steps)})
+    head = json.dumps({"of": identity(), "first": lives[0].seed, "steps": sum(step < CREW for step in lives[0].steps)})
     rows = path.read_text().splitlines(keepends=True) if path.exists() else []
     whole = [row for row in rows if row.endswith("\n")]
     if whole and whole[0] != f"{head}\n":
@@ -154,4 +154,4 @@ def derived(count: int) -> list[int]:
 
 def lives(seeds: Sequence[int], steps: int = STEPS) -> list[Life]:
     """The whole story of each seed."""
-    return list(map(partial(Life, steps=tuple(range(steps))), seeds))
+    return [Life(seed, whole(seed, steps)) for seed in seeds]

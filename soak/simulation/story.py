@@ -15,6 +15,7 @@ from multidrop.dialects import Diagnostic
 from soak.simulation import acts_connections
 from soak.simulation.act import Act
 from soak.simulation.acts.automation import AUTOMATION
+from soak.simulation.acts.crews import CREWS
 from soak.simulation.acts.files import FILES
 from soak.simulation.acts.hand import HAND
 from soak.simulation.acts.meetings import MEETINGS
@@ -148,10 +149,22 @@ MEETING = 0.3
 """How many seeds have the acts of `MEETINGS`, and how many of their steps: the other stories are without them."""
 AT_WORK = 0.2, 0.1
 """How many seeds have the acts of `OPERATORS`, and how many of their steps."""
+AT_ONCE = 0.25
+"""How many seeds end with the acts of `CREWS`."""
+CREW, LAST = 200, 5
+"""The number of the first step with one, and how many there are."""
+
+
+def whole(seed: int, steps: int) -> tuple[int, ...]:
+    """The steps of a whole story: so many, and those of the crews, if it ends with them."""
+    crews = range(CREW, CREW + LAST) if Random(f"{seed} crews").random() < AT_ONCE else ()
+    return (*range(steps), *crews)
 
 
 def _drawn(world: World, step: int, rng: Random) -> Act:
     """Draw the act of a step."""
+    if step >= CREW:
+        return rng.choices(CREWS, [each.weight for each in CREWS])[0]
     act = rng.choices(ACTS, [each.weight for each in ACTS])[0]
     seeds, steps = AT_WORK
     apart = Random(f"{world.seed} work {step}")

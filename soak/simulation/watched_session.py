@@ -90,7 +90,9 @@ class WatchedSession(Session):
             raise
         except asyncio.CancelledError:
             if not self._dead:
-                command.outcome, command.said, command.ended = Outcome.UNKNOWN, "cancelled", self.now()
+                left = (command.line, command.text) in history.sent
+                command.outcome = Outcome.UNKNOWN if left else Outcome.NOT_SENT
+                command.said, command.ended = "cancelled", self.now()
             raise
         else:
             self._ended(command, ())

@@ -272,10 +272,10 @@ class World:
         rng = Random(f"{self.seed} person {self.history.lives}")
         self.person = Person(self.session, self.loop, rng, self._typed, self.cut_ins, process)
 
-    def kill(self, operations: int, moment: str, power: bool = False) -> None:
-        """Kill the session at an operation from now; `power`: the PC loses its power there."""
+    def kill(self, operations: int, moment: str, power: bool = False, of: str = "") -> None:
+        """Kill the session at an operation from now; `power`: the PC loses its power there. `of`: see `Process.arm`."""
         self.history.power = power
-        self.process.arm(operations, moment)
+        self.process.arm(operations, moment, of)
 
     def _died(self) -> None:
         """The kernel closes its ports; what it had to say of a line is not known."""
@@ -331,10 +331,12 @@ class World:
 
     # The story
 
-    def command(self, rng: Random, place: Place | None = None, who: str = "", stops: int | None = None) -> bytes:
+    def command(
+        self, rng: Random, place: Place | None = None, who: str = "", stops: int | None = None, drive: str = ""
+    ) -> bytes:
         """Draw a line for a drive, and its Enter. `who` types it, after so many stops of his own."""
         place = place or rng.choice(self.places)
-        drive = rng.choice(place.names)
+        drive = drive or rng.choice(place.names)
         self.said += 1
         serial = self.step * 100 + self.said
         said = LANGUAGES[place.language].say(rng, serial, self.witnesses[place.name, drive], self.floor.now())

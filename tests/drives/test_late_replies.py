@@ -281,6 +281,34 @@ def test_what_came_behind_a_doubtful_answer_stands_in_front_of_the_mark(first, o
     assert ended[-1].reply.lines == ("202", "?Q00001") and ended[-1].reply.end is End.DONE
 
 
+def test_what_came_before_the_mark_of_another_drive_may_be_the_reply_that_is_owed():
+    """The mark of the slow drive goes first, and the reply of the other one comes before it."""
+    line, ended = Line(Pmx(), timeout=0.3), []
+
+    def at(now: float, data: bytes = b"") -> None:
+        if data:
+            line.receive(data, now)
+        ended.extend(event.reply for event in line.events(now) if isinstance(event, Finished))
+
+    def mark(address: str) -> Request:
+        return pmx(f"Q{address}001", address, kind=Kind.PRINT, expect=rf"\?Q{address}001", gather=True)
+
+    line.ask(pmx("V1", "01"))
+    at(0.0)
+    at(0.5)
+    line.ask(pmx("V1", "03"))
+    at(1.0)
+    at(1.1, b"101\r")
+    assert ended[-1].lines == ("101",) and ended[-1].doubtful
+    line.ask(mark("01"))
+    at(1.2)
+    at(1.3, b"303\r?Q01001\r")
+    line.ask(mark("03"))
+    at(1.5)
+    at(1.6, b"?Q03001\r")
+    assert ended[-1].lines == ("303", "?Q01001", "?Q03001")
+
+
 @pytest.mark.wide
 @pytest.mark.parametrize("checksum", [0, 1, 2])
 @pytest.mark.parametrize("em", [0, 1, 2, 3])

@@ -23,9 +23,10 @@ from soak.simulation.living import lived
 from soak.simulation.outcomes import OUTCOMES
 from soak.simulation.places import Place
 from soak.simulation.rule import Granted, Rule
-from soak.simulation.runs import derived, lives, result, run
+from soak.simulation.runs import STEPS, derived, lives, result, run
 from soak.simulation.seeds import DERIVED, FIXED
 from soak.simulation.shrinking import Life, shrunk
+from soak.simulation.story import CREW, whole
 from soak.simulation.trace import readable
 from tests.support.paths import ROOT
 from tests.support.until import PATIENCE
@@ -37,9 +38,18 @@ SAFETY = (ROOT / "docs" / "safety.md").read_text()
 
 @pytest.mark.parametrize("seed", [*FIXED, *derived(DERIVED)])
 def test_the_rules_hold(seed: int) -> None:
-    world = lived(seed, range(30))
+    world = lived(seed, whole(seed, STEPS))
     assert broken(world) == []
     assert world.history.commands
+
+
+def test_the_acts_of_several_callers_follow_a_story_that_is_the_same_without_them() -> None:
+    seed = next(seed for seed in range(100) if len(whole(seed, 4)) > 4)
+    histories = [lived(seed, steps, keep=True).history for steps in (whole(seed, 4), range(4))]
+    with_crews, without = ([(*row, text.replace(each.folder, "~")) for *row, text in each.lines] for each in histories)
+    first = next(at for at, (_, kind, text) in enumerate(with_crews) if kind == "step" and text.startswith(f"{CREW}: "))
+    assert first > 20
+    assert with_crews[:first] == without[:first]
 
 
 @pytest.mark.nightly

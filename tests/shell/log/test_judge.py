@@ -65,7 +65,7 @@ GOOD: Rows = [
 ]
 
 
-def found(rows: Rows, tmp_path: Path, apart: float = 1.0) -> list[tuple[str, int]]:
+def found(rows: Rows, tmp_path: Path, apart: float = 10.0) -> list[tuple[str, int]]:
     path = tmp_path / "day.jsonl"
     entries = (Entry(datetime.fromtimestamp(at * apart, UTC), **row) for at, row in enumerate(rows))
     path.write_bytes(b"".join(map(line_of, entries)))
@@ -203,6 +203,13 @@ def test_a_reply_to_what_was_typed_before_the_log_began_is_not_judged(tmp_path: 
 def test_what_another_origin_types_meanwhile_is_no_silence(tmp_path: Path) -> None:
     rows = [*HEAD, typed("MR 1", by="macro"), command("MR 1")[0], typed("MR 2"), said("a does not reply", "failed")]
     assert found([*rows, typed("MR 3", by="macro")], tmp_path) == []
+
+
+def test_a_line_of_another_tab_is_typed_while_the_one_before_waits_for_its_reply(tmp_path: Path) -> None:
+    sent, reply = command("MR 1")
+    rows = [*HEAD, typed("MR 1"), sent, typed("MR 2")]
+    assert found([*rows, reply, *command("MR 2")], tmp_path, apart=0.1) == []
+    assert found([*rows, *command("MR 2")], tmp_path, apart=0.1) == [("silence", 6)]
 
 
 @pytest.mark.parametrize(("readings", "breaches"), [(1, ["stopped"]), (2, [])])

@@ -1,0 +1,306 @@
+"""Acts of several callers at once: an operator at each drive of a line, several tabs, and stops between their lines.
+
+They are the last steps of one story in four, after all others, so no other story is changed by them: see `story.whole`.
+Beside them are stops, kills and losses that are aimed: at a write, at a file, at a port that takes little.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+from collections.abc import Mapping
+from dataclasses import replace
+from random import Random
+from typing import TYPE_CHECKING
+
+from multidrop.shell.events import FAILURES
+from soak.simulation.act import Act
+from soak.simulation.acts.automation import Lines, later, motion, pause, refused, tell
+from soak.simulation.acts.files import download
+from soak.simulation.acts.phrases import PHRASES, STOP, number, target
+from soak.simulation.acts_connections import another
+from soak.simulation.cut_ins import OWN_WORK, WRITING, Aim, points
+from soak.simulation.history import Command
+from soak.simulation.told import Run
+
+if TYPE_CHECKING:
+    from soak.simulation.places import Place
+    from soak.simulation.world import World
+
+LOOK = 0.0004
+"""The time between two looks at what a session does, s."""
+WAIT = 8.0
+"""The longest time that is looked, s."""
+TAKING_OVER = (
+    "workspace Workspace.stop:",
+    "stopping Stopping.halt",
+    "stopping Stopping._write:",
+)
+"""The points at which the loop takes over a stop."""
+
+
+def _arrived(world: World) -> int:
+    """The number of stops that have arrived."""
+    return sum(not stop.who for stop in world.history.stops)
+
+
+def _spell(world: World, seconds: float, worse: Mapping[str, float]) -> None:
+    """Let faults of the kernel, the network and USB be more probable for a while."""
+
+    def back() -> None:
+        if not world.ending:
+            world.kernel.quiet(world.climate)
+
+    world.kernel.quiet(replace(world.climate, chances={**world.climate.chances, **worse}))
+    world.loop.call_later(seconds, back)
+
+
+# Several callers
+
+
+async def _operator(world: World, place: Place, drive: str, rng: Random) -> None:
+    """Send lines to one drive, each as soon as the one before has ended; some callers give up before that."""
+    session = world.session
+    for _ in range(rng.randrange(2, 7)):
+        await asyncio.sleep(rng.choice((0.0, 0.0, 0.01, 0.3)))
+        typed = world.command(rng, place, stops=_arrived(world), drive=drive).decode().strip()
+        if rng.random() < 0.3:  # a tab
+            session.start(typed)
+            continue
+        with contextlib.suppress(*FAILURES, TimeoutError):
+            async with asyncio.timeout(rng.random() ** 2 * 0.3 if rng.random() < 0.25 else None):
+                await session.run(typed)
+
+
+def _operators(world: World, rng: Random, places: list[Place], callers: int = 1) -> None:
+    """Let so many callers work at each drive of some lines."""
+    for place in places:
+        for drive in place.names * callers:
+            world.beside(_operator(world, place, drive, Random(rng.random())))
+
+
+def _some(world: World, rng: Random) -> list[Place]:
+    """One line, the one with the most drives or any, or all."""
+    most = max(world.places, key=lambda place: len(place.names))
+    return rng.choice(([most], [most], [rng.choice(world.places)], world.places))
+
+
+def at_each_drive(world: World, rng: Random) -> float:
+    """Let an operator send lines to each drive at once, and stop now and then."""
+    _operators(world, rng, _some(world, rng))
+    took = 1 + rng.random() * 3
+    for _ in range(rng.choice((0, 1, 1, 2, 3))):
+        later(world, rng.random() ** 2 * took, STOP + b"/resume\r")
+    return took
+
+
+def at_each_drive_late(world: World, rng: Random) -> float:
+    """The same with replies that are late, some of them later than the time-out."""
+    for place in (places := _some(world, rng)):
+        world.weather(place, delay=(0.0, 0.4 + rng.random()))
+        world.loop.call_later(6.0, world.weather, place)
+    _operators(world, rng, places)
+    if rng.random() < 0.3:
+        later(world, rng.random() * 3, STOP + b"/resume\r")
+    return 6.0
+
+
+def at_each_drive_in_noise(world: World, rng: Random) -> float:
+    """The same with noise."""
+    for place in (places := _some(world, rng)):
+        kinds = [each for each in ("flip", "drop", "double", "insert") if rng.random() < 0.6]
+        world.weather(place, **{kind: rng.random() * 0.01 for kind in kinds if place.noisy})
+        world.loop.call_later(4.0, world.weather, place)
+    _operators(world, rng, places)
+    return 4.0
+
+
+def two_at_a_share(world: World, rng: Random) -> float:
+    """Let two people work at a line that is shared, each with stops."""
+    places = [each for each in world.places if each.kind == "rfc2217"]
+    if not places:
+        return at_each_drive(world, rng)
+    at, lines = 0.0, Random(f"{world.seed} lines {world.step}")
+
+    def own() -> None:
+        if world.ready.is_set():
+            world.person.type(world.command(lines, places[0]))
+
+    for _ in range(rng.randrange(6, 16)):
+        if (choice := rng.random()) < 0.5:
+            world.loop.call_later(at, another, world, lines)
+        elif choice < 0.8:
+            world.loop.call_later(at, own)
+        else:
+            later(world, at, STOP + b"/resume\r")
+        at += rng.choice((0.0, 0.001, 0.02, 0.3))
+    return at
+
+
+# Stops that are aimed
+
+
+def stop_at_a_write(world: World, rng: Random) -> float:
+    """Let operators work, and stop in the instruction in which a line is about to leave."""
+    _operators(world, rng, _some(world, rng))
+    names = [each for each in points() if each.startswith(WRITING) and not each.startswith("usb")]
+    if any(each.kind == "usb" for each in world.places) and rng.random() < 0.7:
+        names = [each for each in points() if each.startswith("usb")]
+    held = (1 + int(rng.random() * OWN_WORK), 1 + int(rng.random() * 3000)) if rng.random() < 0.3 else (0, 0)
+    aim = Aim(rng.choice(names), 1 + int(rng.random() ** 2 * 4), rng.choice((0, 0, 1, 3, 6)), *held)
+
+    def typed() -> None:
+        if not world.ready.is_set():
+            return
+        world.stops += 1
+        world.person.type_stop(aim)
+        world.person.type(b"/resume\r")
+
+    world.loop.call_later(rng.random() * 0.2, typed)
+    return 2.0
+
+
+def two_stops(world: World, rng: Random) -> float:
+    """Stop; the thread of the next stop is held up as it has written, while the loop takes over the first one."""
+    if world.person._coming:
+        return stop_at_a_write(world, rng)
+    names = [each for each in points() if each.startswith(TAKING_OVER)]
+    own = 200 + int(rng.random() * OWN_WORK)
+    aim = Aim(rng.choice(names), 1, rng.choice((0, 0, 2)), own, 3000 + int(rng.random() * 20_000))
+    world.stops += 1
+    between = world.command(rng) + world.command(rng) * (rng.random() < 0.5)
+    world.process.run(world.person.read, STOP + between)
+    world.stops += 1
+    world.person.type_stop(aim)
+    world.person.type(b"/resume\r")
+    return 1.0
+
+
+def stop_at_a_full_port(world: World, rng: Random) -> float:
+    """Stop while the ports take few bytes at a time, mostly none."""
+    _spell(world, 0.2 + rng.random(), {"full": 0.5 + rng.random() * 0.45, "part": 0.9})
+    _operators(world, rng, [rng.choice(world.places)], rng.randrange(1, 4))
+    for _ in range(rng.randrange(1, 3)):
+        later(world, rng.random() ** 2 * 0.3, STOP + b"/resume\r")
+    return 2.0
+
+
+def stop_while_owed(world: World, rng: Random) -> float:
+    """Send a program, and stop as the session writes down what it owes the drive."""
+    download(world, rng)
+    until = world.loop.now + WAIT
+
+    def look() -> None:
+        if world.ending or not world.ready.is_set() or world.loop.now > until:
+            return
+        talks = [each for bus in world.session.buses.values() for each in bus._conversations.under_way]
+        if any(each._keeping is not None and not each._keeping.done() for each in talks):
+            world.stops += 1
+            return world.person.type(STOP + b"/resume\r")
+        world.loop.call_later(LOOK, look)
+
+    look()
+    return 3.0
+
+
+def stop_at_usb(world: World, rng: Random) -> float:
+    """Stop while controllers on USB take their packets late."""
+    if not world.kernel.usb.plugged:
+        return stop_at_a_full_port(world, rng)
+    _spell(world, 2.0, {"usb held": 0.3 + rng.random() * 0.5, "usb missing": rng.random() * 0.5, "usb late": 0.3})
+    places = [each for each in world.places if each.kind == "usb"]
+    _operators(world, rng, places, rng.randrange(1, 4))
+    for _ in range(rng.randrange(1, 4)):
+        later(world, rng.random() * 1.5, STOP + b"/resume\r")
+    return 3.0
+
+
+# Losses, kills, automation
+
+
+def other_transactions(world: World, rng: Random) -> float:
+    """Let replies over Modbus come late, twice, or with the number of another transaction."""
+    places = [each for each in world.places if each.kind == "modbus"]
+    if not places:
+        return at_each_drive_late(world, rng)
+    _spell(world, 4.0, {"reply again": 0.3, "reply of another": 0.2, "reply late": 0.3})
+    _operators(world, rng, places, 3)
+    return 4.0
+
+
+def kill_at_a_file(world: World, rng: Random) -> float:
+    """Kill the session, or the PC, at an operation on the disk."""
+    name = f"m{rng.randrange(3)}"
+    line, another_one = world.command(rng), world.command(rng)
+    verbs = (
+        b"/record %s --replace\r" % name.encode() + line + b"/record stop\r",
+        b"/key F2 %s\r" % name.encode() + b"/key F3 %s\r" % name.encode(),
+        line + another_one,
+    )
+    world.kill(1 + int(rng.random() ** 2 * 16), rng.choice(("before", "within", "within", "after")), False, "disk")
+    world.person.type(rng.choice(verbs))
+    if rng.random() < 0.4:
+        download(world, rng)
+    return 3.0
+
+
+def nodes_exchanged(world: World, rng: Random) -> float:
+    """Pull all adapters, and plug them in so that each has the node of another."""
+    adapters = world.kernel.adapters
+    if len(adapters) < 2:
+        return at_each_drive(world, rng)
+    nodes = [each.node for each in adapters]
+    for adapter in adapters:
+        world.floor.command(f"/sim unplug {adapter.line}")
+
+    def plug() -> None:
+        for adapter in adapters:
+            world.floor.command(f"/sim plug {adapter.line}")
+        for adapter, node in zip(adapters, nodes[1:] + nodes[:1], strict=True):
+            adapter.node = node or adapter.node
+        _operators(world, rng, world.places)
+
+    world.loop.call_later(0.1 + rng.random(), plug)
+    return 4.0
+
+
+def beside_a_mover(world: World, rng: Random) -> float:
+    """Start a drive by hand, and run a script on another drive of its line that ends early."""
+    places = [each for each in world.places if len(each.drives) > 1 and PHRASES[each.language].endless]
+    if not places or world.climate.wire.harmful:
+        return at_each_drive(world, rng)
+    place = rng.choice(places)
+    first, second = rng.sample(place.names, 2)
+    phrases = PHRASES[place.language]
+    text = phrases.motion.format(phrases.first_motion + number(world))
+    typed = f"@{target(place, first)} {text}"
+    world.history.commands[typed] = Command(text, place.name, first, world.loop.now, world.stops)
+    world.person.type(f"{typed}\r".encode())
+    run = Run(f"m{world.step}", f"/play m{world.step}", automatic=True)
+    lines = Lines(world, rng, run, place.name, second, f"@{target(place, second)}", phrases)
+    steps = [*motion(lines), *pause(lines), *(refused(lines) if rng.random() < 0.7 else ["/sleep 2"])]
+    folder = world.session.settings.macros
+    folder.mkdir(parents=True, exist_ok=True)
+    text = f'name = "{run.name}"\n' + "".join(f"[[step]]\nafter = 0.1\nline = '{step}'\n" for step in steps)
+    (folder / f"{run.name}.toml").write_text(text)
+    tell(world, run)
+    later(world, 0.5, f"{run.typed}\r".encode())
+    later(world, 1.5 + rng.random(), b"/play stop\r")
+    return 9.0
+
+
+CREWS = (
+    Act("operators at once", 4, at_each_drive),
+    Act("operators at once, late replies", 3, at_each_drive_late, fault=True),
+    Act("operators at once, noise", 2, at_each_drive_in_noise, fault=True),
+    Act("two at a share", 2, two_at_a_share),
+    Act("stop at a write", 4, stop_at_a_write),
+    Act("two stops", 2, two_stops),
+    Act("stop at a full port", 3, stop_at_a_full_port, fault=True),
+    Act("stop while owed", 2, stop_while_owed),
+    Act("stop at USB", 2, stop_at_usb, fault=True),
+    Act("other transactions", 2, other_transactions, fault=True),
+    Act("kill at a file", 2, kill_at_a_file),
+    Act("nodes exchanged", 1, nodes_exchanged, fault=True),
+    Act("beside a mover", 2, beside_a_mover),
+)
