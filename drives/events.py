@@ -164,29 +164,51 @@ E = TypeVar("E")
 Watcher = Callable[[BusEvent], None]
 
 
-class Publisher(Generic[E]):
-    """Passes events to its subscribers, in the order of subscription. `name` is theirs in the log of defects.
+class Subscribers(dict[type, tuple[Callable[[E], None], ...]]):
+    """The callbacks for each kind of event, in the order of subscription; found at the first event of a kind."""
 
-    A subscriber that fails affects neither the others nor the caller.
-    """
+    def __init__(self) -> None:
+        super().__init__()
+        self._all: tuple[tuple[Callable[[E], None], tuple[type, ...]], ...] = ()
+        """The subscriptions: a callback and the kinds that it takes, none for all."""
 
-    def __init__(self, name: str) -> None:
-        self._callbacks: tuple[Callable[[E], None], ...] = ()
-        self._isolated = isolated(name)
+    def __missing__(self, kind: type) -> tuple[Callable[[E], None], ...]:
+        found = self[kind] = tuple(callback for callback, kinds in self._all if not kinds or kind in kinds)
+        return found
 
-    def subscribe(self, callback: Callable[[E], None]) -> Callable[[], None]:
-        """Call back with every event, from the event loop. The function returned ends the subscription."""
-        self._callbacks = (*self._callbacks, callback)
+    def add(self, callback: Callable[[E], None], kinds: tuple[type, ...]) -> Callable[[], None]:
+        added = (callback, kinds)
+        self._all = (*self._all, added)
+        self.clear()
 
         def leave() -> None:
-            if callback in self._callbacks:
-                at = self._callbacks.index(callback)
-                self._callbacks = self._callbacks[:at] + self._callbacks[at + 1 :]
+            self._all = tuple(each for each in self._all if each is not added)
+            self.clear()
 
         return leave
 
+
+class Publisher(Generic[E]):
+    """Passes events to its subscribers, in the order of subscription. `name` is theirs in the log of defects.
+
+    A subscriber that fails affects neither the others nor the caller. `kind`: returns the kind of an event.
+    """
+
+    def __init__(self, name: str, kind: Callable[[E], type] = type) -> None:
+        self._kind = kind
+        self.subscribers = Subscribers[E]()
+        self._isolated = isolated(name)
+
+    def subscribe(self, callback: Callable[[E], None], *kinds: type) -> Callable[[], None]:
+        """Call back with every event of these kinds, by default of all, from the event loop.
+
+        The function returned ends the subscription.
+        """
+        return self.subscribers.add(callback, kinds)
+
     def publish(self, event: E) -> None:
-        callbacks, over = iter(self._callbacks), False
+        subscribers = self.subscribers[self._kind(event)]
+        callbacks, over = iter(subscribers), not subscribers
         while not over:  # after a subscriber that fails, the next one
             with self._isolated:
                 for callback in callbacks:
@@ -218,10 +240,18 @@ class EventQueue(Publisher[BusEvent]):
         """Publish what was collected; called by a watcher, it leaves that to the call under way."""
         if self._telling or not self._events:
             return
-        self._telling = True
+        self._telling, event, callbacks = True, self._events[0], iter(tuple[Watcher]())
         try:
-            while self._events:
-                super().publish(self._events.popleft())
+            while self._telling:
+                with self._isolated:
+                    for callback in callbacks:  # after a watcher that fails, the next one
+                        callback(event)
+                    while self._events:
+                        event = self._events.popleft()
+                        callbacks = iter(self.subscribers[type(event)])
+                        for callback in callbacks:
+                            callback(event)
+                    self._telling = False
         finally:
             self._telling = False
 

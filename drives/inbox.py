@@ -246,6 +246,7 @@ class LocalEcho:
 
     def __init__(self) -> None:
         self.own = b""
+        """The bytes whose repetition is awaited; empty: none."""
         self.held = b""
         """Bytes received while the repetition is incomplete."""
 
@@ -327,10 +328,6 @@ class Inbox:
         self.buffer = b""
 
     # Local echo
-
-    @property
-    def awaits_echo(self) -> bool:
-        return self.echo is not None and self.echo.own != b""
 
     def wrote(self, data: bytes, now: float) -> None:
         """Expect the repetition of these bytes, if the adapter repeats them."""

@@ -25,7 +25,7 @@ from typing import NamedTuple
 from multidrop.dialects import Codec, Decoded, End, Kind, Priority, Reply, Request, StopPiece
 from multidrop.dialects.codec import copy_with
 from multidrop.drives.events import Transaction, Unsolicited
-from multidrop.drives.inbox import NEVER_QUIET, TAIL, Doubt, Inbox
+from multidrop.drives.inbox import NEVER_QUIET, TAIL, Doubt, Inbox, LocalEcho
 
 DEFAULT_TIMEOUT = 1.0
 """Longest wait for a reply after the last byte, s, unless a URL gives `timeout`."""
@@ -63,6 +63,8 @@ class Flight:
     sent: bool = True
     judged_length: int = -1
     """Length of the bytes about which quiet was consulted last."""
+    due: tuple[float, float] | None = None
+    """Its `times` with the bytes received so far; None until they are asked for."""
 
     def times(self, buffer: bytes, default: float) -> tuple[float, float]:
         """Times at which quiet ends a reply without an end of its own, and at which the request times out.
@@ -177,7 +179,7 @@ class Line:
 
     def receive(self, data: bytes, now: float) -> None:
         if isinstance(self._state, Flight):
-            self._state.received_at = now
+            self._state.received_at, self._state.due = now, None
         else:
             self.printed_at = now
         self.inbox.receive(data, now)
@@ -267,7 +269,8 @@ class Line:
         """Make one transition; return whether another may follow."""
         if isinstance(self._state, Flight):
             flight = self._state
-            found = self._without_echo(flight, now) if self.inbox.awaits_echo else self._decoded(flight, now)
+            echo = self.inbox.echo
+            found = self._without_echo(flight, echo, now) if echo and echo.own else self._decoded(flight, now)
             if found is not None:
                 self._finish(flight, found, now)
             return found is not None
@@ -325,11 +328,11 @@ class Line:
         """The reply, if it is whole, if quiet ends it, or if time is up."""
         codec, request, buffer = flight.request.codec, flight.request, self.inbox.buffer
         if not self._takes_reply(flight):
-            return codec.on_timeout(request, b"") if now >= flight.times(buffer, self.timeout)[1] else None
+            return codec.on_timeout(request, b"") if now >= self._times(flight)[1] else None
         found = codec.decode(request, buffer) if buffer else None
         if found is not None:
             return found
-        quiet, timeout = flight.times(buffer, self.timeout)
+        quiet, timeout = self._times(flight)
         if flight.judged_length != len(buffer) and now >= quiet:
             flight.judged_length = len(buffer)
             found = codec.on_quiet(request, buffer)
@@ -337,14 +340,18 @@ class Line:
             return codec.on_timeout(request, buffer)
         return found
 
+    def _times(self, flight: Flight) -> tuple[float, float]:
+        if flight.due is None:
+            flight.due = flight.times(self.inbox.buffer, self.timeout)
+        return flight.due
+
     def _takes_reply(self, flight: Flight) -> bool:
         """Whether what comes is the reply to it: not if a stop of another thread kept it back, or has left since."""
         return flight.sent and not self.overtaken
 
-    def _without_echo(self, flight: Flight, now: float) -> Decoded | None:
+    def _without_echo(self, flight: Flight, echo: LocalEcho, now: float) -> Decoded | None:
         """The end of a request whose bytes were not repeated unchanged: no reply can be trusted."""
-        echo = self.inbox.echo
-        if echo is None or now < flight.times(self.inbox.buffer, self.timeout)[1]:
+        if now < self._times(flight)[1]:
             return None
         held = echo.forget().decode("latin-1")
         if not held:
@@ -365,11 +372,11 @@ class Line:
     def deadline(self) -> float | None:
         """Time of the next internal event; None if only new input can cause one."""
         if isinstance(self._state, Flight):
-            buffer, flight = self.inbox.buffer, self._state
-            quiet, timeout = flight.times(buffer, self.timeout)
-            by_quiet = flight.judged_length != len(buffer) and not self.inbox.awaits_echo
-            by_quiet = by_quiet and self._takes_reply(flight)
-            return min(timeout, quiet) if by_quiet else timeout
+            flight, echo = self._state, self.inbox.echo
+            quiet, timeout = flight.due or self._times(flight)
+            if flight.judged_length == len(self.inbox.buffer) or (echo and echo.own):
+                return timeout
+            return min(timeout, quiet) if self._takes_reply(flight) else timeout
         tail = self.inbox.tail_at()
         if not (isinstance(self._state, Recovering) and (self._queue or self._repeats)):
             return tail

@@ -16,7 +16,7 @@ from typing import Any, TypeVar
 from multidrop.dialects import Diagnostic, Procedure, Stopped
 from multidrop.drives.drive import Drive
 from multidrop.drives.events import Publisher
-from multidrop.shell.events import By, Notified, Output, Progressed, SessionEvent, StateChanged
+from multidrop.shell.events import By, Notified, Output, Progressed, SessionEvent, StateChanged, kind_of
 from multidrop.shell.roles import Transcripts
 
 T = TypeVar("T")
@@ -83,7 +83,7 @@ class Channel(Publisher[SessionEvent]):
     """Publishes the events of a session on its clock."""
 
     def __init__(self) -> None:
-        super().__init__("a front end")
+        super().__init__("a front end", kind_of)
         self.front = Front()
         """The front end, as far as it can be asked."""
 

@@ -255,3 +255,8 @@ SessionEvent = (
     | SettingsRead
     | StateChanged
 )
+
+
+def kind_of(event: SessionEvent) -> type:
+    """The type of an event; for an event of a bus, the type of that."""
+    return type(event.event if isinstance(event, OnBus) else event)

@@ -20,7 +20,6 @@ from multidrop.dialects import Command, Diagnostic, DriveError, Refused, Stopped
 from multidrop.dialects.on_demand import imported
 from multidrop.drives.bus import Bus
 from multidrop.drives.drive import Drive
-from multidrop.drives.events import BusEvent, Changed
 from multidrop.shell.automation import AGREED, ENDING, Automations, only_ends
 from multidrop.shell.configuration import Settings
 from multidrop.shell.connect.opening import Opener, open_buses
@@ -102,6 +101,7 @@ class Session(Workspace):
         self.openings = Openings(self, opener or partial(open_buses, state=self.settings.state), lazy, raw, tried)
         self._background: dict[asyncio.Task[Any], None] = {}
         self.on_opened.append(lambda bus: self.units.opened(bus))
+        self.on_changed.append(self.twins.changed)
 
     # Buses
 
@@ -150,11 +150,6 @@ class Session(Workspace):
         """Close a bus and drop everything known of it, its twins too."""
         self.twins.stop(bus)
         await super().forget(bus)
-
-    def _on_bus(self, bus: Bus, event: BusEvent) -> None:
-        super()._on_bus(bus, event)
-        if isinstance(event, Changed):
-            self.twins.changed(bus)
 
     # The path of a command
 

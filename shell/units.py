@@ -95,7 +95,7 @@ class Units:
         self.shown = True
         """Positions are shown in units where an axis has a scale."""
         self._axes: WeakKeyDictionary[Drive, dict[str, Axis]] = WeakKeyDictionary()
-        workspace.subscribe(self._overhear)
+        workspace.subscribe(self._overhear, Unsolicited)
 
     def _overhear(self, event: SessionEvent) -> None:
         """Note the commands of others that show: an echo of another master's, or a program's print for a drive."""

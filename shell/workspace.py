@@ -16,13 +16,13 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 from multidrop.dialects import Diagnostic, NoAnswer
-from multidrop.drives.events import BusEvent, Changed, Lost, Notice, Unsolicited, isolated
+from multidrop.drives.events import BusEvent, Changed, Conditioned, Lost, Notice, Sample, Unsolicited, isolated
 from multidrop.macros import MacroStore, Recorder
 from multidrop.shell import stop_report
 from multidrop.shell.channel import Channel, Questions, Tasks, UnderWay
 from multidrop.shell.configuration import Settings
 from multidrop.shell.connect.reconnect import Reconnections
-from multidrop.shell.events import Failed, Notified, OnBus, StateChanged
+from multidrop.shell.events import Failed, Notified, OnBus, Printed, StateChanged
 from multidrop.shell.line_syntax import EVERYONE, Place, join_target
 from multidrop.shell.playing import Playing, played_by
 from multidrop.shell.remembered import KnownNames, Lately, Observing
@@ -106,8 +106,8 @@ class Workspace(Channel):
         self.recorder = Recorder()
         self.lately = Lately()
         """The last lines that drives printed."""
-        self.subscribe(self.lately.take)
-        self.subscribe(Observing(self.recorder, lambda: self.buses).take)
+        self.subscribe(self.lately.take, Printed, Unsolicited)
+        self.subscribe(Observing(self.recorder, lambda: self.buses).take, Conditioned, Unsolicited, Sample)
         self.names = KnownNames()
         """The labels and variables that were read, for completion."""
         self.log: OpenLog | None = None
@@ -115,6 +115,8 @@ class Workspace(Channel):
         """An axis may have a scale."""
         self.on_opened: list[Callable[[Bus], Awaitable[None]]] = []
         """Awaited with each bus whose drives were found, where an axis may have a scale."""
+        self.on_changed: list[Callable[[Bus], None]] = []
+        """Called with each bus that has changed, once that is published."""
         self.plots: list[RunningPlot] = []
         self.plotted: tuple[Series, ...] = ()
         """The series that the screen plots; empty: the selected drive."""
@@ -364,13 +366,12 @@ class Workspace(Channel):
         return self.recorder.name
 
     def _on_bus(self, bus: Bus, event: BusEvent) -> None:
-        name, record = bus.name, self._open.get(bus)
+        name, record = bus.link.name, self._open.get(bus)
         if record is not None and record.annotators and isinstance(event, Unsolicited):
             for annotate in record.annotators:
                 event = event._replace(lines=tuple(map(annotate, event.lines)))
-        if not (
-            record is not None and record.raw is not None and isinstance(event, Unsolicited)
-        ):  # its bytes are shown
+        shown_as_bytes = record is not None and record.raw is not None and isinstance(event, Unsolicited)
+        if self.subscribers[type(event)] and not shown_as_bytes:
             self.publish(OnBus(name, event))
         if isinstance(event, Lost):
             if self.reconnections.lost(self.buses[name]):  # wanted and possible: tried again
@@ -382,6 +383,8 @@ class Workspace(Channel):
             self.publish(Notified(event.at, text, name, event.warning))
         elif isinstance(event, Changed):
             self.publish(StateChanged(event.at))
+            for changed in self.on_changed:
+                changed(bus)
 
 
 def _in_order(opened: dict[Bus, OpenBus]) -> tuple[dict[Bus, OpenBus], dict[str, Bus]]:

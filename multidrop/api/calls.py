@@ -91,7 +91,7 @@ class Calls:
     def open(self, shell: Session) -> None:
         """Take the session that the calls are for; `begin` follows."""
         self._shell, self._closing = shell, False
-        shell.subscribe(_collect)
+        shell.subscribe(_collect, Printed, Output)
 
     def closing(self) -> bool:
         """Refuse further calls, as the session is being closed; return False where it was before."""

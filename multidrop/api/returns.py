@@ -49,7 +49,7 @@ class Returns:
         self._refused: set[tuple[Drive, str]] = set()
         """Parts that a drive refuses: each refusal may start a subroutine for errors in it."""
         self._following = asyncio.get_running_loop().create_task(self._follow())
-        self._leave = shell.subscribe(self._take)
+        self._leave = shell.subscribe(self._take, Lost, Changed)
 
     def close(self) -> None:
         """End it."""

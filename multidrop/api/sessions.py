@@ -119,7 +119,7 @@ class AsyncSession:
         shell = Shell(load(), reconnect=self._reconnect)
         shell.questions.agreed, shell.questions.beyond = self._yes, self._beyond
         shell.front = Front(way="connect(URL, yes=True)", beyond="beyond=True")
-        shell.subscribe(self._take)
+        shell.subscribe(self._take, Notified)
         self._calls.open(shell)
         if self._reconnect:
             self._calls.returns = Returns(shell)

@@ -58,7 +58,7 @@ class ReportedSession(Session):
         self._failed: tuple[BaseException, Result] | None = None
         """The last call, if it failed, and its result: the program may end with it, or go on."""
         super().__init__(yes=yes, beyond=beyond, notice=notice)
-        self._awaited._shell.subscribe(self._take)
+        self._awaited._shell.subscribe(self._take, Entered, Printed, Output)
 
     def _take(self, event: SessionEvent) -> None:
         if isinstance(event, Entered):

@@ -291,7 +291,9 @@ def attach(workspace: Session, plot: Plot, series: Sequence[Series], period: flo
     wanted, buses = set(series), {each.bus for each in series}
     for bus, address, _ in series:
         plot.label(bus, address, workspace.buses[bus].drives[address].label)
-    ends: list[Callable[[], None]] = [workspace.subscribe(partial(_take, workspace, plot, wanted, buses))]
+    ends: list[Callable[[], None]] = [
+        workspace.subscribe(partial(_take, workspace, plot, wanted, buses), *OF_BUSES, *OF_TWINS, *OF_LINES)
+    ]
     for bus in sorted(buses):
         ends += _polls(
             workspace.buses[bus].telemetry, [each for each in dict.fromkeys(series) if each.bus == bus], period
@@ -307,6 +309,11 @@ def attach(workspace: Session, plot: Plot, series: Sequence[Series], period: flo
 
     plot.on_failure(failed)
     return detach
+
+
+OF_BUSES = Sample, Valued, Conditioned, Lost, Unsolicited
+OF_TWINS = events.Predicted, events.Diverged, events.Agreed, events.TwinEnded
+OF_LINES = events.Entered, events.Printed, events.Failed, events.Notified
 
 
 def _take(workspace: Session, plot: Plot, wanted: set[Series], buses: set[str], event: events.SessionEvent) -> None:
@@ -387,7 +394,7 @@ def _twin(plot: Plot, wanted: set[Series], bus: str, event: events.TwinEvent) ->
 
 def _log(plot: Plot, buses: set[str], event: events.SessionEvent) -> None:
     """Log an event of these buses, or of no bus (a verb)."""
-    if not isinstance(event, events.Entered | events.Printed | events.Failed | events.Notified) or event.bus not in {
+    if not isinstance(event, OF_LINES) or event.bus not in {
         *buses,
         "",
     }:

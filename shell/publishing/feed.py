@@ -223,7 +223,7 @@ class Feed(Outlet):
     async def begin(self) -> None:
         await self._publisher.begin()
         self._say_about()
-        self._leave = self._session.subscribe(self._take)
+        self._leave = self._session.subscribe(self._take, Unsolicited, Entered, Printed, Notified, Failed)
         self._task = asyncio.get_running_loop().create_task(self._looking())
 
     async def end(self) -> str:

@@ -213,7 +213,7 @@ class Registry:
         """The time of the last value on both clocks: all values of one sample have the same time."""
 
     def begin(self) -> None:
-        self._leave = self.session.subscribe(self._take)
+        self._leave = self.session.subscribe(self._take, Lost, Changed, Sample, Silent, Conditioned)
         for bus in self.session.buses.values():
             self.add(bus)
 

@@ -5,12 +5,12 @@ from __future__ import annotations
 import asyncio
 import contextlib
 from collections import deque
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextvars import ContextVar
 from itertools import islice
 
 from multidrop.drives.events import Unsolicited
-from multidrop.shell.channel import Callback
+from multidrop.shell.channel import Channel
 from multidrop.shell.events import Entered, OnBus, Output, Printed, SessionEvent
 
 KEPT = 10_000
@@ -77,9 +77,9 @@ class Hearing:
 
 
 @contextlib.contextmanager
-def hearing(subscribe: Callable[[Callback], Callable[[], None]]) -> Iterator[Hearing]:
+def hearing(channel: Channel) -> Iterator[Hearing]:
     heard = Hearing()
-    leave = subscribe(heard.take)
+    leave = channel.subscribe(heard.take, Entered, Printed, Output, Unsolicited)
     token = _current.set(heard)
     try:
         yield heard

@@ -59,7 +59,7 @@ async def ended_by_loss(execution: Execution, buses: Collection[str]) -> AsyncIt
             losses.append(loss)
             task.cancel()
 
-    leave = execution.session.subscribe(take)
+    leave = execution.session.subscribe(take, Lost)
     try:
         yield
     except asyncio.CancelledError:
@@ -79,7 +79,7 @@ async def ended_by_loss(execution: Execution, buses: Collection[str]) -> AsyncIt
 async def run_script(session: Session, script: Script, executed: Executed = lambda result: None) -> None:
     """Execute a script. `executed` gets the result of each line. Raises the first failure."""
     own = script_claims(session, script)
-    with hearing(session.subscribe) as heard:
+    with hearing(session) as heard:
         execution = Execution(session, heard, executed)
         async with (
             session.automations.run(f"script {script.file}", own),
@@ -92,7 +92,7 @@ async def run_script(session: Session, script: Script, executed: Executed = lamb
 
 async def run_typed(session: Session, lines: Sequence[str], executed: Executed) -> None:
     """Execute typed lines in turn, without values and verbs of scripts. Raises the first failure."""
-    with hearing(session.subscribe) as heard:
+    with hearing(session) as heard:
         execution = Execution(session, heard, executed)
         for count, text in enumerate(lines, 1):
             await execution.line(ScriptLine("", count, text), Frame(None, By.OPERATOR))
@@ -126,7 +126,7 @@ async def play(
     own = macro_claims(session, played, roles)
     claimed = sorted({link.name for link, _ in own})  # a set of links has another order in each run
     state, ports = session.settings.state, {bus: session.of(session.buses[bus]).port for bus in claimed}
-    with hearing(session.subscribe) as heard, crash_marks.playing(state, ports.values(), name, session.wall(begun)):
+    with hearing(session) as heard, crash_marks.playing(state, ports.values(), name, session.wall(begun)):
         execution = Execution(session, heard, executed)
         async with (
             session.automations.run(f"macro {name}", own),

@@ -312,7 +312,7 @@ class FakeSession:
             self.addresses[self.selected_bus] = address
         self.emit(StateChanged(self.time))
 
-    def subscribe(self, callback: Callable[[SessionEvent], None]) -> Callable[[], None]:
+    def subscribe(self, callback: Callable[[SessionEvent], None], *kinds: type) -> Callable[[], None]:
         self._callbacks.append(callback)
         return lambda: self._callbacks.remove(callback)
 

@@ -138,6 +138,16 @@ def _line_of(expect: str) -> re.Pattern[bytes]:
     return re.compile(rb"(?:\A|\n)(?:" + expect.encode("latin-1") + rb")\r?\n")
 
 
+def without_end(request: Request, buffer: bytes, em: int, checksum: int) -> bool:
+    """Whether certainly no reply is whole: each ends in a line, or begins with one or with ACK or NAK.
+
+    Bytes come one by one on a slow line, and the parser begins at the first one each time.
+    """
+    if b"\n" in buffer or (em == 0 and checksum == 2):  # a running program leaves no sign before that prompt
+        return False
+    return request.kind is Kind.PRINT or not checksum or not (framing.ACK in buffer or framing.NAK in buffer)
+
+
 ESCAPE, CONTROL_E = b"\x1b", b"\x05"
 EVERY_DRIVE = ("*", "^")
 LIST_PROMPT = re.compile(rb"[\n\x06\x15][>?]|[>?]\Z")
@@ -218,6 +228,8 @@ class MCode(Codec):
         return ReplyParser(request, self.em, self.checksum, self._body(request), buffer)
 
     def decode(self, request: Request, buffer: bytes) -> Decoded | None:
+        if without_end(request, buffer, self.em, self.checksum):
+            return None
         if not self.checksum and self.em in (1, 2):
             if (found := short_reply(request, buffer)) is not None:
                 return found

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from multidrop.dialects import Decoded, End, Inexpressible, Kind, Reply
-from multidrop.dialects.mcode.host.codec import MCode, only_strays, short_reply
+from multidrop.dialects.mcode.host.codec import MCode, only_strays, short_reply, without_end
 from multidrop.dialects.mcode.host.framing import checksum, pieces, printable, sealed, unasked, unsealed
 from multidrop.dialects.mcode.host.reply_parser import ReplyParser
 from tests.support.cases import for_each
@@ -334,6 +334,19 @@ def test_among_strays_only_the_parser_finds_no_reply(buffer, em, text, gather):
     request = replace(MCode(em=em).request("", text), gather=gather)
     if only_strays(request, buffer):
         assert ReplyParser(request, em, 0, text.encode(), buffer).whole() is None
+
+
+@given(
+    buffer=BUFFERS,
+    em=st.sampled_from([0, 1, 2, 3]),
+    checksum=st.sampled_from([0, 1, 2]),
+    text=st.sampled_from([*ASKED, "PG 100", "PR P;"]),
+    head=st.sampled_from([b"", b"MR 5", b"PR P", b"PG 100"]),
+)
+def test_without_an_end_the_parser_finds_no_reply(buffer, em, checksum, text, head):
+    request = MCode(em=em, checksum=checksum).request("", text)
+    if without_end(request, head + buffer, em, checksum):
+        assert ReplyParser(request, em, checksum, text.encode(), head + buffer).whole() is None
 
 
 def test_a_flood_of_prints_is_known_to_hold_no_reply():

@@ -101,7 +101,7 @@ class Session:
         self.narrated: list[str] = []
         self.scaled = False
 
-    def subscribe(self, callback: Callable[[SessionEvent], None]) -> Callable[[], None]:
+    def subscribe(self, callback: Callable[[SessionEvent], None], *kinds: type) -> Callable[[], None]:
         self.callbacks.append(callback)
         return lambda: self.callbacks.remove(callback)
 
