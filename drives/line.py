@@ -221,7 +221,7 @@ class Line:
             self._events.append(Finished(each.ticket, ended))
         self.inbox.stop(flight.request if flight is not None else None)
         added = [each for each in repeats if each.data]
-        pending = self._repeats if only is not None else [each for each in self._repeats if _taken_from(added, each)]
+        pending = [each for each in self._repeats if _taken_from(added, each) or only is not None]
         self._repeats = [*pending, *added]
         held_up = float("inf")
         if pending and isinstance(self._state, Recovering):  # further stops interrupt the wait of the pieces

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from multidrop.dialects import StopPiece
 from multidrop.drives.inbox import LONGEST_TAIL
 from multidrop.drives.line import Flight
 from soak.simulation.terminal import LIMIT
@@ -34,11 +36,19 @@ def _unended(bus: Bus) -> int:
     return 0 if isinstance(line._state, Flight) or line.inbox.codec.numbered else len(line.inbox.buffer)
 
 
+ALIKE = 6
+"""The most pieces of one stop that are alike: a form has up to three, and a stop has one for each kind of settings."""
+
+
+def _most_alike(pieces: list[StopPiece]) -> int:
+    return max(Counter(pieces).values(), default=0)
+
+
 BOUNDS = (
     Bound("bytes before a terminal", LIMIT, lambda world: iter((world.terminal.most,))),
     Bound("bytes of a print without an end", LONGEST_TAIL, _lines(_unended)),
     Bound("bytes before a port", 4096, _lines(lambda bus: bus.link.transport.pending)),
-    Bound("pieces of a stop", 64, _lines(lambda bus: len(bus.link.line._repeats))),
+    Bound("times that one piece of a stop waits", ALIKE, _lines(lambda bus: _most_alike(bus.link.line._repeats))),
 )
 
 

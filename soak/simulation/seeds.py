@@ -77,6 +77,7 @@ FIXED = {
     200066: "the rest of a Modbus message that was half-sent at a stop (of the simulation itself)",
     400424: "a reply that may have been another one's, taken for proof as the line was lost in the question after it",
     403738: "a program `ssh` that was left as its login was cancelled in the moment of its time-out",
+    430108: "one stop of three modules, whose motors were not counted yet (of the simulation itself)",
 }
 DERIVED = 12
 """The number of seeds that follow from the commit."""

@@ -216,12 +216,13 @@ def test_a_stop_key_that_is_held_down_keeps_no_piece_of_the_stop_from_the_wire(e
     assert written[:3] == [b"one", b"two", b"three"] and len(written) >= 9
 
 
-def test_every_piece_follows_the_last_of_several_stops():
+@pytest.mark.parametrize("only", [None, {"a"}])
+def test_every_piece_follows_the_last_of_several_stops_and_waits_once(only):
     line = Line(MCode())
     pieces = [StopPiece(name, 0.03) for name in (b"one", b"two", b"three")]
-    line.stop(0.0, *pieces)
+    line.stop(0.0, *pieces, only=only)
     assert [event.data for event in line.events(0.031) if isinstance(event, Write)] == [b"one"]
-    line.stop(0.04, *pieces)
+    line.stop(0.04, *pieces, only=only)
     written, now = [], 0.04
     while now < 1.0:
         written += [event.data for event in line.events(now) if isinstance(event, Write)]
