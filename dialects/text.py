@@ -1,4 +1,4 @@
-r"""Text from elsewhere: whole numbers in it, and control and direction characters made visible (`\x1b`).
+r"""Text from elsewhere: numbers in it, and control and direction characters made visible (`\x1b`).
 
 A drive, a file, a name or a typed line may hold such characters. To a terminal they are commands: OSC 52 sets the
 clipboard, and a C1 code is an escape sequence in one character. Direction characters show text in another order.
@@ -53,6 +53,14 @@ def whole(text: str, low: int, high: int) -> int | None:
         return None
     number = int(text)
     return number if low <= number <= high else None
+
+
+def real(text: str) -> float | None:
+    """Return the number in a text; None where it is none."""
+    try:
+        return float(text)
+    except ValueError:
+        return None
 
 
 def counted(number: int, one: str, many: str = "") -> str:

@@ -20,6 +20,7 @@ from multidrop.dialects.codec import Priority, Procedure
 from multidrop.dialects.errors import Refused
 from multidrop.dialects.files import rows
 from multidrop.dialects.state import DriveState
+from multidrop.dialects.text import real
 
 # Settings, and the steps that change them
 
@@ -271,10 +272,9 @@ class Part(Generic[S]):
 
 def printed_number(who: str, word: str, text: str) -> float:
     """Convert a printed value. Raises Refused where it is not one number."""
-    try:
-        return float(text)
-    except ValueError:
-        raise Refused(f"{who}: {word} is not a number: {text.strip() or 'nothing'}") from None
+    if (found := real(text)) is None:
+        raise Refused(f"{who}: {word} is not a number: {text.strip() or 'nothing'}")
+    return found
 
 
 @dataclass(frozen=True)

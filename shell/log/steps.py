@@ -12,7 +12,7 @@ from datetime import datetime
 from pathlib import Path
 
 from multidrop.dialects import Diagnostic
-from multidrop.dialects.text import visible
+from multidrop.dialects.text import real, visible
 from multidrop.shell.line_syntax import WAITS
 from multidrop.shell.log.files import BEGIN, TRAFFIC, Entry, Line, whole
 from multidrop.shell.secrets import HIDDEN
@@ -162,7 +162,7 @@ def compared(step: Step, printed: list[str], failed: str, moving: bool) -> str:
         return f"then {step.failed or 'no error'}; now {failed or 'no error'}"
 
     def alike(then: str, now: str) -> bool:
-        return then == now or (moving and _is_number(then) and _is_number(now))
+        return then == now or (moving and None not in (real(then), real(now)))
 
     if len(printed) == len(step.printed) and all(map(alike, step.printed, printed)):
         return ""
@@ -178,14 +178,6 @@ def errors_differ(then: str, now: str) -> bool:
 def _number_of_error(text: str) -> str:
     after = text.partition(" error ")[2]
     return after[: len(after) - len(after.lstrip("0123456789"))]
-
-
-def _is_number(text: str) -> bool:
-    try:
-        float(text)
-    except ValueError:
-        return False
-    return True
 
 
 def _quoted(lines: Iterable[str]) -> str:

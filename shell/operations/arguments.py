@@ -9,6 +9,8 @@ import argparse
 from collections.abc import Iterator, Mapping
 from typing import Any
 
+from multidrop.dialects.text import real
+
 HOST = "127.0.0.1"
 KEYS = [f"F{number}" for number in range(2, 13)]
 NONE = None
@@ -53,25 +55,17 @@ def rounds(text: str) -> int | None:
 
 
 def duration(text: str) -> float:
-    found = _any_number(text)
+    found = real(text) or 0.0
     if not 0 < found <= 1e7:
         raise argparse.ArgumentTypeError(f"{text} is not a number of seconds above 0")
     return found
 
 
 def speed(text: str) -> float:
-    found = _any_number(text)
+    found = real(text) or 0.0
     if not 0.001 <= found <= 1000:
         raise argparse.ArgumentTypeError(f"{text} is not a number from 0.001 to 1000")
     return found
-
-
-def _any_number(text: str) -> float:
-    """Read a number; 0, which no argument takes, for anything else."""
-    try:
-        return float(text)
-    except ValueError:
-        return 0.0
 
 
 def named_value(text: str) -> tuple[str, str]:

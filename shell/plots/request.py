@@ -16,6 +16,7 @@ from pathlib import Path
 from urllib.parse import urlsplit
 
 from multidrop.dialects import Diagnostic
+from multidrop.dialects.text import real
 from multidrop.drives.drive import Drive
 from multidrop.drives.telemetry import FASTEST, MODEST
 from multidrop.shell.connect.urls import listening
@@ -195,10 +196,7 @@ def parse_rate(text: str) -> float:
     """The period between two samples of a drive, s; 0 for `max`. Raises Diagnostic."""
     if text == MAX:
         return 0.0
-    try:
-        rate = float(text)
-    except ValueError:
-        rate = 0.0
+    rate = real(text) or 0.0
     if not SLOWEST <= rate <= 1 / FASTEST:
         valid = f"valid: {SLOWEST:g} to {1 / FASTEST:g} samples a second of each drive, or {MAX}"
         raise Diagnostic(f"invalid rate {text!r}", "--rate", valid)

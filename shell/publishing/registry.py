@@ -13,6 +13,7 @@ from functools import partial
 from typing import NamedTuple
 
 from multidrop.dialects import Diagnostic
+from multidrop.dialects.text import real
 from multidrop.dialects.units import Takes
 from multidrop.dialects.values import UNREAD, Conditions
 from multidrop.drives.bus import Bus
@@ -94,10 +95,7 @@ CONDITIONS = 1.0
 
 def parse_rate(text: str) -> float:
     """The period between two samples of a drive, s. Raises Diagnostic."""
-    try:
-        rate = float(text)
-    except ValueError:
-        rate = 0.0
+    rate = real(text) or 0.0
     if not SLOWEST <= rate <= FASTEST:
         valid = f"valid: {SLOWEST:g} to {FASTEST:g} samples a second of each drive"
         raise Diagnostic(f"invalid rate {text!r}", "--rate", valid)

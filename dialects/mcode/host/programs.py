@@ -24,7 +24,7 @@ from multidrop.dialects.mcode.manual.mnemonic import ETHERNET, EXPANDED
 from multidrop.dialects.mcode.manual.statements import canonical
 from multidrop.dialects.mcode.manual.table import lookup
 from multidrop.dialects.program_files import Difference, Held, Stored, first_difference
-from multidrop.dialects.text import counted
+from multidrop.dialects.text import counted, real
 
 HOLDING = ("variable", "flag")
 """The kinds of words that hold a value."""
@@ -130,7 +130,7 @@ def _unlike(state: MCodeState, line: SourceLine, held: Held) -> Procedure[str]:
     else:
         values = yield from _values(state, statement)
     if name in names:
-        present = [_as_number(names[name].value)]
+        present = [real(names[name].value)]
     elif named is not None or (row := lookup(name, state.product)) is None:
         return f"line {line.number} differs"
     else:
@@ -161,17 +161,10 @@ def _literal(argument: Argument | None) -> float | None:
 def _read_setting(state: MCodeState, name: str, values: Sequence[float | None]) -> Procedure[list[float | None]]:
     """Read the present values of a setting; of a setting with several rows the row that begins alike."""
     printed = yield from immediate(state, state.codec.request(state.address, f"PR {name}"))
-    rows = [[_as_number(each) for each in line.rpartition("=")[2].split(",")] for line in printed if line.strip()]
+    rows = [[real(each) for each in line.rpartition("=")[2].split(",")] for line in printed if line.strip()]
     if len(rows) == 1:
         return rows[0]
     return next((row for row in rows if row[:1] == list(values[:1])), [])
-
-
-def _as_number(text: str) -> float | None:
-    try:
-        return float(text)
-    except ValueError:
-        return None
 
 
 PROGRAMS: Programs[MCodeState] = Programs(
