@@ -7,46 +7,60 @@ drop is followed by the stop whatever the credit, because the far side obeys the
 from __future__ import annotations
 
 import asyncio
+import socket
 import threading
 from collections.abc import Callable
-from typing import Protocol
 
 from multidrop.transports import PortControl
 from multidrop.transports.pipe import DescriptorPipe
 from multidrop.transports.relay import BEAT, CREDIT, MISSED, MOST, Frames, Garbled, Kind, Setting, frame
 
 _READ = 4096
+_WAITED = 64 * 1024
 _PATIENCE = 5.0
 """Seconds to wait for the outcome of a change of a setting."""
 
 
-class Connection(Protocol):
-    """A stream to the other end, as a descriptor that never blocks."""
+class SocketStream:
+    """A stream to the other end over a socket, as a descriptor that never blocks."""
 
-    @property
-    def name(self) -> str:
-        """The name for a person."""
+    def __init__(self, name: str, made: socket.socket) -> None:
+        """`name`: for a person."""
+        made.setblocking(False)
+        self.name = name
+        self._socket = made
 
     def fileno(self) -> int:
-        """The descriptor."""
+        return self._socket.fileno()
 
     def read(self, most: int) -> bytes:
         """Read bytes that arrived; empty at the end. Raises BlockingIOError where there are none."""
+        return self._socket.recv(most)
+
+    async def read_some(self) -> bytes:
+        """Wait for bytes; empty at the end."""
+        try:
+            return await asyncio.get_running_loop().sock_recv(self._socket, _WAITED)
+        except OSError:
+            return b""
 
     def write(self, data: bytes | bytearray | memoryview) -> int:
         """Write, and return how many bytes were taken. Raises BlockingIOError where none are."""
+        return self._socket.send(data)
 
     def last_words(self) -> str:
         """The reason of its end; empty if unknown."""
+        return ""
 
     def close(self, lost: bool) -> None:
         """End it; may block."""
+        self._socket.close()
 
 
 class RelayEndpoint:
     """The frames and the credit. `read` is called by the loop, all that writes under the lock of the pipe."""
 
-    def __init__(self, connection: Connection, early: bytes) -> None:
+    def __init__(self, connection: SocketStream, early: bytes) -> None:
         """`early`: bytes that arrived after the greeting."""
         self.name = connection.name
         self.answered = 0
@@ -178,7 +192,7 @@ class RelayEndpoint:
 class RelayPipe(DescriptorPipe):
     """A transport over a relay. Room comes with a report of the far side, not with the descriptor."""
 
-    def __init__(self, connection: Connection, baud: int, early: bytes = b"", round_trip: float = 0.0) -> None:
+    def __init__(self, connection: SocketStream, baud: int, early: bytes = b"", round_trip: float = 0.0) -> None:
         """`early`: bytes that arrived after the greeting."""
         self.round_trip = round_trip
         self._relay = RelayEndpoint(connection, early)

@@ -24,7 +24,7 @@ from collections.abc import Iterator
 from multidrop.transports import Transport, Unreachable
 from multidrop.transports.pipe import DescriptorPipe, in_thread
 from multidrop.transports.relay import GREETING, WORD, Frames, Garbled, Kind, frame
-from multidrop.transports.relay_pipe import RelayPipe
+from multidrop.transports.relay_pipe import RelayPipe, SocketStream
 from multidrop.transports.ssh import RELAY, SOCAT, FarPort, NotInstalled
 
 # The command lines of `ssh` and of the far machine, and the reasons of a failure.
@@ -157,16 +157,15 @@ def _pipe_signal_open() -> Iterator[None]:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
-class SshSession:
+class SshSession(SocketStream):
     """A running `ssh` with a socket to it. Its start may block; raises Unreachable."""
 
     def __init__(self, far: FarPort, baud: int, way: str) -> None:
-        self.name = far.name
         self._heard = 0
         with contextlib.ExitStack() as failing:
             try:
-                self._socket, theirs = socket.socketpair()
-                failing.enter_context(self._socket)
+                ours, theirs = socket.socketpair()
+                failing.enter_context(ours)
                 self._words = failing.enter_context(tempfile.TemporaryFile())
                 with theirs, _pipe_signal_open():
                     self._process = subprocess.Popen(
@@ -180,22 +179,7 @@ class SshSession:
                 why = "install OpenSSH's client" if error.filename == "ssh" else error.strerror or str(error)
                 raise Unreachable(f"{far.name}: the program ssh cannot be started; {why}") from error
             failing.pop_all()
-        self._socket.setblocking(False)
-
-    async def read_some(self) -> bytes:
-        try:
-            return await asyncio.get_running_loop().sock_recv(self._socket, _READ)
-        except OSError:
-            return b""
-
-    def fileno(self) -> int:
-        return self._socket.fileno()
-
-    def read(self, most: int) -> bytes:
-        return self._socket.recv(most)
-
-    def write(self, data: bytes | bytearray | memoryview) -> int:
-        return self._socket.send(data)
+        super().__init__(far.name, ours)
 
     def unsent(self) -> int:
         """Bytes that ssh has not taken."""

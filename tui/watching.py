@@ -38,7 +38,8 @@ from multidrop.tui.figures import NATIVE, Figures
 from multidrop.tui.screen_model import Record, ScreenModel
 
 if sys.platform != "win32":
-    from multidrop.shell.watching.join import Connection, Stops
+    from multidrop.shell.watching.join import Stops
+    from multidrop.transports.relay_pipe import SocketStream
     from multidrop.tui.sharing import ON_BUS, TYPES, Shared, SharedBus, SharedDrive
 
 assert sys.platform != "win32"
@@ -262,7 +263,7 @@ class MirrorModel(ScreenModel):
 class Receiver:
     """Takes what the host sends into the app and its session."""
 
-    def __init__(self, connection: Connection, host: Host, name: str, early: bytes) -> None:
+    def __init__(self, connection: SocketStream, host: Host, name: str, early: bytes) -> None:
         """`name`: of the host; `early`: what it has sent already."""
         self._connection, self._host, self._name, self._early = connection, host, name, early
         self._shared: dict[Bus, SharedBus] = {}
@@ -390,7 +391,7 @@ def _add(bus: Bus, drive: SharedDrive) -> None:
 
 
 def watch(
-    connection: Connection, name: str, early: bytes, settings: Settings, driver: type[Driver] | None = None
+    connection: SocketStream, name: str, early: bytes, settings: Settings, driver: type[Driver] | None = None
 ) -> MultidropApp:
     """Make the app of a watcher. `name`: of the host; `early`: what it has sent already."""
     return Receiver(connection, Host(Stops(connection)), name, early).app(settings, driver)

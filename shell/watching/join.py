@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
 import contextlib
 import os
 import re
@@ -12,7 +11,6 @@ import sys
 import threading
 import time
 from pathlib import Path
-from typing import Protocol
 
 from multidrop.dialects import Diagnostic
 from multidrop.shell.watching import wire
@@ -21,6 +19,7 @@ from multidrop.transports.ssh import RELAY, FarPort
 
 if sys.platform != "win32":
     from multidrop.shell.watching.host import peer
+    from multidrop.transports.relay_pipe import SocketStream
     from multidrop.transports.ssh_session import OPENING, SshSession, reason
 
 assert sys.platform != "win32"
@@ -31,56 +30,13 @@ _FAR = re.compile(r"ssh://(?:([^@:/?#\s]+)@)?([^@:/?#\[\]\s]+|\[[0-9A-Fa-f:.]+\]
 _READ = 64 * 1024
 
 
-class Connection(Protocol):
-    """A stream to a host, as a descriptor that never blocks."""
-
-    def fileno(self) -> int:
-        """The descriptor."""
-
-    def write(self, data: bytes) -> int:
-        """Write, and return how many bytes were taken. Raises OSError."""
-
-    def read(self, most: int) -> bytes:
-        """Read what has arrived; empty at the end. Raises OSError."""
-
-    async def read_some(self) -> bytes:
-        """Wait for bytes; empty at the end."""
-
-    def last_words(self) -> str:
-        """The reason of its end; empty if unknown."""
-
-    def close(self, lost: bool) -> None:
-        """End it; may block."""
-
-
-class Local:
-    """The connection to a screen of this machine."""
-
-    def __init__(self, made: socket.socket) -> None:
-        made.setblocking(False)
-        self._socket = made
-        self.fileno, self.write, self.read = made.fileno, made.send, made.recv
-
-    async def read_some(self) -> bytes:
-        try:
-            return await asyncio.get_running_loop().sock_recv(self._socket, _READ)
-        except OSError:
-            return b""
-
-    def last_words(self) -> str:
-        return ""
-
-    def close(self, lost: bool) -> None:
-        self._socket.close()
-
-
-def joined(where: str, folder: Path) -> tuple[Connection, str, bytes]:
+def joined(where: str, folder: Path) -> tuple[SocketStream, str, bytes]:
     """Connect to a shared screen: its number, `ssh://[USER@]HOST[:PORT][/NUMBER]`, or empty for the only one here.
 
     Return the connection, who shares it, and the bytes after the greeting. Raises Diagnostic, Unreachable.
     """
     if "://" not in where:
-        local = Local(connect(where, folder))
+        local = SocketStream("", connect(where, folder))
         return local, *_greet(local, "the shared screen", None)
     far = _far(where)
     session = SshSession(far, 9600, RELAY)
@@ -97,7 +53,7 @@ def _far(where: str) -> FarPort:
     return FarPort(host.strip("[]"), SCREEN + number, user, int(port or 0))
 
 
-def _greet(connection: Connection, there: str, far: FarPort | None) -> tuple[str, bytes]:
+def _greet(connection: SocketStream, there: str, far: FarPort | None) -> tuple[str, bytes]:
     """Greet; return who shares the screen, and what came after his greeting. A far shell may say something before."""
     held, until = b"", time.monotonic() + OPENING
     try:
@@ -174,7 +130,7 @@ def splice(made: socket.socket) -> None:
 class Stops:
     """The stops that a watcher has sent, and which the host has heard. `send` may be called from any thread."""
 
-    def __init__(self, connection: Connection) -> None:
+    def __init__(self, connection: SocketStream) -> None:
         self._connection = connection
         self._lock = threading.Lock()
         self.sent = self.heard = 0

@@ -9,28 +9,13 @@ from collections.abc import Iterator
 
 from multidrop.transports import TransportLost
 from multidrop.transports.relay import GREETING, SILENCE, serve
+from multidrop.transports.relay_pipe import SocketStream
 from multidrop.transports.serial_port import SerialEndpoint
 from tests.support.until import PATIENCE
 
 
-class SocketConnection:
-    """What a relay's pipe needs of ssh."""
-
-    name = "ssh://pc/dev/ttyS0"
-
-    def __init__(self, ours: socket.socket) -> None:
-        ours.setblocking(False)
-        self.fileno, self.read, self.write, self._socket = ours.fileno, ours.recv, ours.send, ours
-
-    def last_words(self) -> str:
-        return ""
-
-    def close(self, lost: bool) -> None:
-        self._socket.close()
-
-
 @contextlib.contextmanager
-def lent(port: str, baud: int = 9600, silence: float = SILENCE) -> Iterator[SocketConnection]:
+def lent(port: str, baud: int = 9600, silence: float = SILENCE) -> Iterator[SocketStream]:
     """Lend a port in a thread, until the connection is closed."""
     endpoint = SerialEndpoint(port, baud)
     ours, theirs = socket.socketpair()
@@ -43,7 +28,7 @@ def lent(port: str, baud: int = 9600, silence: float = SILENCE) -> Iterator[Sock
     far.start()
     try:
         assert ours.recv(len(GREETING) + 1).decode() == f"{GREETING}\n"
-        yield SocketConnection(ours)
+        yield SocketStream("ssh://pc/dev/ttyS0", ours)
     finally:
         ours.close()
         far.join(PATIENCE)

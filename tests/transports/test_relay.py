@@ -28,9 +28,9 @@ from multidrop.transports.relay import (
     Setting,
     frame,
 )
-from multidrop.transports.relay_pipe import RelayEndpoint, RelayPipe
+from multidrop.transports.relay_pipe import RelayEndpoint, RelayPipe, SocketStream
 from multidrop.transports.serial_ports import lock_owner
-from tests.support.lent_port import SocketConnection, lent
+from tests.support.lent_port import lent
 
 pytestmark = pytest.mark.fork
 
@@ -380,7 +380,7 @@ async def pipe(early: bytes = b"") -> AsyncIterator[tuple[RelayPipe, socket.sock
     theirs.setblocking(False)
     data, losses = bytearray(), []
     with theirs:
-        transport = RelayPipe(SocketConnection(ours), 9600, early)
+        transport = RelayPipe(SocketStream("ssh://pc/dev/ttyS0", ours), 9600, early)
         try:
             yield transport, theirs, data, losses
         finally:

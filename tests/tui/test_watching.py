@@ -18,8 +18,9 @@ from multidrop.shell.configuration import Settings
 from multidrop.shell.roles import Series
 from multidrop.shell.secrets import without_secrets
 from multidrop.shell.stop_report import Found, headline
-from multidrop.shell.watching.join import Connection, joined
+from multidrop.shell.watching.join import joined
 from multidrop.shell.watching.wire import Dropped, Item, line
+from multidrop.transports.relay_pipe import SocketStream
 from multidrop.tui.app import MultidropApp
 from multidrop.tui.curves.samples import Quantity
 from multidrop.tui.screen_model import Record
@@ -39,7 +40,7 @@ class Pair(NamedTuple):
     at_host: Pilot[int]
     watcher: MultidropApp
     pilot: Pilot[int]
-    connection: Connection
+    connection: SocketStream
     feed: Feed
 
     async def until(self, true: Callable[[], object]) -> None:
