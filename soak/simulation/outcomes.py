@@ -233,6 +233,8 @@ def _credited(world: World) -> Iterator[str | Granted]:
         own = [each for each in own if each.at <= shown.at]
         if any(shown.form.format(each.number) == shown.text for each in own if each.until >= shown.began):
             continue
+        if _saved(history, shown, own):
+            continue
         if set(re.findall(r"\d", shown.text)) == {"0"} and (shown.line, shown.drive) in world.cut:
             continue  # what a power-up leaves
         words = f"{shown.line}:{shown.drive} printed {shown.text!r}, asked at {shown.began:.3f}"
@@ -245,6 +247,17 @@ def _credited(world: World) -> Iterator[str | Granted]:
             breach = _never_held(world, shown, f"{words}: it never held that")
         if breach:
             yield Granted(ASTRAY, words) if _astray(world, shown.line, shown.began, shown.at) else breach
+
+
+SAVES = ("S", "STORE")
+
+
+def _saved(history: History, shown: Shown, own: list[Held]) -> bool:
+    """Whether a drive that restarted printed what it had saved before."""
+    place = shown.line, shown.drive
+    saves = [each.at for each in history.executed if (each.line, each.drive) == place and each.text in SAVES]
+    earlier = (each for each in own if each.restarts < shown.restarts and shown.form.format(each.number) == shown.text)
+    return any(each.at <= at < each.until for each in earlier for at in saves)
 
 
 def _origin(shown: Shown, numbers: dict[str, Held]) -> str:

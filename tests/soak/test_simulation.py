@@ -206,6 +206,13 @@ def test_a_value_of_the_drive_at_that_time_is_right() -> None:
     assert not found(shown("v0", restarts=1))
 
 
+@pytest.mark.parametrize(("saved", "restarts", "right"), [(2.0, 1, True), (2.0, 0, False), (4.5, 1, False)])
+def test_a_restarted_drive_holds_what_it_saved(saved: float, restarts: int, right: bool) -> None:
+    history = shown("v70000001", restarts=restarts)
+    history.executed.append(Executed(saved, "l", "a", "S"))
+    assert (not found(history)) is right
+
+
 @pytest.mark.parametrize("text", ["v70000001", "v70000003", "tick 50000012", "70000002", "v0", "v7000000"])
 def test_any_other_value_is_a_breach(text: str) -> None:
     [[each]] = found(shown(text)).values()

@@ -18,6 +18,7 @@ from multidrop.shell.events import By
 from multidrop.shell.line_syntax import DriveLine, VerbLine
 from multidrop.shell.session import LinePath
 from soak.simulation.acts.phrases import PHRASES
+from soak.simulation.process import Killed
 from soak.simulation.told import Put, Run
 
 if TYPE_CHECKING:
@@ -104,8 +105,9 @@ async def watched(world: World, run: Run, work: Awaitable[Any]) -> None:
         await work
     except BaseException as failure:
         run.failure = str(failure) or type(failure).__name__
-        world.history.told.unexamined[run.typed] = run
-        world.loop.call_later(SETTLED, examine, world, run)
+        if not isinstance(failure, Killed):  # a dead process stops nothing
+            world.history.told.unexamined[run.typed] = run
+            world.loop.call_later(SETTLED, examine, world, run)
         raise
     finally:
         run.ended = world.loop.now
