@@ -405,13 +405,15 @@ class World:
         self.history.defects += [f"thread left: {each.name}" for each in self.scheduler.running]
 
     def _owing(self) -> list[str]:
-        """The MCode drives in another echo mode than at the beginning, which no act sets, or in program mode."""
+        """The MCode drives in another echo mode than at the beginning, which only FD sets, or in program mode."""
         found = []
+        cleared = {(each.line, each.drive) for each in self.history.executed if each.text == "FD"}
         for (line, drive), witness in self.witnesses.items():
             place = self.place(line)
             if place.language == "mcode":
                 mode, stores = int(witness.device.memory.values["EM"]), witness.device.programming is not None
-                if mode != place.em or stores:
+                factory = mode == 0 and (line, drive) in cleared
+                if stores or (mode != place.em and not factory):
                     found.append(f"{line}:{drive} has EM={mode}, not {place.em}" + ", and stores lines" * stores)
         return found
 

@@ -16,7 +16,7 @@ from multidrop.dialects.pmx.manual.table import lookup, reads, starts_motion
 from multidrop.dialects.state import DriveState
 
 LONGEST = 62
-"""Characters of a command with its number: the room in a USB packet of the same controller, with the end."""
+"""Characters of a command with its number, and of a reply: the room in a USB packet, with the end."""
 FLASH = 5.0
 """Seconds for a write to flash."""
 GAP = 0.03
@@ -83,7 +83,8 @@ class Pmx(Codec):
                 continue
             if request.gather:
                 return Decoded(Reply((*strays, text), acknowledged=True), at)
-            if any(not " " <= c <= "~" for c in text) or (MARKED.match(text) and text != f"?{request.text}"):
+            wrong = len(text) > LONGEST or any(not " " <= c <= "~" for c in text)
+            if wrong or (MARKED.match(text) and text != f"?{request.text}"):
                 reply = Reply(end=End.DAMAGED, detail=f"heard {text[:48]!r}")
             elif text.startswith("?"):
                 reply = Reply((text,), End.REFUSED)

@@ -124,6 +124,7 @@ def test_an_answer_that_is_damaged_is_told_from_none():
     asked = Pmx().request("00", "PX")
     assert Pmx().on_timeout(asked, b"").reply.end is Pmx().on_timeout(asked, b"\n\0").reply.end is End.TIMEOUT
     assert Pmx().on_timeout(asked, b"12").reply.end is Pmx().decode(asked, b"1\xb52\r").reply.end is End.DAMAGED
+    assert Pmx().decode(asked, b"U" * 62 + b"7\r").reply.end is End.DAMAGED  # of a baud rate that differs
     assert "echo=local" in Pmx().on_timeout(asked, b"@00PX\r").reply.detail
 
 
