@@ -10,18 +10,16 @@ import select
 import socket
 import struct
 import tracemalloc
-from collections.abc import AsyncIterator, Awaitable, Callable
-from contextlib import AsyncExitStack
-from pathlib import Path
+from collections.abc import Awaitable, Callable
 
 import pytest
 
 from multidrop.dialects.mcode.manual.errors import text as error_text
 from multidrop.simulator.cell.spec import Faults
-from multidrop.simulator.cells import load, read
+from multidrop.simulator.cells import read
 from multidrop.simulator.floor import Floor
 from multidrop.simulator.serving import running
-from multidrop.simulator.serving.endpoints import BACKLOG, serve_bus
+from multidrop.simulator.serving.endpoints import BACKLOG
 from multidrop.simulator.serving.running import RunningFloor
 from multidrop.simulator.wire import Wire
 from tests.support.posix import termios
@@ -68,24 +66,16 @@ def impatient(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.fixture
-async def serve(tmp_path: Path) -> AsyncIterator[Serve]:
-    async with AsyncExitStack() as stack:
+def serve(serve_text) -> Serve:
+    """Serves a cell for the time of a test; gives the endpoints by bus and scheme, and what is told."""
 
-        async def start(baud: int = 9600, em: int = 1, delay: float = 0.0, speed: float = 1.0):
-            path = tmp_path / "cell.toml"
-            path.write_text(CELL.format(baud=baud, em=em, delay=delay))
-            cell = load(path)
-            floor = RunningFloor(Floor(cell), speed)
-            stack.callback(floor.close)
-            told: list[str] = []
-            floor.notify = told.append
-            served = {}
-            for bus in cell.buses:
-                for each in await serve_bus(floor, bus, stack):
-                    served[f"{each.bus} {each.endpoint.partition(':')[0]}"] = each.endpoint
-            return floor, served, told
+    async def start(baud: int = 9600, em: int = 1, delay: float = 0.0, speed: float = 1.0):
+        floor, served = await serve_text(CELL.format(baud=baud, em=em, delay=delay), speed)
+        told: list[str] = []
+        floor.notify = told.append
+        return floor, {f"{each.bus} {each.endpoint.partition(':')[0]}": each.endpoint for each in served}, told
 
-        yield start
+    return start
 
 
 def port(endpoint: str) -> tuple[str, int]:

@@ -8,17 +8,14 @@ import re
 import socket
 import struct
 import subprocess
-from collections.abc import AsyncIterator, Awaitable, Callable, Iterator
-from contextlib import AsyncExitStack, contextmanager
-from pathlib import Path
+from collections.abc import Awaitable, Callable, Iterator
+from contextlib import contextmanager
 
 import pytest
 from pymodbus.client import AsyncModbusTcpClient
 from pyModbusTCP.client import ModbusClient
 
-from multidrop.simulator.cells import demo, load
-from multidrop.simulator.floor import Floor
-from multidrop.simulator.serving.endpoints import serve_bus
+from multidrop.simulator.cells import demo
 from multidrop.simulator.serving.running import RunningFloor
 from tests.support.processes import Running
 from tests.support.until import PATIENCE
@@ -40,34 +37,14 @@ Streams = tuple[asyncio.StreamReader, asyncio.StreamWriter]
 
 
 @pytest.fixture
-async def serve(tmp_path: Path) -> AsyncIterator[Serve]:
+def serve(serve_text) -> Serve:
     """Serves a cell for the time of a test; gives the ports by scheme."""
-    async with AsyncExitStack() as stack:
 
-        async def start(more: str = "") -> tuple[RunningFloor, dict[str, int]]:
-            path = tmp_path / "cell.toml"
-            path.write_text(CELL + more, encoding="utf-8")
-            floor = RunningFloor(Floor(load(path)))
-            stack.callback(floor.close)
-            served = [each for bus in floor.floor.cell.buses for each in await serve_bus(floor, bus, stack)]
-            return floor, {each.endpoint.partition(":")[0]: int(each.endpoint.rpartition(":")[2]) for each in served}
+    async def start(more: str = "") -> tuple[RunningFloor, dict[str, int]]:
+        floor, served = await serve_text(CELL + more)
+        return floor, {each.endpoint.partition(":")[0]: int(each.endpoint.rpartition(":")[2]) for each in served}
 
-        yield start
-
-
-@pytest.fixture
-async def connect() -> AsyncIterator[Callable[[int], Awaitable[Streams]]]:
-    """Opens connections, and closes them after the test."""
-    writers: list[asyncio.StreamWriter] = []
-
-    async def opened(port: int) -> Streams:
-        reader, writer = await asyncio.open_connection("127.0.0.1", port)
-        writers.append(writer)
-        return reader, writer
-
-    yield opened
-    for writer in writers:
-        writer.close()
+    return start
 
 
 async def heard(reader: asyncio.StreamReader, count: int) -> bytes:
@@ -75,10 +52,10 @@ async def heard(reader: asyncio.StreamReader, count: int) -> bytes:
         return await reader.readexactly(count)
 
 
-async def test_one_drive_answers_mcode_and_modbus_on_one_state(serve, connect):
+async def test_one_drive_answers_mcode_and_modbus_on_one_state(serve, dial):
     _, ports = await serve()
-    mcode_reader, mcode = await connect(ports["tcp"])
-    reader, writer = await connect(ports["modbus"])
+    mcode_reader, mcode = await dial(ports["tcp"])
+    reader, writer = await dial(ports["modbus"])
     writer.write(bytes.fromhex("0001 0000 000B 01 10 005F 0002 04 0007 0000"))  # R1=7
     assert await heard(reader, 12) == bytes.fromhex("0001 0000 0006 01 10 005F 0002")
     mcode.write(b"PR R1\r")
@@ -89,10 +66,10 @@ async def test_one_drive_answers_mcode_and_modbus_on_one_state(serve, connect):
     assert await heard(reader, 13) == bytes.fromhex("0002 0000 0007 01 03 04 FFFE FFFF")
 
 
-async def test_what_a_program_prints_goes_to_mcode_and_never_to_modbus(serve, connect):
+async def test_what_a_program_prints_goes_to_mcode_and_never_to_modbus(serve, dial):
     floor, ports = await serve()
-    mcode_reader, mcode = await connect(ports["tcp"])
-    reader, writer = await connect(ports["modbus"])
+    mcode_reader, mcode = await dial(ports["tcp"])
+    reader, writer = await dial(ports["modbus"])
     mcode.write(b"PG 100\rLB A3\rPR 1234\rE\rPG\r")
     await heard(mcode_reader, 10)
     writer.write(bytes.fromhex("0001 0000 0009 01 42 2020 5845 02 4133") + POSITION)  # EX A3
@@ -101,9 +78,9 @@ async def test_what_a_program_prints_goes_to_mcode_and_never_to_modbus(serve, co
     assert await heard(reader, len(STANDING)) == STANDING
 
 
-async def test_clients_are_served_at_once_each_with_its_own_answers(serve, connect):
+async def test_clients_are_served_at_once_each_with_its_own_answers(serve, dial):
     _, ports = await serve()
-    clients = [await connect(ports["modbus"]) for _ in range(8)]
+    clients = [await dial(ports["modbus"]) for _ in range(8)]
     for number, (_, writer) in enumerate(clients):
         for turn in range(20):
             writer.write(struct.pack(">HHHBBHH", turn, 0, 6, number, 3, 0x57, 2))
@@ -112,10 +89,10 @@ async def test_clients_are_served_at_once_each_with_its_own_answers(serve, conne
             assert await heard(reader, 13) == struct.pack(">HHHBBBHH", turn, 0, 7, number, 3, 4, 0, 0)
 
 
-async def test_who_speaks_something_else_is_let_go_and_the_others_are_not(serve, connect):
+async def test_who_speaks_something_else_is_let_go_and_the_others_are_not(serve, dial):
     _, ports = await serve()
-    reader, writer = await connect(ports["modbus"])
-    other_reader, other = await connect(ports["modbus"])
+    reader, writer = await dial(ports["modbus"])
+    other_reader, other = await dial(ports["modbus"])
     other.write(POSITION + b"GET / HTTP/1.1\r\n\r\n")
     assert await heard(other_reader, len(STANDING)) == STANDING
     async with asyncio.timeout(PATIENCE):
@@ -124,32 +101,32 @@ async def test_who_speaks_something_else_is_let_go_and_the_others_are_not(serve,
     assert await heard(reader, len(STANDING)) == STANDING
 
 
-async def test_an_unplugged_bus_hangs_up_and_comes_back(serve, connect):
+async def test_an_unplugged_bus_hangs_up_and_comes_back(serve, dial):
     floor, ports = await serve()
-    reader, _ = await connect(ports["modbus"])
+    reader, _ = await dial(ports["modbus"])
     floor.command("/sim unplug eth")
     async with asyncio.timeout(PATIENCE):
         assert await reader.read() == b""
-    reader, _ = await connect(ports["modbus"])
+    reader, _ = await dial(ports["modbus"])
     async with asyncio.timeout(PATIENCE):
         assert await reader.read() == b"", "there is nobody"
     floor.command("/sim plug eth")
-    reader, writer = await connect(ports["modbus"])
+    reader, writer = await dial(ports["modbus"])
     writer.write(POSITION)
     assert await heard(reader, len(STANDING)) == STANDING
 
 
-async def test_a_bus_that_hangs_up_by_itself_does_so_over_modbus(serve, connect):
+async def test_a_bus_that_hangs_up_by_itself_does_so_over_modbus(serve, dial):
     _, ports = await serve("hangup_after = 0.2\n")
-    reader, writer = await connect(ports["modbus"])
+    reader, writer = await dial(ports["modbus"])
     writer.write(POSITION)
     async with asyncio.timeout(PATIENCE):
         assert await reader.read() == STANDING
 
 
-async def test_late_answers_come_in_their_order_and_before_the_end(serve, connect):
+async def test_late_answers_come_in_their_order_and_before_the_end(serve, dial):
     _, ports = await serve("delay = [0.01, 0.05]\n")
-    reader, writer = await connect(ports["modbus"])
+    reader, writer = await dial(ports["modbus"])
     began = asyncio.get_running_loop().time()
     for turn in range(5):
         writer.write(struct.pack(">HHHBBHH", turn, 0, 6, 1, 3, 0x57, 2))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import socket
-from collections.abc import AsyncIterator, Awaitable, Callable, Coroutine
+from collections.abc import Awaitable, Callable, Coroutine
 from contextlib import AsyncExitStack
 from pathlib import Path
 from typing import Any
@@ -44,35 +44,15 @@ Serve = Callable[..., Awaitable[tuple[RunningFloor, dict[str, int]]]]
 
 
 @pytest.fixture
-async def serve(tmp_path: Path) -> AsyncIterator[Serve]:
+def serve(serve_text) -> Serve:
     """Serves the cell so many times as fast as the clock; gives the ports by bus and scheme."""
-    async with AsyncExitStack() as stack:
 
-        async def start(speed: float = 1.0) -> tuple[RunningFloor, dict[str, int]]:
-            path = tmp_path / "cell.toml"
-            path.write_text(CELL, encoding="utf-8")
-            floor = RunningFloor(Floor(load(path)), speed)
-            stack.callback(floor.close)
-            served = [each for bus in floor.floor.cell.buses for each in await serve_bus(floor, bus, stack)]
-            ports = {f"{each.bus} {each.endpoint.partition(':')[0]}": each.endpoint for each in served}
-            return floor, {key: int(endpoint.rpartition(":")[2]) for key, endpoint in ports.items()}
+    async def start(speed: float = 1.0) -> tuple[RunningFloor, dict[str, int]]:
+        floor, served = await serve_text(CELL, speed)
+        ports = {f"{each.bus} {each.endpoint.partition(':')[0]}": each.endpoint for each in served}
+        return floor, {key: int(endpoint.rpartition(":")[2]) for key, endpoint in ports.items()}
 
-        yield start
-
-
-@pytest.fixture
-async def dial() -> AsyncIterator[Callable[[int], Awaitable[Streams]]]:
-    """Opens connections, and closes them after the test."""
-    writers: list[asyncio.StreamWriter] = []
-
-    async def opened(port: int) -> Streams:
-        reader, writer = await asyncio.open_connection("127.0.0.1", port)
-        writers.append(writer)
-        return reader, writer
-
-    yield opened
-    for writer in writers:
-        writer.close()
+    return start
 
 
 async def in_time(coming: Coroutine[Any, Any, Any]) -> Any:

@@ -10,7 +10,7 @@ import re
 import signal
 import socket
 import sys
-from collections.abc import AsyncIterator, Awaitable, Callable
+from collections.abc import Awaitable, Callable
 from contextlib import AsyncExitStack
 from pathlib import Path
 from types import SimpleNamespace
@@ -18,10 +18,10 @@ from types import SimpleNamespace
 import pytest
 
 from multidrop.dialects import Diagnostic
-from multidrop.simulator.cells import load, read
+from multidrop.simulator.cells import read
 from multidrop.simulator.floor import Floor
 from multidrop.simulator.serving.command import reachable
-from multidrop.simulator.serving.endpoints import Served, serve_bus
+from multidrop.simulator.serving.endpoints import serve_bus
 from multidrop.simulator.serving.in_process import connect
 from multidrop.simulator.serving.running import RunningFloor
 from multidrop.transports import TransportLost
@@ -50,20 +50,14 @@ def write_cell(folder: Path, baud: int = 0, more: str = "") -> Path:
 
 
 @pytest.fixture
-async def serve(tmp_path: Path) -> AsyncIterator[Serve]:
+def serve(serve_text) -> Serve:
     """Serves a cell for the time of a test; gives the endpoints by scheme."""
-    async with AsyncExitStack() as stack:
 
-        async def start(baud: int = 0, more: str = "") -> tuple[RunningFloor, dict[str, str]]:
-            cell = load(write_cell(tmp_path, baud, more))
-            floor = RunningFloor(Floor(cell))
-            stack.callback(floor.close)
-            served: list[Served] = []
-            for bus in cell.buses:
-                served += await serve_bus(floor, bus, stack)
-            return floor, {each.endpoint.partition(":")[0]: each.endpoint for each in served}
+    async def start(baud: int = 0, more: str = "") -> tuple[RunningFloor, dict[str, str]]:
+        floor, served = await serve_text(CELL.format(baud=baud) + more)
+        return floor, {each.endpoint.partition(":")[0]: each.endpoint for each in served}
 
-        yield start
+    return start
 
 
 class Client:
