@@ -41,6 +41,15 @@ async def test_a_box_says_how_many_rows_are_below_and_follows_the_wheel() -> Non
         assert "below" not in str(box.query_one(".keys", Static).content)
 
 
+async def test_a_box_that_is_closed_before_its_rows_are_laid_out_counts_none() -> None:
+    async with on_screen(many()) as (pilot, app, _):
+        await press(pilot, "ctrl+o")
+        options = app.screen.query_one(Options)
+        await press(pilot, "escape")
+        assert app.screen is app.main
+        options.tell_below()  # what comes after a refresh comes after the box, where the machine is busy
+
+
 async def test_a_click_on_a_row_of_a_box_takes_it() -> None:
     async with on_screen(many()) as (pilot, app, session):
         await press(pilot, "ctrl+o")

@@ -55,6 +55,17 @@ async def test_a_letter_or_the_list_answers() -> None:
         assert session.sent == ["press:a MR 5"]
 
 
+async def test_a_question_that_is_closed_before_it_is_laid_out_takes_no_room() -> None:
+    async with asked() as (pilot, _, answer):
+        question = pilot.app.screen
+        assert isinstance(question, GoOn)
+        readable(pilot)
+        await pilot.press("n")
+        assert not await answer
+        await settle(pilot)
+        question.make_room()  # what comes after a refresh comes after the box, where the machine is busy
+
+
 async def test_keys_typed_ahead_answer_nothing_and_a_function_key_plays_nothing() -> None:
     async with asked() as (pilot, session, answer):
         await press(pilot, "y", "enter")

@@ -72,8 +72,8 @@ class Options(OptionList):
         self.tell_below()
 
     def tell_below(self) -> None:
-        """Have the box say how many rows are below."""
-        if isinstance(self.screen, Over):
+        """Have the box say how many rows are below, unless it was closed meanwhile."""
+        if self.is_attached and isinstance(self.screen, Over):
             self.screen.say_below(round(self.max_scroll_y - self.scroll_y))
 
     def action_select(self) -> None:
@@ -207,7 +207,12 @@ class GoOn(Dialog[bool]):
 
     def on_resize(self) -> None:
         """Leave the rows of the box to it: the lines that lead to the question stay in view below it."""
-        self.call_after_refresh(lambda: self._room(self.query_one(".box").outer_size.height + 1))
+        self.call_after_refresh(self.make_room)
+
+    def make_room(self) -> None:
+        """Leave rows for the box, unless it was closed meanwhile."""
+        for box in self.query(".box"):
+            self._room(box.outer_size.height + 1)
 
     def on_mount(self) -> None:
         self.query_one(Options).highlighted = 0
