@@ -148,10 +148,10 @@ class Conversation(Generic[T]):
         self._on_ended = on_ended
         self._searching = searching
         self._stops = conversations.stops(state)
-        self._unproven = ""
-        """The last command, until a reply shows that it was executed."""
+        self._unproven: Request | None = None
+        """The last command, until a reply shows that it was executed; from the first failure on it stays."""
         self._executed = ""
-        """The last command, once a reply has shown that it was executed."""
+        """The last command, once a reply has shown that it was executed; from the first failure on it stays."""
         self._request: Request | None = None
         """The request that it sends now."""
         self._ticket = 0
@@ -242,8 +242,8 @@ class Conversation(Generic[T]):
 
     def _doubts(self) -> None:
         """Note that the command that is queued or in flight may be executed."""
-        if self._request is not None and self._request.kind not in ASKING:
-            self._unproven = self._request.text
+        if self._request is not None and self._request.kind not in ASKING and not self._cleaning_up:
+            self._unproven = self._request
 
     def _lost(self, error: TransportLost) -> None:
         """Fail with what the loss leaves open: whether the last command was executed."""
@@ -251,11 +251,11 @@ class Conversation(Generic[T]):
             self._state.reply_outstanding()
             self._doubts()
         error = (self._link.away or error).again()
-        if self._unproven and not self._cleaning_up:
-            done = "stored" if self._request is not None and self._request.kind is Kind.PROGRAM else "executed"
-            error = TransportLost(f"{error}; it is not known whether '{self._unproven}' was {done}")
-            error.unproven = self._unproven
-        elif self._executed and not self._cleaning_up:
+        if (doubtful := self._unproven) is not None:
+            done = "stored" if doubtful.kind is Kind.PROGRAM else "executed"
+            error = TransportLost(f"{error}; it is not known whether '{doubtful.text}' was {done}")
+            error.unproven = doubtful.text
+        elif self._executed:
             error = type(error)(f"{error}; '{self._executed}' was executed before that")
             error.executed = self._executed
         self._fail(error)
@@ -268,9 +268,9 @@ class Conversation(Generic[T]):
             self._on_ended(transaction)
         if self._all.witnesses.all:
             self._taken.append(transaction)
-        if request.kind not in ASKING and (sent or reply.end is not End.STOPPED):
+        if request.kind not in ASKING and (sent or reply.end is not End.STOPPED) and not self._cleaning_up:
             proven = reply.acknowledged and not reply.doubtful
-            self._unproven = "" if proven else request.text
+            self._unproven = None if proven else request
             self._executed = request.text if proven and request.kind is not Kind.PROGRAM else ""
         if reply.end is not End.STOPPED:
             return self._procedure.send(reply)
@@ -288,7 +288,8 @@ class Conversation(Generic[T]):
         if self._executed:
             return f"'{self._executed}' was executed before the stop"
         if self._unproven or sent:
-            return f"'{self._unproven or text}' was stopped; it is not known whether it was executed"
+            doubtful = self._unproven.text if self._unproven is not None else text
+            return f"'{doubtful}' was stopped; it is not known whether it was executed"
         return f"'{text}' was stopped; it was not sent"
 
     # The end
@@ -307,7 +308,8 @@ class Conversation(Generic[T]):
             self.over.set_result(None)
         assert self._outcome is not None
         if self._all.witnesses.all:
-            unproven = self._unproven if self._outcome.error is not None else ""
+            failed = self._outcome.error is not None
+            unproven = self._unproven.text if failed and self._unproven is not None else ""
             self._all.witnesses.report(Concluded(self._state, tuple(self._taken), self._outcome, unproven))
         self._on_over(self._outcome)
 

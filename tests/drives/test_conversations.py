@@ -62,6 +62,12 @@ class Desk:
         """Print in turn; if that fails, print what is `after`."""
         return asyncio.ensure_future(self.conversations.run(prints(texts, after, self.state.codec), self.state))
 
+    def stop(self) -> None:
+        """Stop everything."""
+        self.conversations.stop(None)
+        self.link.line.stop(self.link.now())
+        self.link.advance()
+
 
 def prints(texts: tuple[str, ...], after: tuple[str, ...] = (), codec: MCode = CODEC) -> Procedure[str]:
     reply = Reply()
@@ -70,7 +76,7 @@ def prints(texts: tuple[str, ...], after: tuple[str, ...] = (), codec: MCode = C
             reply = yield codec.request("", text)
     except BaseException:
         for text in after:
-            yield request(text)
+            yield codec.request("", text)
         raise
     return reply.text
 
@@ -186,14 +192,30 @@ async def test_what_ends_a_question_after_a_command_leaves_that_executed_or_afte
     if how == "lost":
         desk.pipe.lost(TransportLost("unplugged"))
     else:
-        desk.conversations.stop(None)
-        desk.link.line.stop(desk.link.now())
-        desk.link.advance()
+        desk.stop()
     with pytest.raises((TransportLost, Stopped), match="'MR 5' was ") as end:
         await running
     assert known in str(end.value)
     if isinstance(end.value, TransportLost):
         assert (end.value.unproven, end.value.executed) == (("MR 5", "") if late else ("", "MR 5"))
+
+
+@pytest.mark.parametrize("acknowledged", [True, False])
+async def test_a_loss_in_the_clean_up_after_a_stop_says_what_the_stop_left_open(acknowledged: bool) -> None:
+    desk = Desk(codec=MCode(em=1, checksum=1))
+    desk.pipe.silent = True
+    running = desk.run("MR 5", "PR P", after=("EM=1", "PR EM"))
+    await asyncio.sleep(0.01)
+    if acknowledged:
+        desk.pipe.received(b"\x06")
+        await asyncio.sleep(0.01)
+    desk.stop()
+    await asyncio.sleep(0.2)
+    assert desk.sent[-1] == "EM=1"
+    desk.pipe.lost(TransportLost("unplugged"))
+    with pytest.raises(TransportLost, match="^unplugged; .*'MR 5' was executed") as lost:
+        await running
+    assert (lost.value.unproven, lost.value.executed) == (("", "MR 5") if acknowledged else ("MR 5", ""))
 
 
 class SlowKeeper(Keeper):
