@@ -37,7 +37,9 @@ ASKED: ContextVar[tuple[str, float] | None] = ContextVar("asked", default=None)
 @contextlib.contextmanager
 def ahead(world: World) -> Iterator[None]:
     """Note what the stop's thread writes meanwhile: the one that runs this."""
-    stop, me = world.history.stops[-1], threading.get_ident()
+    stops, me = world.history.stops, threading.get_ident()
+    # a key may cut in between another key and its stop
+    stop = next((each for each in reversed(stops) if each.at == world.loop.now and not each.done), stops[-1])
     world.stopping[me] = stop
     try:
         yield
