@@ -11,7 +11,6 @@ from multidrop.dialects.on_demand import imported
 
 if TYPE_CHECKING:
     from multidrop.dialects.codec import Codec as Codec
-    from multidrop.dialects.codec import Command as Command
     from multidrop.dialects.codec import Decoded as Decoded
     from multidrop.dialects.codec import End as End
     from multidrop.dialects.codec import Kind as Kind
@@ -35,7 +34,7 @@ if TYPE_CHECKING:
     from multidrop.dialects.state import Owed as Owed
 
 _MODULES = {
-    "codec": ("Codec", "Command", "Decoded", "End", "Kind", "Priority", "Procedure", "Reply", "Request", "StopPiece"),
+    "codec": ("Codec", "Decoded", "End", "Kind", "Priority", "Procedure", "Reply", "Request", "StopPiece"),
     "errors": ("Diagnostic", "DriveError", "Inexpressible", "NoAnswer", "Refused", "Stopped"),
     "family": ("Family", "Hints", "Motion", "Progress"),
     "files": ("SourceLine",),

@@ -12,10 +12,10 @@ from __future__ import annotations
 
 import re
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Generator, Sequence
+from collections.abc import Generator, Sequence
 from dataclasses import dataclass, field, replace
 from enum import Enum, IntEnum
-from typing import Any, ClassVar, NamedTuple, TypeVar
+from typing import ClassVar, NamedTuple, TypeVar
 
 
 class Kind(Enum):
@@ -50,27 +50,6 @@ class End(Enum):
 
 
 T = TypeVar("T")
-
-
-class Command(str):
-    """A line typed for a drive. Each grammar reads it once: the result goes with the text to the conversation.
-
-    What depends on the drive (guard, start of a motion, target) is asked of the family when the line's turn comes.
-    """
-
-    __slots__ = ("_read",)
-    _read: dict[Callable[[str], Any], Any]
-
-    def read_by(self, grammar: Callable[[str], T]) -> T:
-        """Return what this function reads in the line; it is called once."""
-        try:
-            known = self._read
-        except AttributeError:
-            known = self._read = {}
-        if grammar not in known:
-            known[grammar] = grammar(self)
-        found: T = known[grammar]
-        return found
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol, TypeVar
 
-from multidrop.dialects.codec import Codec, Command, Priority, Procedure
+from multidrop.dialects.codec import Codec, Priority, Procedure
 from multidrop.dialects.errors import Differs, DriveError, Inexpressible, NoAnswer, Refused, Stopped, Unreferenced
 from multidrop.dialects.families import FAMILIES, program_languages
 from multidrop.dialects.family import Family, Motion, Programs
@@ -219,11 +219,10 @@ class Drive:
     # What is sent
 
     async def send(self, text: str, check: Check | None = None) -> tuple[str, ...]:
-        """Send a line in the drive's own language (a `Command` if it was parsed before); return what it printed.
+        """Send a line in the drive's own language; return what it printed.
 
         `check`: runs in the same conversation right before the line, which is not sent if that raises.
         """
-        text = text if isinstance(text, Command) else Command(text)
         if not self.starts(text):
             return await self._send(text, check)
         self.check_start(text)

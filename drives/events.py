@@ -167,8 +167,9 @@ Watcher = Callable[[BusEvent], None]
 class Subscribers(dict[type, tuple[Callable[[E], None], ...]]):
     """The callbacks for each kind of event, in the order of subscription; found at the first event of a kind."""
 
-    def __init__(self) -> None:
+    def __init__(self, name: str) -> None:
         super().__init__()
+        self.isolated = isolated(name)
         self._all: tuple[tuple[Callable[[E], None], tuple[type, ...]], ...] = ()
         """The subscriptions: a callback and the kinds that it takes, none for all."""
 
@@ -187,6 +188,15 @@ class Subscribers(dict[type, tuple[Callable[[E], None], ...]]):
 
         return leave
 
+    def call(self, kind: type, event: E) -> None:
+        """Pass an event to those that take its kind."""
+        callbacks, over = iter(self[kind]), False
+        while not over:  # after a subscriber that fails, the next one
+            with self.isolated:
+                for callback in callbacks:
+                    callback(event)
+                over = True
+
 
 class Publisher(Generic[E]):
     """Passes events to its subscribers, in the order of subscription. `name` is theirs in the log of defects.
@@ -196,8 +206,7 @@ class Publisher(Generic[E]):
 
     def __init__(self, name: str, kind: Callable[[E], type] = type) -> None:
         self._kind = kind
-        self.subscribers = Subscribers[E]()
-        self._isolated = isolated(name)
+        self.subscribers = Subscribers[E](name)
 
     def subscribe(self, callback: Callable[[E], None], *kinds: type) -> Callable[[], None]:
         """Call back with every event of these kinds, by default of all, from the event loop.
@@ -207,13 +216,7 @@ class Publisher(Generic[E]):
         return self.subscribers.add(callback, kinds)
 
     def publish(self, event: E) -> None:
-        subscribers = self.subscribers[self._kind(event)]
-        callbacks, over = iter(subscribers), not subscribers
-        while not over:  # after a subscriber that fails, the next one
-            with self._isolated:
-                for callback in callbacks:
-                    callback(event)
-                over = True
+        self.subscribers.call(self._kind(event), event)
 
 
 class EventQueue(Publisher[BusEvent]):
@@ -243,7 +246,7 @@ class EventQueue(Publisher[BusEvent]):
         self._telling, event, callbacks = True, self._events[0], iter(tuple[Watcher]())
         try:
             while self._telling:
-                with self._isolated:
+                with self.subscribers.isolated:
                     for callback in callbacks:  # after a watcher that fails, the next one
                         callback(event)
                     while self._events:

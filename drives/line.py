@@ -64,13 +64,15 @@ class Flight:
     judged_length: int = -1
     """Length of the bytes about which quiet was consulted last."""
     due: tuple[float, float] | None = None
-    """Its `times` with the bytes received so far; None until they are asked for."""
+    """What `times` has found with the bytes received so far; None until they are asked for."""
 
     def times(self, buffer: bytes, default: float) -> tuple[float, float]:
         """Times at which quiet ends a reply without an end of its own, and at which the request times out.
 
         `default`: the line's timeout, s.
         """
+        if self.due is not None:
+            return self.due
         patience, own = self.request.codec.quiet_time(self.request, buffer), self.request.timeout
         slow = default - DEFAULT_TIMEOUT
         if slow > 0 and own is not None and self.request.signed:
@@ -87,7 +89,8 @@ class Flight:
         longest = self.transmitted_at + (LONGEST_LIST if self.request.kind is Kind.LIST else CHATTER * timeout)
         if not buffer.endswith(b"\n"):  # not in the middle of a program's line
             longest = max(longest, min(self.received_at + TAIL, longest + NEVER_QUIET))
-        return quiet, min(since + timeout, longest)
+        self.due = quiet, min(since + timeout, longest)
+        return self.due
 
 
 class Waiting(NamedTuple):
@@ -328,11 +331,11 @@ class Line:
         """The reply, if it is whole, if quiet ends it, or if time is up."""
         codec, request, buffer = flight.request.codec, flight.request, self.inbox.buffer
         if not self._takes_reply(flight):
-            return codec.on_timeout(request, b"") if now >= self._times(flight)[1] else None
+            return codec.on_timeout(request, b"") if now >= flight.times(buffer, self.timeout)[1] else None
         found = codec.decode(request, buffer) if buffer else None
         if found is not None:
             return found
-        quiet, timeout = self._times(flight)
+        quiet, timeout = flight.times(buffer, self.timeout)
         if flight.judged_length != len(buffer) and now >= quiet:
             flight.judged_length = len(buffer)
             found = codec.on_quiet(request, buffer)
@@ -340,18 +343,13 @@ class Line:
             return codec.on_timeout(request, buffer)
         return found
 
-    def _times(self, flight: Flight) -> tuple[float, float]:
-        if flight.due is None:
-            flight.due = flight.times(self.inbox.buffer, self.timeout)
-        return flight.due
-
     def _takes_reply(self, flight: Flight) -> bool:
         """Whether what comes is the reply to it: not if a stop of another thread kept it back, or has left since."""
         return flight.sent and not self.overtaken
 
     def _without_echo(self, flight: Flight, echo: LocalEcho, now: float) -> Decoded | None:
         """The end of a request whose bytes were not repeated unchanged: no reply can be trusted."""
-        if now < self._times(flight)[1]:
+        if now < flight.times(self.inbox.buffer, self.timeout)[1]:
             return None
         held = echo.forget().decode("latin-1")
         if not held:
@@ -373,7 +371,7 @@ class Line:
         """Time of the next internal event; None if only new input can cause one."""
         if isinstance(self._state, Flight):
             flight, echo = self._state, self.inbox.echo
-            quiet, timeout = flight.due or self._times(flight)
+            quiet, timeout = flight.due or flight.times(self.inbox.buffer, self.timeout)
             if flight.judged_length == len(self.inbox.buffer) or (echo and echo.own):
                 return timeout
             return min(timeout, quiet) if self._takes_reply(flight) else timeout

@@ -5,7 +5,7 @@
 selected drive. This module does not know what is open.
 
 A line is parsed once, at its Enter. What depends on the drive is asked of the parsed line when its turn comes; each
-grammar reads its text once (`dialects.Command`).
+grammar keeps the texts that it has read.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
-from multidrop.dialects import Command, Diagnostic
+from multidrop.dialects import Diagnostic
 
 EVERYONE = ("*", "^")
 WAITS = ("/wait", "/sleep")
@@ -73,8 +73,8 @@ def parse(line: str) -> TypedLine | None:
             raise Diagnostic(f"nothing to send to {target}", f"@{target}", f"/use {target} selects it")
         if text.startswith("/"):
             raise Diagnostic(f"{text.split()[0]} is a verb and takes no @{target}", line, f"/help {text.split()[0]}")
-        return DriveLine(Command(text), bus, address or None, typed)
-    return DriveLine(Command(line), typed=typed)
+        return DriveLine(text, bus, address or None, typed)
+    return DriveLine(line, typed=typed)
 
 
 def each_names_one_drive(lines: Iterable[str]) -> bool:

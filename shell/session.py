@@ -16,7 +16,7 @@ from contextvars import ContextVar
 from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any
 
-from multidrop.dialects import Command, Diagnostic, DriveError, Refused, Stopped
+from multidrop.dialects import Diagnostic, DriveError, Refused, Stopped
 from multidrop.dialects.on_demand import imported
 from multidrop.drives.bus import Bus
 from multidrop.drives.drive import Drive
@@ -283,7 +283,7 @@ class LinePath:
             await self._undoubted([bus], by)
         if session.scaled or _MAYBE_QUANTITY.search(text):
             line = await session.units.line(drive, text)
-            text, check, values = Command(line.text), line.check, line.values
+            text, check, values = line.text, line.check, line.values
             await imported(TRAVEL)(session.units, drive, text, by)
         await self.guard(drive, text, by)
         if drive.stops != stops:

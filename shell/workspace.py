@@ -372,7 +372,7 @@ class Workspace(Channel):
                 event = event._replace(lines=tuple(map(annotate, event.lines)))
         shown_as_bytes = record is not None and record.raw is not None and isinstance(event, Unsolicited)
         if self.subscribers[type(event)] and not shown_as_bytes:
-            self.publish(OnBus(name, event))
+            self.subscribers.call(type(event), OnBus(name, event))
         if isinstance(event, Lost):
             if self.reconnections.lost(self.buses[name]):  # wanted and possible: tried again
                 self.notify(f"{name}: {event.error}; trying again", bus=name, warning=True)

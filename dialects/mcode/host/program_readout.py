@@ -114,17 +114,7 @@ def size(text: str, product: str) -> int:
 
 
 def programs_of(lines: Sequence[SourceLine]) -> list[FileProgram]:
-    found: list[FileProgram] = []
-    place, inside = "", list[SourceLine]()
-    for line in lines:
-        if classify.enters_program(line.text):
-            place, inside = classify.word_of(line.text)[1], []
-        elif place and classify.leaves_program(line.text):
-            found.append(FileProgram(place, tuple(inside)))
-            place = ""
-        elif place:
-            inside.append(line)
-    return found
+    return list(_divided(tuple(lines))[0])
 
 
 def size_of_file(lines: Sequence[SourceLine]) -> int:
@@ -133,14 +123,25 @@ def size_of_file(lines: Sequence[SourceLine]) -> int:
 
 def immediate_lines(lines: Sequence[SourceLine]) -> list[SourceLine]:
     """Return the lines of a file that the drive executes at once: all but its programs."""
-    found: list[SourceLine] = []
-    inside = False
+    return list(_divided(tuple(lines))[1])
+
+
+@lru_cache(maxsize=8)
+def _divided(lines: tuple[SourceLine, ...]) -> tuple[tuple[FileProgram, ...], tuple[SourceLine, ...]]:
+    """Divide a file into its programs and the lines outside of them; each step of a download asks for one or both."""
+    programs, outside = list[FileProgram](), list[SourceLine]()
+    place, inside = "", list[SourceLine]()
     for line in lines:
-        if classify.enters_program(line.text) or inside:
-            inside = not classify.leaves_program(line.text)
+        if classify.enters_program(line.text):
+            place, inside = classify.word_of(line.text)[1], []
+        elif not place:
+            outside.append(line)
+        elif classify.leaves_program(line.text):
+            programs.append(FileProgram(place, tuple(inside)))
+            place = ""
         else:
-            found.append(line)
-    return found
+            inside.append(line)
+    return tuple(programs), tuple(outside)
 
 
 @lru_cache(maxsize=4096)

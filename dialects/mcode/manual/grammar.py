@@ -16,10 +16,10 @@ from __future__ import annotations
 import re
 from collections.abc import Container
 from dataclasses import dataclass, field
+from functools import lru_cache
 from math import inf
 from typing import NamedTuple
 
-from multidrop.dialects.codec import Command
 from multidrop.dialects.mcode.manual.errors import ErrorNumber
 from multidrop.dialects.mcode.manual.table import MDRIVE, MNEMONICS, lookup
 
@@ -33,6 +33,8 @@ TAKES_NAME = frozenset({"BP", "BR", "CL", "CP", "DC", "EX", "IC", "IV", "LB", "O
 """Instructions whose first argument may be a name, so that the name may follow without a space."""
 
 
+READ_LINES = 4096
+"""The number of lines that are kept as they were read: session, codec and conversation ask for the same one."""
 MOST_TOKENS = 256
 """Far more than fit into a drive's 64 characters; limits the parser's recursion."""
 
@@ -156,16 +158,17 @@ def is_name(word: str) -> bool:
 
 def tokens(line: str) -> list[Token]:
     """Return all tokens of a line, remark included, without spaces. Never fails."""
-    return list(line.read_by(_tokens) if isinstance(line, Command) else _tokens(line))
+    return list(_tokens(line))
 
 
-def _tokens(line: str) -> list[Token]:
+@lru_cache(maxsize=READ_LINES)
+def _tokens(line: str) -> tuple[Token, ...]:
     found = []
     for match in _TOKEN.finditer(line):
         kind = match.lastgroup or "bad"
         if kind != "space":
             found.append(Token(kind, match.group(), match.start()))
-    return found
+    return tuple(found)
 
 
 def words(line: str) -> set[str]:
@@ -191,10 +194,15 @@ def parse(line: str, names: Container[str] = ()) -> Statement | None:
 
     Raises LineError.
     """
-    found = line.read_by(_read) if isinstance(line, Command) and not names else _read(line, names)
+    found = _read(line, names) if names else _read_alone(line)
     if isinstance(found, LineError):
-        raise found
+        raise LineError(found.code, found.column, found.why)  # one that is kept would gather tracebacks
     return found
+
+
+@lru_cache(maxsize=READ_LINES)
+def _read_alone(line: str) -> Statement | LineError | None:
+    return _read(line)
 
 
 def _read(line: str, names: Container[str] = ()) -> Statement | LineError | None:
@@ -211,7 +219,7 @@ def _read(line: str, names: Container[str] = ()) -> Statement | LineError | None
 
 def parsed(line: str, names: Container[str] = ()) -> Statement | None:
     """Parse a line; None also for one that no drive accepts."""
-    found = line.read_by(_read) if isinstance(line, Command) and not names else _read(line, names)
+    found = _read(line, names) if names else _read_alone(line)
     return None if isinstance(found, LineError) else found
 
 

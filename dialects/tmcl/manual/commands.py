@@ -12,8 +12,8 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import IntEnum
+from functools import lru_cache
 
-from multidrop.dialects.codec import Command as TypedCommand
 from multidrop.dialects.files import rows
 from multidrop.dialects.text import counted
 
@@ -214,18 +214,19 @@ class LineError(ValueError):
 
 def parse(text: str) -> Call:
     """The command in a line. Raises LineError."""
-    found = text.read_by(_read) if isinstance(text, TypedCommand) else _read(text)
+    found = _read(text)
     if isinstance(found, LineError):
-        raise found
+        raise LineError(*found.args)  # one that is kept would gather tracebacks
     return found
 
 
 def parsed(text: str) -> Call | None:
     """The command in a line; None for an invalid line."""
-    found = text.read_by(_read) if isinstance(text, TypedCommand) else _read(text)
+    found = _read(text)
     return None if isinstance(found, LineError) else found
 
 
+@lru_cache(maxsize=4096)
 def _read(text: str) -> Call | LineError:
     try:
         return _parsed(text)
