@@ -77,6 +77,11 @@ class Halt:
     """A drive moves on, or its program runs on, after the last attempt to stop it."""
 
     @property
+    def delivered(self) -> bool:
+        """Whether its bytes have left, with a part for every drive."""
+        return bool(self.data) and not self.missed and not isinstance(self.link.lost, Undelivered)
+
+    @property
     def affected(self) -> tuple[Drive, ...]:
         return self.drives + self.others
 

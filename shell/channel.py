@@ -69,6 +69,8 @@ class Tasks:
             task.cancel()
 
     def _others(self) -> list[asyncio.Task[Any]]:
+        if not self._running:
+            return []
         try:
             current = asyncio.current_task()
         except RuntimeError:  # in a signal handler or a callback

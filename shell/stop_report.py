@@ -198,7 +198,9 @@ def unreached(halts: Iterable[Halt], now: float) -> list[str]:
     """A line for each bus with drives that a stop did not reach, with their last readings."""
     lines = []
     for halt in halts:
-        missed = [drive for drive in halt.drives if halt.fate(drive) is Fate.NOT_REACHED]
+        missed = []
+        if not halt.delivered:
+            missed = [drive for drive in halt.drives if halt.fate(drive) is Fate.NOT_REACHED]
         if missed or not (halt.data or halt.drives):
             seen = ", ".join(f"{drive.label or drive.address} {last_seen(drive, now)}".strip() for drive in missed)
             why = ", ".join(dict.fromkeys(halt.trouble)) or "a defect"

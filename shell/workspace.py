@@ -333,9 +333,11 @@ class Workspace(Channel):
             self.notify(f"{why}: {to_all}; macros and scripts wait for /resume")
             for text in (*unreached, *map(stop_report.not_open, opening)):
                 self.notify(text, warning=True)
-            for name, raw in self.raw.items():
-                text = f"{name}: raw, so the stop of {raw.bus.roster.family.name} was sent, and no drive was asked"
-                self.notify(text, bus=name, warning=True)
+            for bus, record in self._open.items():
+                if record.raw is not None:
+                    name = bus.name
+                    text = f"{name}: raw, so the stop of {bus.roster.family.name} was sent, and no drive was asked"
+                    self.notify(text, bus=name, warning=True)
             for name, bus in self.buses.items():
                 if name in self.reconnections.trying and bus.link.lost is not None:
                     text = f"{name}: the stop is the first to be sent when the line is back"
