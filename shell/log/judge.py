@@ -102,6 +102,9 @@ class _Session:
         """Replies of drives since a stop after which they got no command."""
         self._begun = False
         """Its beginning is in the log."""
+        self._early: dict[str, str] = {}
+        """By bus, what was received before anything was sent: it may answer what was sent before the log began."""
+        self._sent_on: set[str] = set()
         self._earlier: Counter[Place] = Counter()
         """Those before the last stop, which an earlier one may be confirmed by in this moment."""
         self._commanded: set[Place] = set()
@@ -138,6 +141,8 @@ class _Session:
             ):
                 self._replies[entry.bus, entry.drive] += 1
                 del self._asked[entry.bus]
+            if not self._begun and entry.bus not in self._sent_on:
+                self._early[entry.bus] = self._early.get(entry.bus, "") + entry.text
             for (bus, *_), typed in self._last.items():
                 typed.heard += entry.text * (bus == entry.bus)
             for (bus, _), typed in self._silent:
@@ -176,6 +181,7 @@ class _Session:
 
     def _sent(self, entry: Entry) -> Iterator[tuple[str, str]]:
         place, earlier = (entry.bus, entry.drive), self._stop is not None and entry.time < self._stop
+        self._sent_on.add(entry.bus)
         if entry.bus in self._due and not earlier:
             self._due.discard(entry.bus)
             if not entry.stop:
@@ -216,8 +222,8 @@ class _Session:
     def _printed(self, entry: Entry) -> Iterator[tuple[str, str]]:
         exchanges = self._exchanges.get((entry.bus, entry.drive))
         asked = any(key[:2] == (entry.bus, entry.drive) for key in self._last)
-        if exchanges is None or not asked:  # what it answers was typed before the log began
-            return
+        if exchanges is None or not asked or entry.text in self._early.get(entry.bus, ""):
+            return  # what it answers was typed, or sent, before the log began
         found = [_named(sent, received, entry.text) for sent, received in exchanges]
         names = {name for each in found if each is not None for name in each}
         if all(each is None for each in found):

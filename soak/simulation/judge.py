@@ -11,7 +11,7 @@ from multidrop.transports.relay import Kind, frame
 from soak.simulation.bounds import beyond
 from soak.simulation.departures import DEPARTURES
 from soak.simulation.history import Stop
-from soak.simulation.outcomes import OUTCOMES
+from soak.simulation.outcomes import ASTRAY, OUTCOMES, arrived_late
 from soak.simulation.promises import PROMISES
 from soak.simulation.rule import Grant, Granted, Rule
 from soak.simulation.world import World
@@ -101,7 +101,9 @@ def _restored(world: World) -> Iterator[str | Granted]:
         silent = f"{line}: {drive} does not reply"  # what is owed to it is kept for the session after this one
         warned = any(line in text and said.search(text) for _, text in world.history.notices)
         asked = any(text == silent and at >= world.history.began[-1] for at, text in world.history.notices)
-        yield Granted(SAID, found) if warned or asked else found
+        borrowed = (each for each in world.history.executed if each.text == "EM=0")
+        late = any(arrived_late(world, each) for each in borrowed if (each.line, each.drive) == (line, drive))
+        yield Granted(ASTRAY, found) if late else Granted(SAID, found) if warned or asked else found
 
 
 def _ends(world: World) -> Iterator[str]:
@@ -133,7 +135,7 @@ RULES = (
         "A setting that a session has borrowed from a drive is restored by it, or by the next one.",
         "What a report means",
         _restored,
-        (SAID,),
+        (SAID, ASTRAY),
     ),
     Rule("bounded", "What waits in a session is bounded.", "What a report means", beyond),
     Rule("log", "A session log breaks no rule of `log judge`.", "What a report means", _logged),

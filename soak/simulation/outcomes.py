@@ -12,7 +12,7 @@ from collections.abc import Iterator
 from math import inf
 
 from soak.languages import TICKS
-from soak.simulation.history import Command, Damage, Held, History, Outcome, Shown
+from soak.simulation.history import Command, Damage, Executed, Held, History, Outcome, Shown
 from soak.simulation.rule import Grant, Granted, Rule
 from soak.simulation.world import NUMBER, World
 
@@ -148,6 +148,12 @@ def _astray(world: World, line: str, since: float, until: float) -> bool:
     """Whether a datagram of a line arrived twice or late in a time, or so before it that its reply came then."""
     host = world.place(line).host
     return any(name == host and since - AFTER <= at <= until for at, name in world.network.astray)
+
+
+def arrived_late(world: World, executed: Executed) -> bool:
+    """Whether a line was executed as its datagram arrived twice or late."""
+    host = world.place(executed.line).host
+    return any(name == host and executed.at - PROMPTLY <= at <= executed.at for at, name in world.network.astray)
 
 
 def _stop_unanswered(world: World, command: Command) -> bool:

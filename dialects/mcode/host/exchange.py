@@ -172,6 +172,7 @@ def check_printed(state: MCodeState, reply: Reply, refusal: str = "") -> None:
     if refusal and reply.end is End.REFUSED and not reply.doubtful:
         raise Refused(f"{who(state)} {refusal}")
     if reply.end is not End.DONE:
+        state.error_possible()  # noise may have made a print of it that the drive refuses
         if reply.end is not End.NAK:
             state.reply_lost()
         raise NoAnswer(f"{who(state)} does not reply ({reply.end.value})")

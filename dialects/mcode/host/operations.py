@@ -15,8 +15,8 @@ from multidrop.dialects.mcode.host import classify, exchange
 from multidrop.dialects.mcode.host.before_request import before_request, find_again, first_print, value_of
 from multidrop.dialects.mcode.host.classify import INTEGER
 from multidrop.dialects.mcode.host.codec import EVERY_DRIVE, MCode
-from multidrop.dialects.mcode.host.identity import set_wire
-from multidrop.dialects.mcode.host.state import MCodeState, refuse_in_program, report_error, who
+from multidrop.dialects.mcode.host.identity import find, set_wire
+from multidrop.dialects.mcode.host.state import MCodeState, Place, refuse_in_program, report_error, who
 from multidrop.dialects.mcode.manual import grammar
 from multidrop.dialects.mcode.manual.grammar import Number, Unary, parsed
 from multidrop.dialects.mcode.manual.mnemonic import EXPANDED
@@ -60,7 +60,14 @@ def enter_program(state: MCodeState, request: Request) -> Procedure[tuple[str, .
 
 
 def echo_everything(state: MCodeState) -> Procedure[None]:
-    """Set EM=0 for a while; `state.restore` records the previous mode and the drive before that."""
+    """Set EM=0 for a while; `state.restore` records the previous mode and the drive before that.
+
+    A drive that was silent at the opening is identified first: nobody restores an unknown one.
+    """
+    if not state.product:
+        place = Place(state.codec.party, state.address, (int(state.codec.checksum > 0),))
+        if not (yield from find(state, place)):
+            raise NoAnswer(f"{who(state)} does not reply: 'EM=0' was not sent")
     if not state.serial:
         state.serial_read((yield from serial_number(state)))
     if state.restore is None:

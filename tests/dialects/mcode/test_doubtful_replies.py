@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from multidrop.dialects import End, Kind, NoAnswer, Reply
+from multidrop.dialects import End, Kind, NoAnswer, Priority, Reply
 from multidrop.dialects.mcode.family import MCODE
 from multidrop.dialects.mcode.host.codec import MCode
 from multidrop.dialects.mcode.host.exchange import fresh
@@ -67,6 +67,15 @@ def test_an_error_is_not_read_twice_where_it_may_have_been_read_once():
     assert talk.send(Reply(end=End.NAK)).text.startswith("PR ER")
     with pytest.raises(NoAnswer, match="the reason could not be read"):
         talk.send(Reply(end=End.NAK, detail="prints follow the NAK"))
+
+
+def test_a_line_is_not_blamed_for_the_error_of_a_reading_that_noise_made_another_print():
+    state = MCodeState(MCode(em=1, checksum=1, escape=1))
+    talk = MCODE.motion(state, Priority.OPERATOR)
+    next(talk)
+    with pytest.raises(NoAnswer):
+        talk.send(Reply(end=End.NAK))
+    assert next(MCODE.perform(state, "MR 1")).text.startswith("PR ER")
 
 
 def test_a_line_whose_ack_came_late_is_not_blamed_for_an_error_that_came_beside_it():

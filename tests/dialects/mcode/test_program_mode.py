@@ -25,6 +25,18 @@ def test_program_mode_is_known_however_it_is_entered(bench, text, em, party, che
     assert desk.witness.executed("R1=7") == []
 
 
+@pytest.mark.parametrize(("party", "check"), [(False, 0), (True, 0), (True, 1)])
+def test_a_drive_that_was_silent_at_the_opening_is_identified_before_its_echo_mode_is_borrowed(bench, party, check):
+    desk = Desk(bench, (1, check), party=party)
+    desk.state.product = ""
+    desk.type("PG 1")
+    owed = desk.state.restore
+    assert owed is not None
+    assert (owed.em, owed.product) == (1, "LMDCM")
+    desk.type("PG")
+    assert desk.agrees() and desk.state.codec.em == 1
+
+
 def test_in_program_mode_nothing_is_asked(bench):
     desk = Desk(bench, (1, 0))
     desk.type("PG 1")

@@ -200,6 +200,17 @@ def test_a_reply_to_what_was_typed_before_the_log_began_is_not_judged(tmp_path: 
     assert found([*HEAD, typed("PR P"), *asked("V", "0"), printed], tmp_path) == [("credited", 6)]
 
 
+@pytest.mark.parametrize(("of", "breaches"), [("session", ["credited"]), ("part", [])])
+def test_a_reply_to_what_was_sent_before_the_log_began_is_not_judged(
+    of: str, breaches: list[str], tmp_path: Path
+) -> None:
+    head = {**HEAD[0], "text": f"{of} of process 7"}
+    heard = {"kind": "received", "bus": "l", "drive": "a", "text": '384112"a"\r\n'}
+    printed = {"kind": "printed", "bus": "l", "drive": "a", "text": "384112"}
+    rows = [head, HEAD[1], typed("SL 7", by="script"), heard, asked("MV", "0")[0], printed]
+    assert [rule for rule, _ in found(rows, tmp_path)] == breaches
+
+
 def test_what_another_origin_types_meanwhile_is_no_silence(tmp_path: Path) -> None:
     rows = [*HEAD, typed("MR 1", by="macro"), command("MR 1")[0], typed("MR 2"), said("a does not reply", "failed")]
     assert found([*rows, typed("MR 3", by="macro")], tmp_path) == []
