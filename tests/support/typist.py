@@ -62,8 +62,8 @@ class Typist:
         drawn = self.app.renderer.last_rendered_screen
         if drawn is None:
             return ""
-        rows = [[drawn.data_buffer[y][x].char for x in range(COLUMNS)] for y in range(drawn.height)]
-        return "\n".join("".join(row).rstrip() for row in rows)
+        rows = [drawn.data_buffer[y] for y in range(drawn.height)]
+        return "\n".join("".join(row[x].char for x in range(max(row, default=-1) + 1)).rstrip() for row in rows)
 
     async def shows(self, text: str) -> None:
         """Wait until the prompt begins with this text."""
