@@ -117,5 +117,6 @@ def _repeating(items: list[pytest.Item], unmeasured: set[str]) -> Iterator[pytes
 def pytest_sessionstart(session: pytest.Session) -> None:
     """Take over from pytest-cov."""
     manager = session.config.pluginmanager
-    if (plugin := manager.getplugin("_cov")) is not None:
+    plugin = manager.getplugin("_cov")
+    if plugin is not None and plugin.cov_controller is not None:  # None: --no-cov
         manager.register(Measuring(plugin))
