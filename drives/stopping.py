@@ -375,7 +375,7 @@ class Stopping:
         tries, until = 0, link.now() + RAMP
         while unconfirmed and link.now() < until:
             found = {drive: await _read(drive, halt) for drive in unconfirmed if not halt.started_since(drive)}
-            if self.last is not None and self.last.number > halt.number and not link.lost:
+            if self.last is not None and self.last.number > halt.number:
                 return  # a later stop of the whole link confirms it, by what is read after that
             for drive, each in found.items():  # whether this reading or a poll after it has confirmed that
                 if each.places and each.none and halt.fate(drive) is Fate.STANDING:
@@ -383,7 +383,7 @@ class Stopping:
             active = {drive: each for drive, each in found.items() if not each.none and not halt.started_since(drive)}
             slow_down = all(each.lessens(before.get(drive)) for drive, each in active.items())
             before = found
-            if active and not slow_down and tries < TRIES:
+            if active and not slow_down and tries < TRIES and not link.lost:
                 tries += 1
                 self._once_more(halt, active, tries)
             # The line of an operator that may start a drive may also be refused, and then nothing has started it.
@@ -407,6 +407,7 @@ class Stopping:
             return
         for drive, each in active.items():
             does = f"still moves at {each.speed} a second" if each.speed else "its program still runs"
+            does = "a stop kept its velocity from being read" if each is ENDLESS else does
             halt.link.notify(f"{drive.shown}: {does}; stop sent again", warning=True)
         self._repeat(halt)
 

@@ -86,6 +86,7 @@ FIXED = {
     400424: "a reply that may have been another one's, taken for proof as the line was lost in the question after it",
     403738: "a program `ssh` that was left as its login was cancelled in the moment of its time-out",
     430108: "one stop of three modules, whose motors were not counted yet (of the simulation itself)",
+    600424: "an earlier stop, confirmed as the line was lost after another one, and a velocity of 2 to the 40",
 }
 DERIVED = 12
 """The number of seeds that follow from the commit."""

@@ -355,6 +355,34 @@ async def test_what_was_read_before_a_stop_confirms_no_drive_after_it():
     await shop.bus.stopped()
 
 
+async def test_what_was_read_before_a_stop_says_nothing_of_it_either_where_the_line_is_lost_in_that_moment():
+    shop = await SimulatedBus(*(party(name) for name in "abc")).open(*"abc")
+    await shop.send("a", "SL 50000")
+    first = len(shop.sent)
+    shop.bus.stop()
+    await until(lambda: shop.sent[-1].startswith(b"bPR") and b"".join(shop.sent[first:]).count(b"aPR") > 1)
+    known = shop.said
+    second = shop.bus.stop()
+    shop.floor.floor.wires["w"].unplug()
+    await shop.bus.stopped()
+    said = shop.said.removeprefix(known)
+    assert "stopped, velocity" not in said and "stop sent again" not in said, said
+    assert {second.fate(drive) for drive in shop.bus.drives.values()} == {Fate.NOT_KNOWN}
+
+
+async def test_a_drive_that_a_stop_kept_from_being_read_is_said_to_move_at_no_velocity():
+    shop = await SimulatedBus(party("a"), party("b")).open("a", "b")
+    a = shop.bus.drives["a"]
+    shop.bus.stop()
+    for _ in range(3):  # stops of it alone, each before it is read
+        read = shop.written.count(b"aPR")
+        await until(lambda before=read: shop.written.count(b"aPR") > before)
+        shop.bus.stop([a])
+    await shop.bus.stopped()
+    assert "a: a stop kept its velocity from being read; stop sent again" in shop.said
+    assert "still moves" not in shop.said
+
+
 async def test_a_drive_that_was_only_spoken_to_is_stopped_too():
     shop = await SimulatedBus(party("a", ES=3, CK=0), party("q", EM=0, ES=2, CK=0)).open("a")
     await shop.bus.at("q").send("SL 50000")
