@@ -35,13 +35,13 @@ def _connections(world: World, since: int = 0) -> Iterator[Connection]:
         ends = next((index for _, other, index in history.opened[number + 1 :] if other == line), None)
         left = history.written[begins:ends]
         whole, before = (  # a message may have begun to leave
-            _for_drives(places[line[:2]].kind, b"".join(data for _, port, data in part if port == line))
+            for_drives(places[line[:2]].kind, b"".join(data for _, port, data in part if port == line))
             for part in (left, left[: max(0, since - begins)])
         )
         yield Connection(at, line, whole[len(before) :])
 
 
-def _for_drives(kind: str, left: bytes) -> bytes:
+def for_drives(kind: str, left: bytes) -> bytes:
     """Those bytes of a connection that are for the drives."""
     if kind == "rfc2217":
         return b"".join(each.data for each in telnet.Decoder().receive(left) if isinstance(each, telnet.Data))

@@ -8,8 +8,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 from multidrop.transports.relay import Kind, frame
+from soak.languages import LANGUAGES
 from soak.simulation.bounds import beyond
-from soak.simulation.departures import DEPARTURES
+from soak.simulation.departures import DEPARTURES, for_drives
 from soak.simulation.history import Stop
 from soak.simulation.outcomes import ASTRAY, OUTCOMES, arrived_late
 from soak.simulation.promises import PROMISES
@@ -56,8 +57,16 @@ def _first(world: World) -> Iterator[str | Granted]:
                 begins = [each for each in begins if each]
                 if world.place(line[:2]).kind == "ssh":
                     begins = [*_behind_one_drop(world, line, first, begins)]
+                    if any(_begins_with_a_stop(world, line, each) for each in begins):
+                        continue  # one of a stop before it that the far end had not taken: the next follows it
                 if not any(form.startswith(each) or each.startswith(form) for form in forms for each in begins):
                     yield f"{line}: stop at {stop.at:.6f}, {begun!r} left at {after[0][0]:.6f}"
+
+
+def _begins_with_a_stop(world: World, line: str, left: bytes) -> bool:
+    """Whether the first message for the drives, to a relay, is a stop."""
+    place = world.place(line[:2])
+    return bool(re.match(LANGUAGES[place.language].stop, for_drives(place.kind, left)))
 
 
 def _behind_one_drop(world: World, line: str, first: int, begins: list[bytes]) -> Iterator[bytes]:

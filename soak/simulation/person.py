@@ -89,12 +89,16 @@ class Person:
         if self._coming and not self.keyboard.closed:
             self.read(self._coming.popleft())
 
-    def read(self, data: bytes) -> None:
-        """One read of the keyboard's thread."""
+    def read(self, data: bytes, held: float = 0.0) -> None:
+        """One read of the keyboard's thread, which is then held up for so long, s, before it passes the bytes on."""
         self._typed(data)
         if STOP_KEY in data:
             self.keyboard.stop_ahead()
-        self._loop.call_soon(self.keyboard._read, data)
+        if held:
+            self._at = max(self._at, self._loop.now + held)
+            self._loop.call_at(self._at, self.keyboard._read, data)
+        else:
+            self._loop.call_soon(self.keyboard._read, data)
 
     def paste(self, text: str, enter: bool = True) -> None:
         """Paste text in brackets, and type Enter behind it."""

@@ -31,12 +31,8 @@ LOOK = 0.0004
 """The time between two looks at what a session does, s."""
 WAIT = 8.0
 """The longest time that is looked, s."""
-TAKING_OVER = (
-    "workspace Workspace.stop:",
-    "stopping Stopping.halt",
-    "stopping Stopping._write:",
-)
-"""The points at which the loop takes over a stop."""
+INTO_THE_PIPE = "pipe DescriptorPipe.write: with"
+"""The point at which a line is about to be passed to a port."""
 
 
 def _arrived(world: World) -> int:
@@ -143,7 +139,8 @@ def two_at_a_share(world: World, rng: Random) -> float:
 def stop_at_a_write(world: World, rng: Random) -> float:
     """Let operators work, and stop in the instruction in which a line is about to leave."""
     _operators(world, rng, _some(world, rng))
-    names = [each for each in points() if each.startswith(WRITING) and not each.startswith("usb")]
+    form = INTO_THE_PIPE if rng.random() < 0.5 else WRITING
+    names = [each for each in points() if each.startswith(form) and not each.startswith("usb")]
     if any(each.kind == "usb" for each in world.places) and rng.random() < 0.7:
         names = [each for each in points() if each.startswith("usb")]
     held = (1 + int(rng.random() * OWN_WORK), 1 + int(rng.random() * 3000)) if rng.random() < 0.3 else (0, 0)
@@ -161,18 +158,17 @@ def stop_at_a_write(world: World, rng: Random) -> float:
 
 
 def two_stops(world: World, rng: Random) -> float:
-    """Stop; the thread of the next stop is held up as it has written, while the loop takes over the first one."""
-    if world.person._coming:
+    """Stop twice; the thread of the second stop is held up as it has written, while the loop takes over the first."""
+    person = world.person
+    if person._coming:
         return stop_at_a_write(world, rng)
-    names = [each for each in points() if each.startswith(TAKING_OVER)]
-    own = 200 + int(rng.random() * OWN_WORK)
-    aim = Aim(rng.choice(names), 1, rng.choice((0, 0, 2)), own, 3000 + int(rng.random() * 20_000))
     world.stops += 1
     between = world.command(rng) + world.command(rng) * (rng.random() < 0.5)
-    world.process.run(world.person.read, STOP + between)
+    world.process.run(person.read, STOP + between)
     world.stops += 1
-    world.person.type_stop(aim)
-    world.person.type(b"/resume\r")
+    if not world.process.dead:
+        world.process.run(person.read, STOP, 0.1 + rng.random() * 0.5)
+        person.type(b"/resume\r")
     return 1.0
 
 
