@@ -69,6 +69,8 @@ def typed(world: World, data: bytes, session: Session, who: str = "") -> None:
     if STOP in data:
         buses = {name: bus for name, bus in session.buses.items() if not bus.link.lost}
         forms = {f"{name}{who}": _forms(world, bus) for name, bus in buses.items()}
+        repeats = {name + who: stop_forms(bus.roster).repeats for name, bus in buses.items() if name not in session.raw}
+        pieces = {name: tuple(each.data for each in found) for name, found in repeats.items()}
         trying = session.reconnections.trying
         for name, bus in buses.items():
             pipe = bus.link.transport
@@ -77,9 +79,8 @@ def typed(world: World, data: bytes, session: Session, who: str = "") -> None:
             ):  # the far side has taken nothing of the last stops
                 world.history.full.append((world.loop.now, f"{name}{who}"))
         lost = tuple(name + who for name, bus in session.buses.items() if bus.link.lost and name in trying)
-        world.history.stops.append(Stop(world.loop.now, forms, who, len(world.history.written), lost=lost))
-        pieces = {name + who: stop_forms(bus.roster).repeats for name, bus in buses.items() if name not in session.raw}
-        world.history.stops[-1].pieces = {name: tuple(each.data for each in found) for name, found in pieces.items()}
+        stop = Stop(world.loop.now, forms, who, len(world.history.written), lost=lost, pieces=pieces)
+        world.history.stops.append(stop)
 
 
 def _forms(world: World, bus: Bus) -> tuple[bytes, ...]:

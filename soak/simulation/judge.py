@@ -7,7 +7,7 @@ from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 
-from multidrop.transports.relay import Kind, frame
+from multidrop.transports.relay import Garbled, Kind, frame
 from soak.languages import LANGUAGES
 from soak.simulation.bounds import beyond
 from soak.simulation.departures import DEPARTURES, for_drives
@@ -33,7 +33,7 @@ def _first(world: World) -> Iterator[str | Granted]:
     It leaves at once, whatever the loop does, unless the line is found to be lost.
     """
     history = world.history
-    for stop in history.stops:
+    for number, stop in enumerate(history.stops):
         killed = not stop.who and any(stop.at <= at <= stop.at + SOON for at in history.deaths)
         for line, forms in {} if killed else stop.forms.items():
             first, rest = stop.own[line]  # the rest of a message that leaves whole; other rests are dropped
@@ -46,7 +46,7 @@ def _first(world: World) -> Iterator[str | Granted]:
                     full = any(name == line and stop.at <= at <= stop.at + SOON for at, name in history.full)
                     yield Granted(FULL, words) if full else words
             else:
-                following = (other.own[line][0] for other in history.stops if line in other.own and other.at > stop.at)
+                following = (other.own[line][0] for other in history.stops[number + 1 :] if line in other.own)
                 ends = next((at for at in following if at > first), None)  # where the next stop drops the rest of it
                 own = [(at, data) for at, port, data in history.written[first:ends] if port == line]
                 begun = b"".join(data for at, data in own if at <= stop.at + SOON)
@@ -66,7 +66,10 @@ def _first(world: World) -> Iterator[str | Granted]:
 def _begins_with_a_stop(world: World, line: str, left: bytes) -> bool:
     """Whether the first message for the drives, to a relay, is a stop."""
     place = world.place(line[:2])
-    return bool(re.match(LANGUAGES[place.language].stop, for_drives(place.kind, left)))
+    try:
+        return bool(re.match(LANGUAGES[place.language].stop, for_drives(place.kind, left)))
+    except Garbled:  # the rest of a message that had begun to leave
+        return False
 
 
 def _behind_one_drop(world: World, line: str, first: int, begins: list[bytes]) -> Iterator[bytes]:
