@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import logging
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from types import TracebackType
 from typing import Any, Generic, NamedTuple, TypeVar
@@ -243,7 +243,8 @@ class EventQueue(Publisher[BusEvent]):
         """Publish what was collected; called by a watcher, it leaves that to the call under way."""
         if self._telling or not self._events:
             return
-        self._telling, event, callbacks = True, self._events[0], iter(tuple[Watcher]())
+        callbacks: Iterator[Watcher] = iter(())
+        self._telling, event = True, self._events[0]
         try:
             while self._telling:
                 with self.subscribers.isolated:
