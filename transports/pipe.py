@@ -199,7 +199,7 @@ class DescriptorPipe(Pipe):
         return dropped
 
     def _drop(self, whole: bool) -> int:
-        begun = self._pending[0] if whole and self._pending and _begun(self._pending[0]) else None
+        begun = self._pending[0] if whole and self._pending and begun(self._pending[0]) else None
         dropped = sum(map(len, self._pending)) - len(begun or b"")
         self._pending.clear()
         if begun:
@@ -302,6 +302,6 @@ class DescriptorPipe(Pipe):
         return self._endpoint.explain(error)
 
 
-def _begun(chunk: memoryview) -> bool:
+def begun(chunk: memoryview) -> bool:
     """True if the system has taken the beginning of the write that this chunk is the rest of."""
     return chunk.nbytes < memoryview(chunk.obj).nbytes

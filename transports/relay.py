@@ -43,7 +43,8 @@ SILENCE = 6.0
 """Without a byte from this side for that long, s, the far side ends: a cut network must not keep the port locked.
 
 By then this side has given up. What it sent before must not be executed later."""
-_HEAD = 3
+HEAD = 3
+"""The bytes of a frame before its payload."""
 
 
 class Kind(IntEnum):
@@ -91,14 +92,14 @@ class Frames:
     def take(self, data: bytes) -> Iterator[tuple[Kind, bytes]]:
         """Take bytes in, and return the frames that are whole by now. Raises Garbled at the first wrong byte."""
         self._held += data
-        while len(self._held) >= _HEAD:
-            kind, size = self._held[0], int.from_bytes(self._held[1:_HEAD])
+        while len(self._held) >= HEAD:
+            kind, size = self._held[0], int.from_bytes(self._held[1:HEAD])
             if kind not in _KINDS or size > MOST:
-                raise Garbled(f"{bytes(self._held[:_HEAD]).hex(' ')} is not the beginning of a frame")
-            if len(self._held) < _HEAD + size:
+                raise Garbled(f"{bytes(self._held[:HEAD]).hex(' ')} is not the beginning of a frame")
+            if len(self._held) < HEAD + size:
                 return
-            payload = bytes(self._held[_HEAD : _HEAD + size])
-            del self._held[: _HEAD + size]
+            payload = bytes(self._held[HEAD : HEAD + size])
+            del self._held[: HEAD + size]
             yield Kind(kind), payload
 
 

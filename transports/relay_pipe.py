@@ -9,11 +9,12 @@ from __future__ import annotations
 import asyncio
 import socket
 import threading
+from collections import deque
 from collections.abc import Callable
 
 from multidrop.transports import PortControl
-from multidrop.transports.pipe import DescriptorPipe
-from multidrop.transports.relay import BEAT, CREDIT, MISSED, MOST, Frames, Garbled, Kind, Setting, frame
+from multidrop.transports.pipe import DescriptorPipe, begun
+from multidrop.transports.relay import BEAT, CREDIT, HEAD, MISSED, MOST, Frames, Garbled, Kind, Setting, frame
 
 _READ = 4096
 _WAITED = 64 * 1024
@@ -71,8 +72,8 @@ class RelayEndpoint:
         self._connection = connection
         self._frames = Frames()
         self._early = early
-        self._rest = bytearray()
-        """Frames that the system has not taken."""
+        self._rest: deque[memoryview] = deque()
+        """Frames, and the rest of one, that the system has not taken."""
         self._sent = self._done = self._base = 0
         """Bytes for the port: sent; reported as sent by the port or dropped; sent before the last drop."""
         self._urgent = self._ended = self._lost = False
@@ -135,20 +136,25 @@ class RelayEndpoint:
             raise BlockingIOError
         self._urgent = False
         for at in range(0, allowed, MOST):
-            self._rest += frame(Kind.DATA, data[at : min(at + MOST, allowed)])
+            self._rest.append(memoryview(frame(Kind.DATA, data[at : min(at + MOST, allowed)])))
         self._sent += allowed
         self.flush()
         return allowed
 
     def send(self, made: bytes) -> None:
-        self._rest += made
+        self._rest.append(memoryview(made))
         self.flush()
 
     def flush(self) -> None:
         """Write waiting frames until the system takes no more."""
         try:
             while self._rest:
-                del self._rest[: self._connection.write(self._rest)]
+                first = self._rest[0]
+                taken = self._connection.write(first)
+                if taken < len(first):
+                    self._rest[0] = first[taken:]
+                else:
+                    self._rest.popleft()
         except (BlockingIOError, InterruptedError):
             return
 
@@ -156,10 +162,20 @@ class RelayEndpoint:
         return max(0, self._sent - self._done)
 
     def drop(self) -> int:
-        """Have the far side drop what its port has not sent; what is written next leaves at once and whole."""
+        """Drop what waits here, and have the far side drop what its port has not sent.
+
+        What is written next leaves at once and whole.
+        """
         held = self.unsent()
+        leaves = deque[memoryview]()
+        for each in self._rest:
+            if each[0] == Kind.DATA and not begun(each):
+                self._sent -= len(each) - HEAD
+            else:
+                leaves.append(each)
+        self._rest = leaves
         self._base, self._urgent = self._sent, True
-        self._rest += frame(Kind.DROP)
+        self._rest.append(memoryview(frame(Kind.DROP)))
         return held
 
     def explain(self, error: OSError | None) -> str:

@@ -132,7 +132,8 @@ class Way:
 
     def __init__(self) -> None:
         self.there, self.back = bytearray(), bytearray()
-        self.full = False
+        self.takes = 10**6
+        """Number of bytes that it takes until it is full."""
 
     def fileno(self) -> int:
         raise NotImplementedError
@@ -145,10 +146,12 @@ class Way:
         return data
 
     def write(self, data: bytes | bytearray | memoryview) -> int:
-        if self.full:
+        taken = bytes(data[: self.takes])
+        if not taken:
             raise BlockingIOError
-        self.there += data
-        return len(data)
+        self.there += taken
+        self.takes -= len(taken)
+        return len(taken)
 
     def last_words(self) -> str:
         return "client_loop: send disconnect: Broken pipe"
@@ -272,17 +275,32 @@ def test_of_what_arrives_after_too_long_a_silence_only_a_stop_is_passed_on(both:
     assert bytes(both.port.sent) == b"\x1b"
 
 
-def test_a_way_that_is_full_gets_the_rest_of_a_frame_first(both: Both) -> None:
-    both.way.full = True
-    assert both.write(b"PR P\r") == 5
+@pytest.mark.parametrize("taken", range(len(frame(Kind.DATA, b"MR 51200\r"))))
+def test_on_a_way_that_is_full_a_stop_follows_only_the_rest_of_a_frame_that_has_begun(both: Both, taken: int) -> None:
+    begun = frame(Kind.DATA, b"MR 51200\r") if taken else b""
+    both.way.takes = taken
+    assert both.write(b"MR 51200\r") == 9
     assert both.near.blocked
-    both.near.drop()
+    assert both.near.drop() == 9
     assert both.write(b"\x1b") == 0
-    both.way.full = False
+    both.way.takes = 10**6
     assert both.write(b"\x1b") == 1
+    assert bytes(both.way.there) == begun + frame(Kind.DROP) + frame(Kind.DATA, b"\x1b")
     both.deliver()
     both.send_all()
+    both.answer()
     assert bytes(both.port.sent) == b"\x1b"
+    assert both.near.unsent() == 0 and both.near.room == CREDIT
+
+
+def test_a_change_of_a_setting_that_waits_is_not_dropped(both: Both) -> None:
+    both.way.takes = 0
+    change = frame(Kind.SET, b"\x01\x01\x00\x00\x25\x80")
+    both.near.send(change)
+    both.near.drop()
+    both.way.takes = 10**6
+    both.near.flush()
+    assert bytes(both.way.there) == change + frame(Kind.DROP)
 
 
 def test_bytes_of_the_port_come_back_in_order_and_its_loss_is_named(both: Both) -> None:
