@@ -199,11 +199,11 @@ class DescriptorPipe(Pipe):
         return dropped
 
     def _drop(self, whole: bool) -> int:
-        begun = self._pending[0] if whole and self._pending and begun(self._pending[0]) else None
-        dropped = sum(map(len, self._pending)) - len(begun or b"")
+        rest = self._pending[0] if whole and self._pending and begun(self._pending[0]) else None
+        dropped = sum(map(len, self._pending)) - len(rest or b"")
         self._pending.clear()
-        if begun:
-            self._pending.append(begun)
+        if rest:
+            self._pending.append(rest)
         return dropped + (0 if whole else self._endpoint.drop())
 
     def preempt(self, whole: bool, make: Callable[[int], bytes]) -> bool:

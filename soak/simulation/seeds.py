@@ -58,6 +58,7 @@ FIXED = {
     207802: "the error of a question at the opening that noise had damaged, which a later command was blamed for",
     207760: "a reply with the number of the next transaction, which no server gives (of the simulation itself)",
     300446: "a checksum behind the mark of a drive alone, which `log judge` took for another drive's name",
+    1000065: "a command that waited for a full connection of a relay, which left ahead of the stop",
     206086: "a stop in a starved loop, before the loop said it (of the simulation itself)",
     206172: "a line after a stop in the same moment, whose motion was stopped again as one that went on",
     205844: "a late reply to what ends a half-sent line at a stop, which was taken for the refusal of a command",
