@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from multidrop.dialects import DriveState
+from multidrop.dialects import DriveState, Owed
 from multidrop.dialects.state import Remembered
 
 GLOBAL = ("*", "^")
@@ -16,6 +16,8 @@ class Keeper:
 
     baud = 0
     """The baud rate of the port; 0 where it has none."""
+    owed: tuple[Owed, ...] = ()
+    """What is written down, also for drives that were not found yet."""
 
     async def owes(self, state: DriveState) -> None:
         """Write down what is to be restored in this drive (`state.restore`), if anything; done on return."""

@@ -279,7 +279,8 @@ class Roster:
             self.stated = hints.drives
             return await self.search(hints)
         states = [drive.state for drive in self.drives.values()]
-        owed = tuple(state.restore for state in states if state.restore is not None)
+        own = (state.restore for state in states if state.restore is not None)
+        owed = tuple(dict.fromkeys((*own, *self._keeper.owed)))  # a drive may have been silent at the opening
         mark = max((state.sync_marks for state in states), default=0)
         first = replace(hints, checksum=None, em=None, cut="", owed=owed, remembered=(), first_mark=mark)
         names = tuple(filter(None, self.drives))

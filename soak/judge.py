@@ -15,6 +15,7 @@ from enum import Enum
 from typing import Any
 
 from multidrop.dialects import Refused
+from multidrop.simulator.lexium.device import MCodeDevice
 
 
 class Word(Enum):
@@ -58,6 +59,11 @@ class Witness:
         """Executes a line that does not count."""
         self._asks, self._refused = asks, refused
         device.execute = self._seen
+
+    @property
+    def boots(self) -> int:
+        """How often an MCode drive has begun again; a byte of noise can make it do so (^C)."""
+        return self.device.power_unit.boots if isinstance(self.device, MCodeDevice) else 0
 
     def _seen(self, text: Any, now: float, **how: Any) -> Any:
         stored = getattr(self.device, "programming", None) is not None

@@ -147,7 +147,7 @@ class NoisyLine:
         self.floor._turn()
 
     def _boots(self) -> int:
-        return sum(getattr(device, "boots", 0) for device in self.devices.values())
+        return sum(each.boots for each in self.witnesses.values())
 
     async def _open(self) -> None:
         settings = Settings({}, self._folder / "config", self._folder / "state")

@@ -238,7 +238,7 @@ class _Session:
             typed = self._typed.get(target)
             if entry.kind == "failed" and typed is not None and typed.sent:
                 yield "not sent", f"{typed.text!r} was sent"
-            if entry.kind == "notice" or target in self._lines:
+            if found[2] or target in self._lines:
                 self._unsent.add(target)
         if entry.kind == "notice" and self._stop is not None and STOPPED.match(entry.text):
             drive = entry.text.removeprefix(f"{entry.bus}: ").rpartition("stopped, ")[0].removesuffix(": ")

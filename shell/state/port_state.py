@@ -105,7 +105,7 @@ class PortState(Keeper):
 
     def __init__(self, folder: Path, port: str, baud: int = 0) -> None:
         self.cut = ""
-        self.owed: tuple[Owed, ...] = ()
+        self.owed = ()
         self.remarks: list[str] = []
         self.notify: Callable[[str], None] = self.remarks.append
         self._port, self.baud = port, baud

@@ -22,6 +22,8 @@ REPEATED = 2.0
 AFTER = 2.0
 """The longest time, s, between a damaged byte of a line and the end of that line: late bytes, and a slow wire."""
 
+PRINTED = re.compile(rb"(?:tick )?5\d{7}\r\n")
+"""A line of the program that prints: see `soak.languages.PROGRAM`."""
 PROMPTLY = 0.1
 """The longest time, s, from a datagram's arrival to its execution."""
 OUTAGE = 10.0
@@ -281,13 +283,21 @@ def _origin(shown: Shown, numbers: dict[str, Held]) -> str:
 def _never_held(world: World, shown: Shown, words: str) -> str | Granted:
     """Except a value that noise damaged, where no checksum showed that, or where it was right."""
     place, history = world.place(shown.line), world.history
+    heard = b"".join(data for at, data in history.received.get(shown.line, []) if shown.began <= at <= shown.at)
     if not _damage(history, shown.line, shown.began - AFTER, shown.at):
-        return words
+        return Granted(BARE_VALUE, words) if not place.checked and _divided(history, shown, heard) else words
     if not place.checked:
         return Granted(BARE_VALUE, words)
-    heard = b"".join(data for at, data in history.received.get(shown.line, []) if shown.began <= at <= shown.at)
     right = _sealed_frame if place.language == "tmcl" else _sealed_line
     return Granted(SEVEN_BITS, words) if right(heard, shown.text) else words
+
+
+def _divided(history: History, shown: Shown, heard: bytes) -> bool:
+    """Whether another drive's program printed while the value came, so that what was shown is its end."""
+    whole = PRINTED.sub(b"", heard)
+    own = [each for each in history.held if (each.line, each.drive) == (shown.line, shown.drive)]
+    texts = [shown.form.format(each.number) for each in own if each.at <= shown.at and each.until >= shown.began]
+    return any(each.endswith(shown.text) and each.encode() in whole and each.encode() not in heard for each in texts)
 
 
 def _sealed_line(heard: bytes, text: str) -> bool:

@@ -87,6 +87,13 @@ FIXED = {
     400424: "a reply that may have been another one's, taken for proof as the line was lost in the question after it",
     403738: "a program `ssh` that was left as its login was cancelled in the moment of its time-out",
     430108: "one stop of three modules, whose motors were not counted yet (of the simulation itself)",
+    1005321: "a line that was sent after a stop, which had come as an echo mode was put back before that line",
+    1005373: "the same, with a move",
+    1001858: "an echo mode of a drive that was silent at the opening, which a reconnection struck out of the record",
+    1002784: "a line to which another person writes at the end (of the simulation itself)",
+    1001896: "a notice that EM=3 was not sent, for which `log judge` blamed a later download",
+    1000425: "a drive that a byte of noise had reset (of the simulation itself)",
+    1001813: "a print of another drive's program in the middle of a value (of the simulation itself)",
     600424: "an earlier stop, confirmed as the line was lost after another one, and a velocity of 2 to the 40",
 }
 DERIVED = 12

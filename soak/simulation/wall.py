@@ -66,7 +66,7 @@ class Wall:
             sleep=sleep,
         )
         before: list[tuple[Any, str, Any]] = []
-        for name, module in list(sys.modules.items()):
+        for name, module in sys.modules.copy().items():  # in one step: another thread may be importing
             if name.startswith(PACKAGE):
                 for attribute, old, new in (("time", time, clock), ("datetime", datetime, Datetime)):
                     if getattr(module, attribute, None) is old:

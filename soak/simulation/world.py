@@ -200,7 +200,7 @@ class World:
 
     def restarts(self, line: str, drive: str) -> int:
         """How often a drive has lost what it held."""
-        return len(self.cut.get((line, drive), ())) + int(getattr(self.witnesses[line, drive].device, "boots", 0))
+        return len(self.cut.get((line, drive), ())) + self.witnesses[line, drive].boots
 
     def harmed(self, data: bytes, faults: Faults, rng: Random) -> bytes:
         """In place of the noise of a wire: the same noise, and a note of what it changed."""
@@ -385,6 +385,8 @@ class World:
             self.person.type(b"n")  # the answer to a question, if there is one
             await asyncio.sleep(1.0)
         await self._close()
+        for other in self.others:  # while he writes to a line, the next session is refused there
+            await other.leave()
         if self.history.lives > 1 or self._owing():
             await self._live()
             await self._close()
@@ -392,8 +394,6 @@ class World:
         self.history.owing += self._owing()
         self.history.told.backups = backups(self.folder)
         self.history.logged += breaches_in_logs(self.folder, self.history)
-        for other in self.others:
-            await other.leave()
         for shared in self.shares.values():
             await shared.close()
         await self.stack.aclose()

@@ -4,8 +4,9 @@ import asyncio
 
 import pytest
 
-from multidrop.dialects import Hints, Stopped
+from multidrop.dialects import Hints, Owed, Stopped
 from multidrop.dialects.mcode.manual import program_file
+from multidrop.drives.port_journal import Keeper
 from multidrop.transports import TransportLost
 from tests.drives.test_bus import LOOP
 from tests.drives.test_bus import opened as opened_with
@@ -14,21 +15,21 @@ from tests.support.until import until
 pytestmark = pytest.mark.virtual
 
 
-class Kept:
+class Kept(Keeper):
     """A keeper that takes its time, and notes what had been written to the drives by then."""
 
     def __init__(self, seconds=0.05):
         self.seconds = seconds
         self.told = []
         self.line = ""
-        self.owed = None
+        self.last = None
         self.closed = False
 
     async def owes(self, state):
         owed = state.restore and state.restore.em
-        if owed != self.owed:
+        if owed != self.last:
             await asyncio.sleep(self.seconds)
-            self.owed = owed
+            self.last = owed
             self.told.append((state.address, owed, self.desk.written.count(b"EM=0"), self.desk.written.count(b"EM=1")))
 
     def remember(self, drives):
@@ -82,7 +83,7 @@ async def test_whoever_is_cancelled_or_stopped_while_it_is_written_down_changes_
             loading.cancel()
         with pytest.raises(Stopped if way == "stop" else asyncio.CancelledError):
             await loading
-        await until(lambda desk=desk: desk.keeper.owed is None)
+        await until(lambda desk=desk: desk.keeper.last is None)
         assert b"PG" not in desk.written and desk.devices["b"].memory.echo_mode == 1
 
 
@@ -156,3 +157,14 @@ async def test_the_drives_are_remembered_as_they_are_found_and_as_they_are_left(
     desk.bus.drives["a"].state.settings_may_have_changed()
     await desk.bus.close()
     assert seen == [{"a": 1, "b": 1}, {"a": None, "b": 0}]
+
+
+async def test_a_drive_that_was_silent_at_the_opening_is_given_its_echo_mode_back_after_a_loss(desk):
+    drive, hints = desk.bus.drives["b"].state, Hints(drives=("a", "b"), party=True)
+    desk.keeper.owed = (Owed(1, "b", drive.product, drive.version, drive.part, drive.serial),)
+    desk.devices["b"].power(False, desk.floor.now())
+    await desk.bus.identify(hints)
+    desk.devices["b"].power(True, desk.floor.now())
+    desk.devices["b"].execute("EM=0", desk.floor.now())
+    await desk.bus.find_again(hints)
+    assert desk.devices["b"].memory.echo_mode == 1

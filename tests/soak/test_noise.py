@@ -3,10 +3,13 @@
 import pytest
 
 from multidrop.dialects import NoAnswer, Refused
+from multidrop.simulator.cells import read
+from multidrop.simulator.floor import Floor
 from multidrop.transports import TransportLost
 from soak.judge import Judge, Ledger, Witness, Word, word
 from soak.noise import Job, jobs, judge
 from soak.noisy_line import Setup
+from tests.support.cell_session import bus
 
 pytestmark = pytest.mark.slow
 
@@ -71,6 +74,13 @@ def test_the_jobs_send_as_many_commands_as_asked():
     found = jobs(1000, 10)
     assert sum(job.commands for job in found if not job.place and job.group == "checksum") == 1000
     assert {job.setup.em for job in found if job.place == "tcp"} == {0, 1, 2, 3}
+
+
+def test_a_drive_that_noise_resets_has_begun_again():
+    [placed] = Floor(read(bus("w", 'personality = "LMDCM"'), "cell")).drives
+    witness = Witness(placed.device, str.isspace, bool)
+    placed.device.reset(1.0)
+    assert witness.boots == 1 and Witness(Device(), str.isspace, bool).boots == 0
 
 
 # --- the judge itself

@@ -9,7 +9,7 @@ from functools import lru_cache, partial
 
 from multidrop.dialects.certifying import repaired
 from multidrop.dialects.codec import End, Kind, Priority, Procedure, Reply, Request
-from multidrop.dialects.errors import DriveError, Inexpressible, NoAnswer, Refused
+from multidrop.dialects.errors import DriveError, Inexpressible, NoAnswer, Refused, Stopped
 from multidrop.dialects.family import Motion
 from multidrop.dialects.mcode.host import classify, exchange
 from multidrop.dialects.mcode.host.before_request import before_request, find_again, first_print, value_of
@@ -105,7 +105,7 @@ def restore_echo(state: MCodeState) -> Procedure[None]:
 
 
 def put_back(state: MCodeState) -> Procedure[None]:
-    """Restore the echo mode beside another task: a failure becomes a note.
+    """Restore the echo mode beside another task: a failure becomes a note, but for a stop, which nothing may follow.
 
     After a refusal the host gives up. Without a reply the echo mode stays owed.
     """
@@ -115,6 +115,8 @@ def put_back(state: MCodeState) -> Procedure[None]:
         if isinstance(error, Refused):
             state.owes_nothing()
         state.note(f"{who(state)}: its echo mode may be EM=0 now: {error}")
+        if isinstance(error, Stopped):
+            raise
 
 
 def put_back_found(state: MCodeState, owed: Sequence[Owed]) -> Procedure[None]:

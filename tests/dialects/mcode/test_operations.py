@@ -2,7 +2,7 @@
 
 import pytest
 
-from multidrop.dialects import DriveState, End, Kind, NoAnswer, Priority, Refused, Reply, Stopped
+from multidrop.dialects import DriveState, End, Kind, NoAnswer, Owed, Priority, Refused, Reply, Stopped
 from multidrop.dialects.mcode.family import MCODE
 from multidrop.dialects.mcode.host import identify
 from multidrop.dialects.mcode.host.codec import MCode
@@ -334,6 +334,17 @@ def test_a_stop_thrown_into_a_conversation_ends_it():
     with pytest.raises(Stopped):
         procedure.fail(Stopped("stopped"))
     assert procedure.request is None
+
+
+def test_a_line_is_not_sent_after_a_stop_that_came_as_the_echo_mode_was_put_back():
+    state = checked()
+    state.owes(Owed(3, "", "LMDCM", "", ""))
+    procedure = ProcedureRunner(MCODE.perform(state, "MR 1"))
+    assert procedure.request.text == "EM=3"
+    with pytest.raises(Stopped):
+        procedure.fail(Stopped("stopped"))
+    assert procedure.request is None and state.restore is not None
+    assert any("may be EM=0 now: stopped" in note for note in state.notes)
 
 
 # --- opening
