@@ -37,6 +37,8 @@ class Network:
         """The datagrams that arrived twice, with their hosts."""
         self.astray: list[tuple[float, str]] = []
         """When datagrams arrived twice or late, with their hosts."""
+        self.overtaken: list[tuple[float, float, str]] = []
+        """When late datagrams left and arrived, with their hosts: one that left later may have come before."""
         self._hosts: dict[str, Host] = {}
         self._listening: dict[Address, Callable[[], asyncio.BaseProtocol]] = {}
         self._datagrams: dict[Address, Datagrams] = {}
@@ -144,6 +146,7 @@ class Network:
                 self.doubled.append((host.name, data))
             if (delay := self.delay("datagram late")) > PROMPT or twice:
                 self.astray.append((self.loop.now + delay, host.name))
+                self.overtaken.append((self.loop.now, self.loop.now + delay, host.name))
             self.loop.call_later(delay, arrive, data)
 
     def at_host(self, host: Host, address: Address, data: bytes, sender: Socket) -> None:

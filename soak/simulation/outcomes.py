@@ -197,7 +197,8 @@ def _unknown(world: World) -> Iterator[str | Granted]:
     if not world.climate.calm:
         return
     history = world.history
-    stops = [each.at for each in history.stops] + history.told.halts + history.deaths + [at for at, _ in history.passed]
+    stops = [each.at for each in history.stops] + history.told.halts + [at for at, _ in history.passed]
+    stops += history.deaths + history.began[1:]  # the next session finds what was cut off
     early = [(run.began, run.ended + OUTAGE) for run in history.told.runs.values() if run.failure]
     for command, _, words in _cases(world):
         if command.outcome is not Outcome.UNKNOWN or command.said == "cancelled":
@@ -254,7 +255,8 @@ def _credited(world: World) -> Iterator[str | Granted]:
         elif own and all(each.restarts == shown.restarts for each in own if each.until >= shown.began):
             breach = _never_held(world, shown, f"{words}: it never held that")
         if breach:
-            yield Granted(ASTRAY, words) if _astray(world, shown.line, shown.began, shown.at) else breach
+            astray = _astray(world, shown.line, shown.began, shown.at) or _overtaken(world, shown)
+            yield Granted(ASTRAY, words) if astray else breach
 
 
 SAVES = ("S", "STORE")
@@ -292,12 +294,25 @@ def _never_held(world: World, shown: Shown, words: str) -> str | Granted:
     return Granted(SEVEN_BITS, words) if right(heard, shown.text) else words
 
 
+def _endings(history: History, shown: Shown) -> list[bytes]:
+    """The values that the drive held then, and which end with what was shown."""
+    own = [each for each in history.held if (each.line, each.drive) == (shown.line, shown.drive)]
+    texts = [shown.form.format(each.number) for each in own if each.at <= shown.at and each.until >= shown.began]
+    return [each.encode() for each in texts if each.endswith(shown.text)]
+
+
 def _divided(history: History, shown: Shown, heard: bytes) -> bool:
     """Whether another drive's program printed while the value came, so that what was shown is its end."""
     whole = PRINTED.sub(b"", heard)
-    own = [each for each in history.held if (each.line, each.drive) == (shown.line, shown.drive)]
-    texts = [shown.form.format(each.number) for each in own if each.at <= shown.at and each.until >= shown.began]
-    return any(each.endswith(shown.text) and each.encode() in whole and each.encode() not in heard for each in texts)
+    return any(each in whole and each not in heard for each in _endings(history, shown))
+
+
+def _overtaken(world: World, shown: Shown) -> bool:
+    """Whether a datagram with the end of the value came before the one with its beginning."""
+    host = world.place(shown.line).host
+    ways = [(left, arrives) for left, arrives, name in world.network.overtaken if name == host]
+    late = any(shown.began <= left <= shown.at < arrives for left, arrives in ways)
+    return late and bool(_endings(world.history, shown))
 
 
 def _sealed_line(heard: bytes, text: str) -> bool:

@@ -94,6 +94,8 @@ FIXED = {
     1001896: "a notice that EM=3 was not sent, for which `log judge` blamed a later download",
     1000425: "a drive that a byte of noise had reset (of the simulation itself)",
     1001813: "a print of another drive's program in the middle of a value (of the simulation itself)",
+    1004673: "a macro's move for a drive that a stop kept from being taken out of program mode, which executed it",
+    1001972: "what a killed session had cut off, which left the next one in doubt (of the simulation itself)",
     600424: "an earlier stop, confirmed as the line was lost after another one, and a velocity of 2 to the 40",
 }
 DERIVED = 12

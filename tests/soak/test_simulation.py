@@ -117,7 +117,7 @@ def test_docs_list_every_rule_by_its_name_and_its_sentence() -> None:
 def found(history: History, checksum: int = 1, *astray: tuple[float, str]) -> dict[str, list[str | Granted]]:
     """What the rules of commands and values find on a line of two drives, `a` and `b`."""
     place = Place("l", "mcode", ("a", "b"), 1, checksum, 9600, True)
-    network = SimpleNamespace(doubled=[], astray=astray)
+    network = SimpleNamespace(doubled=[], astray=astray, overtaken=[(at - 1.0, at, host) for at, host in astray])
     calm = SimpleNamespace(calm=False)
     world: Any = SimpleNamespace(history=history, network=network, cut={}, place=lambda line: place, climate=calm)
     return {rule.name: list(rule.check(world)) for rule in OUTCOMES if list(rule.check(world))}
@@ -228,6 +228,24 @@ def test_a_damaged_value_is_granted_without_a_checksum_and_where_the_checksum_is
     history.received["l"] = [(5.5, line[:4]), (5.6, line[4:] + bytes([-sum(line) & 0x7F | 0x80]) + b"\r\n\x06")]
     [[right]] = found(history).values()
     assert [type(each) for each in (bare, wrong, right)] == [Granted, str, Granted]
+
+
+def test_the_end_of_a_value_is_granted_where_it_came_before_its_beginning() -> None:
+    for text, kind in (("02", Granted), ("03", str)):
+        [[each]] = found(shown(text), 0, (6.5, "l.plant")).values()
+        assert isinstance(each, kind)
+    [[each]] = found(shown("02"), 0, (6.5, "m.plant")).values()
+    assert isinstance(each, str)
+
+
+def test_the_end_of_a_value_is_granted_where_a_program_printed_in_the_middle_of_it() -> None:
+    history = shown("02")
+    history.received["l"] = [(5.5, b'v70000050000007\r\n02"a"\r\n')]
+    [[bare]] = found(history, checksum=0).values()
+    [[checked]] = found(history).values()
+    history.received["l"] = [(5.5, b'v700000\r\n02"a"\r\n')]
+    [[other]] = found(history, checksum=0).values()
+    assert [type(each) for each in (bare, checked, other)] == [Granted, str, str]
 
 
 # Runs

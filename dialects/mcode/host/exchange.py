@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 
 from multidrop.dialects.codec import End, Kind, Priority, Procedure, Reply, Request
-from multidrop.dialects.errors import Inexpressible, NoAnswer, Refused, Stopped
+from multidrop.dialects.errors import DriveError, Inexpressible, NoAnswer, Refused, Stopped
 from multidrop.dialects.exchange import unanswered
 from multidrop.dialects.mcode.host import classify
 from multidrop.dialects.mcode.host.classify import INTEGER, NOTHING
@@ -373,6 +373,11 @@ def leave_program(state: MCodeState) -> Procedure[int]:
 
 
 def take_out(state: MCodeState, remark: str) -> Procedure[None]:
-    code = yield from leave_program(state)
+    """Leave program mode, and note that. Where a stop prevents it, the mode is read before the next line."""
+    try:
+        code = yield from leave_program(state)
+    except DriveError:
+        state.reply_outstanding()
+        raise
     error = f"; {described(code, state)}, now cleared" if code else ""
     state.note(f"{who(state)}: {remark}{error}")

@@ -6,7 +6,7 @@ from multidrop.dialects import DriveState, End, Kind, NoAnswer, Owed, Priority, 
 from multidrop.dialects.mcode.family import MCODE
 from multidrop.dialects.mcode.host import identify
 from multidrop.dialects.mcode.host.codec import MCode
-from multidrop.dialects.mcode.host.exchange import answered
+from multidrop.dialects.mcode.host.exchange import answered, take_out
 from multidrop.dialects.mcode.host.state import MCodeState
 from tests.support.mcode_drives import one_drive
 from tests.support.procedure import ProcedureRunner
@@ -345,6 +345,16 @@ def test_a_line_is_not_sent_after_a_stop_that_came_as_the_echo_mode_was_put_back
         procedure.fail(Stopped("stopped"))
     assert procedure.request is None and state.restore is not None
     assert any("may be EM=0 now: stopped" in note for note in state.notes)
+
+
+def test_where_a_stop_prevents_that_program_mode_is_left_the_mode_is_read_before_the_next_line():
+    state = MCodeState(MCode())
+    state.entered_program_mode(300)
+    procedure = ProcedureRunner(take_out(state, "taken out"))
+    assert procedure.request.text == "PG"
+    with pytest.raises(Stopped):
+        procedure.fail(Stopped("stopped"))
+    assert ProcedureRunner(MCODE.perform(state, "MR 1")).request.text == ""
 
 
 # --- opening
