@@ -21,6 +21,7 @@ from soak.simulation.acts.phrases import PHRASES, STOP, number, target
 from soak.simulation.acts_connections import another
 from soak.simulation.cut_ins import OWN_WORK, WRITING, Aim, points
 from soak.simulation.history import Command
+from soak.simulation.process import Killed
 from soak.simulation.told import Run
 
 if TYPE_CHECKING:
@@ -164,11 +165,12 @@ def two_stops(world: World, rng: Random) -> float:
         return stop_at_a_write(world, rng)
     world.stops += 1
     between = world.command(rng) + world.command(rng) * (rng.random() < 0.5)
-    world.process.run(person.read, STOP + between)
-    world.stops += 1
-    if not world.process.dead:
-        world.process.run(person.read, STOP, 0.1 + rng.random() * 0.5)
-        person.type(b"/resume\r")
+    with contextlib.suppress(Killed):  # a kill ends the program, and not its story
+        world.process.run(person.read, STOP + between)
+        world.stops += 1
+        if not world.process.dead:
+            world.process.run(person.read, STOP, 0.1 + rng.random() * 0.5)
+            person.type(b"/resume\r")
     return 1.0
 
 
