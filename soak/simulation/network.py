@@ -13,6 +13,7 @@ import errno
 import socket
 from collections import deque
 from collections.abc import Callable, Iterator
+from math import inf
 from random import Random
 from typing import TYPE_CHECKING, Any, cast
 
@@ -38,7 +39,7 @@ class Network:
         self.astray: list[tuple[float, str]] = []
         """When datagrams arrived twice or late, with their hosts."""
         self.overtaken: list[tuple[float, float, str]] = []
-        """When late datagrams left and arrived, with their hosts: one that left later may have come before."""
+        """When late or lost datagrams left and arrived, with their hosts: one that left later may have come before."""
         self._hosts: dict[str, Host] = {}
         self._listening: dict[Address, Callable[[], asyncio.BaseProtocol]] = {}
         self._datagrams: dict[Address, Datagrams] = {}
@@ -139,7 +140,7 @@ class Network:
     def datagram(self, host: Host, data: bytes, arrive: Callable[[bytes], None]) -> None:
         """Send one: it may be lost, late or doubled."""
         if host.dark > self.loop.now or self.drawn("datagram lost"):
-            return
+            return self.overtaken.append((self.loop.now, inf, host.name))
         twice = self.drawn("datagram doubled")
         for again in (False, True) if twice else (False,):
             if again:

@@ -308,7 +308,7 @@ def _divided(history: History, shown: Shown, heard: bytes) -> bool:
 
 
 def _overtaken(world: World, shown: Shown) -> bool:
-    """Whether a datagram with the end of the value came before the one with its beginning."""
+    """Whether a datagram with the end of the value came, and not yet the one with its beginning."""
     host = world.place(shown.line).host
     ways = [(left, arrives) for left, arrives, name in world.network.overtaken if name == host]
     late = any(shown.began <= left <= shown.at < arrives for left, arrives in ways)

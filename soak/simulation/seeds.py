@@ -96,6 +96,9 @@ FIXED = {
     1001813: "a print of another drive's program in the middle of a value (of the simulation itself)",
     1004673: "a macro's move for a drive that a stop kept from being taken out of program mode, which executed it",
     1001972: "what a killed session had cut off, which left the next one in doubt (of the simulation itself)",
+    1005302: "a datagram with the end of a value, whose beginning was lost (of the simulation itself)",
+    600753: "the error of a list that noise had made another line, which a command was blamed for",
+    520269: "the same, of a reading that a stop cut off",
     600424: "an earlier stop, confirmed as the line was lost after another one, and a velocity of 2 to the 40",
 }
 DERIVED = 12

@@ -111,12 +111,7 @@ def answered(state: MCodeState, request: Request) -> Procedure[Reply]:
     """Send a request; repeat it only after a NAK with ER=0. Raises Refused or NoAnswer."""
     for _ in range(1 + REPEATS):
         stood = state.error
-        try:
-            reply = yield request
-        except Stopped:
-            if not state.codec.checksum:  # noise may have made a print of it that the drive refuses
-                state.error_possible()
-            raise
+        reply = yield from once(state, request)
         if not reply.doubtful:
             note_error(state, reply)
         if reply.end is End.NAK and not reply.doubtful:
@@ -149,6 +144,16 @@ def answered(state: MCodeState, request: Request) -> Procedure[Reply]:
     raise NoAnswer(
         f"{who(state)}: '{request.text}' arrived damaged {1 + REPEATS} times and was not executed; check the cabling"
     )
+
+
+def once(state: MCodeState, request: Request) -> Procedure[Reply]:
+    """Send a request once. Without a checksum noise may have made another of it, whose error a stop leaves unread."""
+    try:
+        return (yield request)
+    except Stopped:
+        if not state.codec.checksum:
+            state.error_possible()
+        raise
 
 
 def attempted(state: MCodeState, request: Request) -> Procedure[Reply]:

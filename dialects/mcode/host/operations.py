@@ -376,7 +376,7 @@ def motion(state: MCodeState, priority: Priority) -> Procedure[tuple[Motion, ...
     refuse_in_program(state, "ask again")
     yield from before_request(state, _motion(state.codec, state.address, exchange.sign(state), priority))
     request = _motion(state.codec, state.address, exchange.sign(state), priority)
-    reply = yield request
+    reply = yield from exchange.once(state, request)
     exchange.check_printed(state, reply)
     found = re.fullmatch(request.expect or "", reply.text)
     assert found is not None

@@ -16,6 +16,7 @@ from multidrop.dialects.mcode.host.exchange import (
     REPEATS,
     check_printed,
     note_error,
+    once,
     print_mark,
     printed_value,
     question,
@@ -78,9 +79,7 @@ def read(state: MCodeState, progress: Progress) -> Procedure[Readings]:
     flag = yield from _print(state, "EF", [Form.DIGIT.value])
     state.error_flag_read(flag != ["0"])
     if not state.serial:
-        prints_it = (
-            state.product.startswith("LM") or state.codec.party or state.codec.checksum
-        )  # no such product refuses
+        prints_it = state.product.startswith("LM") or state.codec.party or state.codec.checksum  # others may refuse
         serial = (yield from _print(state, "SN", ["[!-~][ -~]*"])) if prints_it else None
         state.serial_read(serial[0] if serial else "")
     batches = list(_batches(state, manual.settings(state.product, state.version, state.part)))
@@ -162,7 +161,7 @@ def _print(state: MCodeState, items: str, forms: Sequence[str]) -> Procedure[lis
     answer = "".join(f"(?:{form})" for form in forms)
     for _ in range(1 + REPEATS):
         yield from before_request(state, question(state, items, answer))
-        reply = yield question(state, items, answer)
+        reply = yield from once(state, question(state, items, answer))
         if reply.end is End.DONE:
             note_error(state, reply)
             found = re.fullmatch("".join(f"({form})" for form in forms), value(state, reply))
@@ -211,20 +210,24 @@ def list_request(state: MCodeState, word: str, numbers: Sequence[int]) -> Reques
 
 def listed(state: MCodeState, text: str) -> Procedure[tuple[str, ...]]:
     """Print a list (`PR UV`, `L`) to its end. Raises NoAnswer where it may be incomplete."""
+    stood = state.error
     for _ in range(1 + REPEATS):
         yield from before_request(state, question(state, "EF", "[01]"))
-        reply = yield state.codec.request(state.address, text)
+        reply = yield from once(state, state.codec.request(state.address, text))
+        if reply.end in (End.REFUSED, End.NAK) or reply.prompt == "?":  # noise may have made another line of it
+            state.error_possible()
         lines = reply.lines
         if state.codec.em != 0 or reply.end is not End.DONE:
             rest = yield from print_mark(state, Priority.OPERATOR)
             if rest is None:
                 state.reply_lost()
+                stood = True
                 continue
             state.synchronised()
             lines += rest[:-1]
         whole = reply.end in (End.DONE, End.SILENT)
         if reply.end in (End.REFUSED, End.NAK):  # an earlier error looks like the refusal of an empty list
-            whole = state.error or (reply.end is End.NAK and bool(reply.lines))
+            whole = stood or (reply.end is End.NAK and bool(reply.lines))
         if whole:
             return tuple(line for line in lines if line)
     raise NoAnswer(f"{who(state)}: the list of '{text}' may be incomplete ({reply.end.value}); ask again")
@@ -324,7 +327,7 @@ def _values(state: MCodeState, names: Sequence[str]) -> Procedure[Facts]:
     items, forms = items_and_forms(batch)
     answer = "".join(f"(?:{form})" for form in forms)
     yield from before_request(state, replace(question(state, items, answer), priority=Priority.POLL))
-    reply = yield replace(question(state, items, answer), priority=Priority.POLL)
+    reply = yield from once(state, replace(question(state, items, answer), priority=Priority.POLL))
     check_printed(state, reply, REFUSAL)
     found = re.fullmatch("".join(f"({form})" for form in forms), value(state, reply))
     assert found is not None
@@ -337,7 +340,7 @@ def _values(state: MCodeState, names: Sequence[str]) -> Procedure[Facts]:
 
 def _list(state: MCodeState, word: str, numbers: Sequence[int]) -> Procedure[Facts]:
     yield from before_request(state, replace(question(state, "EF", "[01]"), priority=Priority.POLL))
-    reply = yield replace(list_request(state, word, numbers), priority=Priority.POLL)
+    reply = yield from once(state, replace(list_request(state, word, numbers), priority=Priority.POLL))
     check_printed(state, reply, REFUSAL)
     rows = rows_of_list(word, numbers, reply.lines)
     if reply.doubtful or len(rows) < len(numbers):

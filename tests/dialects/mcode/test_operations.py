@@ -8,6 +8,7 @@ from multidrop.dialects.mcode.host import identify
 from multidrop.dialects.mcode.host.codec import MCode
 from multidrop.dialects.mcode.host.exchange import answered, take_out
 from multidrop.dialects.mcode.host.state import MCodeState
+from multidrop.dialects.mcode.host.values import listed
 from tests.support.mcode_drives import one_drive
 from tests.support.procedure import ProcedureRunner
 
@@ -355,6 +356,26 @@ def test_where_a_stop_prevents_that_program_mode_is_left_the_mode_is_read_before
     with pytest.raises(Stopped):
         procedure.fail(Stopped("stopped"))
     assert ProcedureRunner(MCODE.perform(state, "MR 1")).request.text == ""
+
+
+@pytest.mark.parametrize("check", [0, 1])
+def test_a_stop_in_a_reading_without_a_checksum_leaves_an_error_that_no_line_is_blamed_for(check):
+    for reading in (lambda state: MCODE.motion(state, Priority.OPERATOR), lambda state: listed(state, "PR UV")):
+        state = MCodeState(MCode(em=1, checksum=check))
+        with pytest.raises(Stopped):
+            ProcedureRunner(reading(state)).fail(Stopped("stopped"))
+        assert state.error is (check == 0)
+
+
+def test_the_error_of_a_list_that_noise_made_another_line_is_read_before_the_next_line():
+    state = MCodeState(MCode())
+    procedure = ProcedureRunner(listed(state, "PR UV"))
+    procedure.answer(Reply((), end=End.REFUSED, prompt="?"))
+    while procedure.request is not None:
+        mark = procedure.request.text.startswith('PR "~')
+        lines = (procedure.request.text.split('"')[1],) if mark else ("G1 = 1",)
+        procedure.answer(Reply(lines, prompt="?"))
+    assert procedure.result == ("G1 = 1",) and state.error
 
 
 # --- opening
