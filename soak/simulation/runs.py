@@ -18,6 +18,7 @@ from typing import TextIO
 
 from multidrop import __version__
 from soak.simulation.judge import Judgement, judged
+from soak.simulation.process import Killed
 from soak.simulation.shrinking import Life
 from soak.simulation.story import CREW, whole
 from soak.simulation.world import World
@@ -64,9 +65,12 @@ def outcomes(world: World) -> Counter[str]:
 
 
 def result(life: Life) -> Result:
-    """Live and judge."""
+    """Live and judge. Raises RuntimeError where a kill leaves the story: it would end a worker, and not the range."""
     began = time.process_time()
-    world = life.live()
+    try:
+        world = life.live()
+    except Killed as escaped:
+        raise RuntimeError(f"seed {life.seed}: a kill ended the story") from escaped
     found, history = judged(world), world.history
     return Result(
         life.seed,

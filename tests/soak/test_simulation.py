@@ -22,6 +22,7 @@ from soak.simulation.judge import RULES, Judgement, broken
 from soak.simulation.living import lived
 from soak.simulation.outcomes import OUTCOMES
 from soak.simulation.places import Place
+from soak.simulation.process import Killed
 from soak.simulation.rule import Granted, Rule
 from soak.simulation.runs import STEPS, derived, lives, result, run
 from soak.simulation.seeds import DERIVED, FIXED
@@ -313,3 +314,14 @@ def test_a_seed_ends_with_its_one_line(capsys: pytest.CaptureFixture[str]) -> No
 def test_a_kind_of_fault_that_does_not_exist_is_refused() -> None:
     with pytest.raises(SystemExit):
         main(["--seed", "3", "--without", "rain"])
+
+
+def test_a_kill_that_leaves_a_story_is_an_error_with_its_seed(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As it is, it would end a worker of a range and not the range, which would wait for ever."""
+
+    def killed(life: Life, keep: bool = False) -> world.World:
+        raise Killed
+
+    monkeypatch.setattr(Life, "live", killed)
+    with pytest.raises(RuntimeError, match="seed 7: a kill ended the story"):
+        list(run(lives([7, 8]), jobs=1))
