@@ -31,6 +31,7 @@ from multidrop.dialects import Codec, End, Kind, Reply, Request
 
 LATE = 10.0
 """How long a missing reply may still come and be taken for another, s."""
+TERMINATORS = (b"\r", b"\n")
 MOST_EVIDENCE = 8
 """Most lines kept after a doubtful reply: one is enough as evidence against it."""
 
@@ -59,6 +60,8 @@ class _Late:
     """Its reply may have been taken for another drive's."""
     came: bool = False
     """A line came that seems to be its reply."""
+    begun: bool = False
+    """Its reply had begun as the wait for it ended: the rest may come, and look like another value."""
 
 
 class Doubt:
@@ -86,14 +89,14 @@ class Doubt:
                 shown.append(line)
         return tuple(shown)
 
-    def weigh(self, request: Request, reply: Reply, now: float) -> Weight:
-        """Weigh a reply against those outstanding, and update these."""
+    def weigh(self, request: Request, reply: Reply, now: float, heard: bytes) -> Weight:
+        """Weigh a reply against those outstanding, and update these. `heard`: what came in its time."""
         if request.codec.numbered:
             return CERTAIN
         if not self._late and not _outstanding(request, reply, doubtful=False):
             return CERTAIN
         self._late = [late for late in self._late if late.until > now]
-        doubtful = any(_may_answer(late.request, request, reply) for late in self._late)
+        doubtful = any(_may_answer(late, request, reply) for late in self._late)
         own = [late for late in self._late if late.request.address == request.address]
         others = [late for late in self._late if late.request.address != request.address]
         if reply.surplus or (doubtful and not reply.lines):
@@ -108,8 +111,9 @@ class Doubt:
             return Weight(doubtful or any(late.taken for late in own), request.gather and bool(own))
         if _outstanding(request, reply, doubtful):
             late = _Late(now + LATE, request, nak=reply.end is End.NAK)
-            own = [replace(late, request=each.request, came=each.came) for each in own]  # none comes before the first
-            self._late = [*others, *own, late]
+            own = [replace(each, until=late.until, nak=late.nak, taken=False) for each in own]  # none before the first
+            cut = reply.end in (End.DAMAGED, End.STOPPED) and heard != b"" and not heard.endswith(TERMINATORS)
+            self._late = [*others, *own, replace(late, begun=cut)]
         return Weight(doubtful)
 
     def with_evidence(self, request: Request, reply: Reply) -> Reply:
@@ -118,7 +122,7 @@ class Doubt:
         What came before the mark of another drive may be the reply that this one owes.
         """
         evidence = self._evidence.pop(request.address, None)
-        if request.gather:
+        if request.gather or reply.doubtful:  # or the reply that an earlier doubtful one stands for
             self.stray(reply.lines)
         if evidence and request.gather and reply.end is End.DONE:
             return replace(reply, lines=(*evidence, *reply.lines))
@@ -127,13 +131,14 @@ class Doubt:
         return reply
 
 
-def _may_answer(late: Request, request: Request, reply: Reply) -> bool:
+def _may_answer(late: _Late, request: Request, reply: Reply) -> bool:
     """Whether the reply may belong to an earlier request. Replies that print nothing all look alike."""
     if not reply.lines:
         return True
     if request.signed:
         return False
-    return late.expect is None or any(re.fullmatch(late.expect, line) for line in reply.lines)
+    expect = late.request.expect
+    return late.begun or expect is None or any(re.fullmatch(expect, line) for line in reply.lines)
 
 
 def _outstanding(request: Request, reply: Reply, doubtful: bool) -> bool:

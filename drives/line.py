@@ -240,7 +240,7 @@ class Line:
         self.overtaken = False
         flight = self._state if isinstance(self._state, Flight) else None
         if flight is not None:
-            self._doubt.weigh(flight.request, Reply(end=End.STOPPED), now)
+            self._doubt.weigh(flight.request, Reply(end=End.STOPPED), now, self.inbox.buffer)
             self.inbox.forget()
         self.inbox.cut_off(now)
         self._queue = []
@@ -314,8 +314,9 @@ class Line:
     def _finish(self, flight: Flight, found: Decoded, now: float) -> None:
         if found.strays:  # first: a proof forgets which replies are outstanding
             self._publish(now, found.strays)
-        weight = self._doubt.weigh(flight.request, found.reply, now)
-        reply = copy_with(found.reply, raw=self.inbox.buffer[: found.used], doubtful=weight.doubtful)
+        heard = self.inbox.buffer
+        weight = self._doubt.weigh(flight.request, found.reply, now, heard)
+        reply = copy_with(found.reply, raw=heard[: found.used], doubtful=weight.doubtful)
         reply = self._doubt.with_evidence(flight.request, reply)
         ended = Transaction(flight.request, reply, flight.sent_at, now, flight.transmitted_at, flight.sent)
         self._events.append(Finished(flight.ticket, ended))

@@ -12,7 +12,7 @@ from math import inf, nextafter
 
 from multidrop.dialects import End, Kind, Priority, Request
 from multidrop.drives import events
-from multidrop.drives.inbox import Debris, Leftovers
+from multidrop.drives.inbox import TERMINATORS, Debris, Leftovers
 from multidrop.drives.line import Finished, Line, Write
 from multidrop.drives.port_journal import GLOBAL, Departure, Keeper
 from multidrop.transports import Transport, TransportLost
@@ -22,7 +22,6 @@ OnAnswer = Callable[[events.Transaction | TransportLost], None]
 """Called with the end of a request that was queued, in the turn of the event loop in which it ends."""
 
 
-TERMINATORS = (b"\r", b"\n")
 HELD_UP = 0.01
 """A timer that is later than this, s, was held up with the loop: what the wire has delivered meanwhile comes first."""
 LONGEST_HEARD = 60

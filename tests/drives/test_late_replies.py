@@ -143,6 +143,53 @@ def test_a_late_answer_is_never_the_value_of_another_drive(em, check, text, sign
         assert two.result == own(text)
 
 
+@pytest.mark.parametrize(("beginning", "doubtful"), [(b"Performax-2", True), (b"Performax-2ED-SA?\r", False)])
+def test_the_rest_of_a_reply_that_had_begun_may_look_like_any_value(beginning, doubtful):
+    """The wait for 03 ends within its reply, and the rest comes where 02 was asked."""
+    line, ended = Line(Pmx(), timeout=0.3), []
+
+    def at(now: float, data: bytes = b"") -> None:
+        if data:
+            line.receive(data, now)
+        ended.extend(event.reply for event in line.events(now) if isinstance(event, Finished))
+
+    line.ask(pmx("ID", "03", kind=Kind.PRINT, expect="Performax-2ED-SA"))
+    at(0.0)
+    at(0.1, beginning)
+    at(0.5)
+    line.ask(pmx("V1", "02"))
+    at(1.0)
+    at(1.1, b"ED-SA\r")
+    assert ended[0].end is End.DAMAGED
+    assert ended[-1].lines == ("ED-SA",) and ended[-1].doubtful is doubtful
+
+
+def test_a_doubtful_reply_of_another_drive_stands_in_front_of_the_mark():
+    """02 is asked, gets what is left of 03's reply, and its own goes to 01, which was asked before the mark."""
+    line, ended = Line(Pmx(), timeout=0.3), []
+
+    def at(now: float, data: bytes = b"") -> None:
+        if data:
+            line.receive(data, now)
+        ended.extend(event.reply for event in line.events(now) if isinstance(event, Finished))
+
+    line.ask(pmx("ID", "03", kind=Kind.PRINT, expect="Performax-2ED-SA"))
+    at(0.0)
+    at(0.1, b"Performax-2")
+    at(0.5)
+    line.ask(pmx("V1", "02"))
+    at(1.0)
+    at(1.1, b"ED-SA\r")
+    line.ask(pmx("MSTX", "01"))
+    at(1.2)
+    at(1.3, b"202\r")
+    assert ended[-1].lines == ("202",) and ended[-1].doubtful
+    line.ask(pmx("Q02001", "02", kind=Kind.PRINT, expect=r"\?Q02001", gather=True))
+    at(1.4)
+    at(1.5, b"?Q02001\r")
+    assert ended[-1].lines == ("202", "?Q02001")
+
+
 @pytest.mark.wide
 @pytest.mark.parametrize("text", PRINTS)
 @pytest.mark.parametrize(("em", "check"), MODES)
