@@ -132,8 +132,8 @@ class Doubt:
 
 
 def _may_answer(late: _Late, request: Request, reply: Reply) -> bool:
-    """Whether the reply may belong to an earlier request. Replies that print nothing all look alike."""
-    if not reply.lines:
+    """Whether the reply may belong to an earlier request. Replies that print nothing all look alike, and refusals."""
+    if not reply.lines or reply.end is End.REFUSED:
         return True
     if request.signed:
         return False

@@ -124,7 +124,7 @@ class PmxLanguage:
     url = "dialect=pmx"
     alone = "00"
     checked = False
-    stop = rb"(~+\r)?(@\d\d)?ABORT\r"
+    stop = rb"(~+\r)?(@?\d{0,2}A?B?O?R?T?~+\r)*(@\d\d)?ABORT\r"  # the next stop cuts off one at a full port
     carries = MCodeLanguage.carries
 
     @staticmethod

@@ -120,10 +120,21 @@ def _refused(world: World) -> Iterator[str | Granted]:
         if times and command.outcome is Outcome.REFUSED:
             bare = not world.place(command.line).checked
             noise = _damage(world.history, command.line, command.began - AFTER, command.ended)
+            noise = noise or _before(world, command)
             if _astray(world, command.line, command.began - AFTER, command.ended):
                 yield Granted(ASTRAY, words)
             else:
                 yield Granted(BARE_REFUSAL, words) if bare and noise else words
+
+
+def _before(world: World, command: Command) -> list[Damage]:
+    """What noise changed in the time of the last command of the same drive: it may have been the error flag of that."""
+    same = [each for each in world.history.commands.values() if (each.line, each.drive) == (command.line, command.drive)]
+    ended = [each for each in same if each.ended <= command.began]
+    if not ended:
+        return []
+    last = max(ended, key=lambda each: each.ended)
+    return _damage(world.history, last.line, last.began, last.ended)
 
 
 def _lost(world: World) -> Iterator[str | Granted]:

@@ -100,6 +100,10 @@ FIXED = {
     600753: "the error of a list that noise had made another line, which a command was blamed for",
     520269: "the same, of a reading that a stop cut off",
     600424: "an earlier stop, confirmed as the line was lost after another one, and a velocity of 2 to the 40",
+    1005245: "the rest of a reply that had begun, which was shown as another controller's value",
+    2026282: "a late refusal of another controller, which a command that was executed was blamed for",
+    2000497: "an error flag that noise had changed, whose error the next line showed (of the simulation itself)",
+    2000775: "a stop at a full port that the next stop cut off (of the simulation itself)",
 }
 DERIVED = 12
 """The number of seeds that follow from the commit."""

@@ -190,6 +190,24 @@ def test_a_doubtful_reply_of_another_drive_stands_in_front_of_the_mark():
     assert ended[-1].lines == ("202", "?Q02001")
 
 
+def test_a_late_refusal_of_another_drive_is_not_certain():
+    """A command that reads nothing is replied to with OK, and with a refusal: either may come late."""
+    line, ended = Line(Pmx(), timeout=0.3), []
+
+    def at(now: float, data: bytes = b"") -> None:
+        if data:
+            line.receive(data, now)
+        ended.extend(event.reply for event in line.events(now) if isinstance(event, Finished))
+
+    line.ask(pmx("X7000", "01"))
+    at(0.0)
+    at(0.5)
+    line.ask(pmx("V2=5", "02"))
+    at(1.0)
+    at(1.1, b"?Moving\r")
+    assert ended[-1].end is End.REFUSED and ended[-1].doubtful
+
+
 @pytest.mark.wide
 @pytest.mark.parametrize("text", PRINTS)
 @pytest.mark.parametrize(("em", "check"), MODES)
