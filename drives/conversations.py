@@ -209,6 +209,9 @@ class Conversation(Generic[T]):
                 return self._fail(Stopped(f"{self._name}: interrupted"))
             if self._stops != self._all.stops(self._state):  # between a reply and the next request
                 return self._fail(Stopped(f"{self._name}: stopped; '{request.text}' was not sent"))
+        elif request.kind is Kind.COMMAND and request.codec.starts_motion(request.text):
+            # A procedure that went on after a stop: no clean-up moves a drive.
+            return self._step(self._procedure.throw, Stopped(f"{self._name}: stopped; '{request.text}' was not sent"))
         try:
             self._ticket = self._link.submit(request, self._answered, self._searching)
         except TransportLost as error:

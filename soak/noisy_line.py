@@ -15,7 +15,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from random import Random
 from typing import Any
-from unittest import mock
 
 from multidrop.dialects import DriveError
 from multidrop.drives.events import Notice
@@ -30,10 +29,9 @@ from multidrop.simulator.cell.spec import Faults
 from multidrop.simulator.floor import Floor
 from multidrop.simulator.serving.endpoints import serve_bus
 from multidrop.simulator.serving.running import RunningFloor
-from multidrop.transports import TransportLost, libusb
+from multidrop.transports import TransportLost
 from soak.judge import Judge, Ledger, Witness
 from soak.languages import LANGUAGES, PROGRAM, TICKS
-from tests.support.usb_stand_in import Plugged, Sockets, UsbFaults
 
 BUS = "line"
 NUMBER = r"\d{7,8}"
@@ -214,62 +212,6 @@ class NoisyLine:
                 kind = "an older value" if self._held[number] == name else "credited to the wrong drive"
                 return self.ledger.misdeed(kind, said)
         self.ledger.damage("damaged value", said)
-
-
-class UsbLine(NoisyLine):
-    """A controller on USB: its replies come late or never, and it is unplugged."""
-
-    def __init__(self, setup: Setup, floor: RunningFloor, plugged: Plugged, folder: Path) -> None:
-        super().__init__(setup, floor, lambda session: session.open("usb:2ED00?timeout=0.4"), folder)
-        self._plugged = plugged
-
-    @contextlib.contextmanager
-    def _noise(self) -> Iterator[None]:
-        level = self.setup.level
-        self._plugged.faults = UsbFaults(level, self.setup.latest, level, level, 2.5, level, level)
-        work = asyncio.get_running_loop().create_task(self._disturb())
-        try:
-            yield
-        finally:
-            work.cancel()
-            self._plugged.faults = UsbFaults()
-            self.floor.command(f"/sim plug {BUS}")
-
-    async def _disturb(self) -> None:
-        """Empty the buffers, as a second host does; unplug the controller, and plug it in again."""
-        while True:
-            await asyncio.sleep(self.rng.random() ** 2 * 4)
-            if not self.setup.hangups or self.rng.random() < 0.5:
-                self._plugged.controller.replies.clear()
-            else:
-                self.floor.command(f"/sim unplug {BUS}")
-                await asyncio.sleep(self.rng.random() ** 2 * 3)
-                self.floor.command(f"/sim plug {BUS}")
-
-
-@contextlib.asynccontextmanager
-async def on_usb(setup: Setup, folder: Path) -> AsyncIterator[NoisyLine]:
-    """A controller on the USB of a machine in memory, for a loop with virtual time."""
-    floor = RunningFloor(Floor(cells.load(str(setup.write(folder)))))
-    plugged = Plugged(floor, BUS, floor.floor.usb(BUS)[0], "1-1", Random(setup.seed))  # type: ignore[arg-type]
-    with (
-        contextlib.closing(floor),
-        mock.patch.object(libusb, "LibusbCarrier", Sockets(plugged)),
-    ):
-        yield UsbLine(setup, floor, plugged, folder)
-
-
-@contextlib.asynccontextmanager
-async def in_memory(setup: Setup, folder: Path) -> AsyncIterator[NoisyLine]:
-    """A line in memory, for a loop with virtual time. A pipe of our own keeps the cell alive over hang-ups."""
-    from multidrop.simulator.serving.in_process import connect
-
-    url = f"sim:{setup.write(folder)}"
-    [keep] = await connect(url)
-    try:
-        yield NoisyLine(setup, keep.floor, lambda session: session.open(url), folder)
-    finally:
-        await keep.transport.close()
 
 
 @contextlib.asynccontextmanager

@@ -129,7 +129,9 @@ def _refused(world: World) -> Iterator[str | Granted]:
 
 def _before(world: World, command: Command) -> list[Damage]:
     """What noise changed in the time of the last command of the same drive: it may have been the error flag of that."""
-    same = [each for each in world.history.commands.values() if (each.line, each.drive) == (command.line, command.drive)]
+    same = [
+        each for each in world.history.commands.values() if (each.line, each.drive) == (command.line, command.drive)
+    ]
     ended = [each for each in same if each.ended <= command.began]
     if not ended:
         return []

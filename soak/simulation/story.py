@@ -15,7 +15,7 @@ from multidrop.dialects import Diagnostic
 from soak.simulation import acts_connections
 from soak.simulation.act import Act
 from soak.simulation.acts.automation import AUTOMATION
-from soak.simulation.acts.crews import CREWS
+from soak.simulation.acts.crews import AFTER_CREWS, CREWS
 from soak.simulation.acts.files import FILES
 from soak.simulation.acts.hand import HAND
 from soak.simulation.acts.meetings import MEETINGS
@@ -153,16 +153,20 @@ AT_ONCE = 0.25
 """How many seeds end with the acts of `CREWS`."""
 CREW, LAST = 200, 5
 """The number of the first step with one, and how many there are."""
+AFTER = CREW + LAST
+"""The number of the first step of `AFTER_CREWS`."""
 
 
 def whole(seed: int, steps: int) -> tuple[int, ...]:
     """The steps of a whole story: so many, and those of the crews, if it ends with them."""
-    crews = range(CREW, CREW + LAST) if Random(f"{seed} crews").random() < AT_ONCE else ()
+    crews = range(CREW, AFTER + len(AFTER_CREWS)) if Random(f"{seed} crews").random() < AT_ONCE else ()
     return (*range(steps), *crews)
 
 
 def _drawn(world: World, step: int, rng: Random) -> Act:
     """Draw the act of a step."""
+    if step >= AFTER:
+        return AFTER_CREWS[step - AFTER]
     if step >= CREW:
         return rng.choices(CREWS, [each.weight for each in CREWS])[0]
     act = rng.choices(ACTS, [each.weight for each in ACTS])[0]
@@ -178,10 +182,12 @@ def _drawn(world: World, step: int, rng: Random) -> Act:
 
 async def tell(world: World, step: int) -> None:
     """Let one thing happen, once a session is there, and time pass."""
-    await world.ready.wait()
     rng = Random(f"{world.seed} step {step}")
-    world.step, world.said = step, 0
     act = _drawn(world, step, rng)
+    if not act.where(world):
+        return
+    await world.ready.wait()
+    world.step, world.said = step, 0
     pause = rng.random() ** 2 * rng.choice((0.05, 0.6, 1.0, 2.0))
     if not act.fault or not world.climate.calm:
         world.history.count(act.name)

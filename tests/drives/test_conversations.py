@@ -102,6 +102,18 @@ async def test_the_next_request_of_a_conversation_leaves_in_the_turn_that_read_t
     running.cancel()
 
 
+@pytest.mark.parametrize(("after", "sent"), [("MR 5", False), ("EM=1", True), ("PR EF", True)])
+async def test_what_follows_a_stop_restores_and_asks_and_moves_nothing(after, sent):
+    """A procedure that swallows a stop goes on with its line: the conversation holds that back."""
+    desk = Desk()
+    running = desk.run("PR P", after=(after,))
+    await asyncio.sleep(0.005)
+    desk.stop()
+    with pytest.raises(Stopped):
+        await running
+    assert (after in desk.sent) is sent
+
+
 async def test_thousands_of_conversations_that_wait_end_with_a_stop_and_none_is_sent():
     desk = Desk()
     runs = [desk.run("PR P") for _ in range(3000)]

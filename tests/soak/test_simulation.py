@@ -27,7 +27,7 @@ from soak.simulation.rule import Granted, Rule
 from soak.simulation.runs import STEPS, derived, lives, result, run
 from soak.simulation.seeds import DERIVED, FIXED
 from soak.simulation.shrinking import Life, shrunk
-from soak.simulation.story import CREW, whole
+from soak.simulation.story import AFTER, CREW, whole
 from soak.simulation.trace import readable
 from tests.support.paths import ROOT
 from tests.support.until import PATIENCE
@@ -51,6 +51,16 @@ def test_the_acts_of_several_callers_follow_a_story_that_is_the_same_without_the
     first = next(at for at, (_, kind, text) in enumerate(with_crews) if kind == "step" and text.startswith(f"{CREW}: "))
     assert first > 20
     assert with_crews[:first] == without[:first]
+
+
+@pytest.mark.parametrize(
+    ("seed", "act", "times"),
+    [(2, "second host at USB", 1), (7, "second host at USB", 0), (7, "same question", 1), (3, "same question", 0)],
+)
+def test_what_ends_the_story_of_the_crews_happens_where_the_machine_has_it(seed: int, act: str, times: int) -> None:
+    life = Life(seed, (0, AFTER, AFTER + 1))
+    assert lived(seed, life.steps).history.counts.get(act, 0) == times
+    assert not result(life).breaches
 
 
 @pytest.mark.nightly

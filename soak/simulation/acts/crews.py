@@ -11,7 +11,7 @@ import contextlib
 from collections.abc import Mapping
 from dataclasses import replace
 from random import Random
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from multidrop.shell.events import FAILURES
 from soak.simulation.act import Act
@@ -32,6 +32,8 @@ LOOK = 0.0004
 """The time between two looks at what a session does, s."""
 WAIT = 8.0
 """The longest time that is looked, s."""
+QUESTIONS = 0.4
+"""The part of the commands that are questions: see `soak.languages`."""
 INTO_THE_PIPE = "pipe DescriptorPipe.write: with"
 """The point at which a line is about to be passed to a port."""
 
@@ -213,6 +215,57 @@ def stop_at_usb(world: World, rng: Random) -> float:
     return 3.0
 
 
+def second_host(world: World, rng: Random) -> float:
+    """Let a second host empty the buffers of controllers on USB at any time, while operators work at them."""
+    sockets = world.kernel.usb.plugged
+    places = [each for each in world.places if each.kind == "usb"]
+    took = 2 + rng.random() * 4
+    _spell(world, took, {f"usb {kind}": rng.random() * 0.1 for kind in ("late", "held", "stalled", "empty")})
+    _operators(world, rng, places, rng.randrange(1, 4))
+    at = rng.random() ** 2
+    while at < took:
+        world.loop.call_later(at, rng.choice(sockets).controller.replies.clear)
+        at += rng.choice((0.001, 0.02, 0.3, 1.0)) * rng.random()
+    if rng.random() < 0.3:
+        name = rng.choice(places).name
+        world.loop.call_later(rng.random() * took, world.floor.command, f"/sim unplug {name}")
+        world.loop.call_later(took, world.floor.command, f"/sim plug {name}")
+    if rng.random() < 0.3:
+        later(world, rng.random() * took, STOP + b"/resume\r")
+    return took + 1
+
+
+class Asking(Random):
+    """Draws questions in place of commands, each of the first form."""
+
+    def random(self) -> float:
+        """Draw less than `QUESTIONS`."""
+        return super().random() * QUESTIONS
+
+    def choice(self, seq: Any) -> Any:
+        """Take the first."""
+        return seq[0]
+
+
+async def _asker(world: World, place: Place, drive: str, rng: Random) -> None:
+    """Ask one drive the same question again and again."""
+    questions = Asking(rng.random())
+    for _ in range(rng.randrange(4, 12)):
+        await asyncio.sleep(rng.choice((0.0, 0.0, 0.01, 0.3)))
+        with contextlib.suppress(*FAILURES):
+            await world.session.run(world.command(questions, place, drive=drive).decode().strip())
+
+
+def same_question(world: World, rng: Random) -> float:
+    """Ask all drives of a line the same at once, with replies that come late, some of them later than the time-out."""
+    place = rng.choice([each for each in world.places if len(each.names) > 1])
+    world.weather(place, delay=(0.0, 0.4 + rng.random() * 0.8))
+    world.loop.call_later(8.0, world.weather, place)
+    for drive in place.names:
+        world.beside(_asker(world, place, drive, Random(rng.random())))
+    return 8.0
+
+
 # Losses, kills, automation
 
 
@@ -302,3 +355,10 @@ CREWS = (
     Act("nodes exchanged", 1, nodes_exchanged, fault=True),
     Act("beside a mover", 2, beside_a_mover),
 )
+AFTER_CREWS = (
+    Act("second host at USB", 1, second_host, fault=True, where=lambda world: bool(world.kernel.usb.plugged)),
+    Act(
+        "same question", 1, same_question, fault=True, where=lambda world: any(each.names[1:] for each in world.places)
+    ),
+)
+"""The last of all, each once."""
