@@ -104,6 +104,7 @@ FIXED = {
     2026282: "a late refusal of another controller, which a command that was executed was blamed for",
     2000497: "an error flag that noise had changed, whose error the next line showed (of the simulation itself)",
     2000775: "a stop at a full port that the next stop cut off (of the simulation itself)",
+    2001878: "the address of the first line of a list, whose rest was late, taken for the prompt of program mode",
 }
 DERIVED = 12
 """The number of seeds that follow from the commit."""

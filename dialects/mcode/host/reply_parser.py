@@ -438,8 +438,9 @@ class ReplyParser:
             if self.echo == 3 and kind is Kind.LIST and not got.repeated:
                 return None
             prompt = printable(self.rest) if self.echo == 0 and self._is_prompt(self.rest) else ""
-            if prompt not in ("", ">", "?") and got.lines:
-                prompt = ""  # the address of the next listed line
+            listing = kind is Kind.LIST and classify.word_of(self.request.text)[0] == "L"
+            if prompt not in ("", ">", "?") and (got.lines or listing):
+                prompt = ""  # the address of a listed line, whose rest is late
             unended = self.echo == 0 or bool(self.rest and not self.request.text.endswith(";"))
             if kind is Kind.LIST and not prompt and unended:  # its prompt is missing, or the end of a line
                 return None

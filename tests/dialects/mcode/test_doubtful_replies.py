@@ -185,10 +185,18 @@ def test_a_list_does_not_end_before_its_prompt_nor_within_a_line(em, reply):
     assert codec.on_timeout(codec.request("", "L"), reply).reply.end is End.DAMAGED
 
 
-def test_an_address_alone_is_the_prompt_of_program_mode():
+@pytest.mark.parametrize("text", ["PR AL", "MR 5"])
+def test_an_address_alone_is_the_prompt_of_program_mode(text):
     codec = MCode(0)
-    found = codec.on_quiet(codec.request("", "L"), b"L\r\n41  ")
+    found = codec.on_quiet(codec.request("", text), f"{text}\r\n41  ".encode())
     assert found is not None and found.reply.prompt == "41  "
+
+
+@pytest.mark.parametrize("text", ["L", "L G1", "l 41"])
+def test_after_l_an_address_alone_may_be_that_of_the_first_line(text):
+    codec, heard = MCode(0), f"{text}\r\n41  ".encode()
+    assert codec.on_quiet(codec.request("", text), heard) is None
+    assert codec.on_timeout(codec.request("", text), heard).reply.end is End.DAMAGED
 
 
 @pytest.mark.parametrize("em", [1, 2, 3])
