@@ -36,6 +36,7 @@ ASTRAY = Grant("a datagram that arrives twice or late", "A datagram that arrives
 STOPS_REPLY = Grant("a reply to a stop, late or to another client", "The reply to a stop")
 BARE_REFUSAL = Grant("a refusal of noise, without a checksum", "A refusal without a checksum")
 BARE_COMMAND = Grant("a damaged command without a checksum", "Noise on the line")
+FLAG_CLEARED = Grant("a flag that a program clears", "A flag that a program clears")
 NO_SIGN = Grant("a mode without a sign of execution", "0010")
 RUNS = Grant("a program that runs in the drive", "What a report means")
 BARE_VALUE = Grant("a damaged value without a checksum", "Noise on the line")
@@ -150,6 +151,8 @@ def _confirms_lost(world: World, command: Command) -> Grant | None:
     """What can have confirmed a command that was lost."""
     if _astray(world, command.line, command.began, command.ended):
         return ASTRAY
+    if _cleared(world, command):
+        return FLAG_CLEARED
     if not world.place(command.line).checked:
         if _damage(world.history, command.line, command.began - AFTER, command.ended):
             return BARE_COMMAND
@@ -157,6 +160,15 @@ def _confirms_lost(world: World, command: Command) -> Grant | None:
     if _made(world.history, command, ACK):
         return NOISY_ACK
     return SEVEN_BITS if _executed_as_another(world, command) else None
+
+
+def _cleared(world: World, command: Command) -> bool:
+    """Whether an input started a program in the time of a command that the error flag alone shows as refused."""
+    place, started = world.place(command.line), world.history.told.started
+    if place.em == 0 or (place.noisy and place.checksum):  # which a prompt or a NAK shows, too
+        return False
+    own = (at for at, line, drive in started if (line, drive) == (command.line, command.drive))
+    return any(command.began <= at <= command.ended for at in own)
 
 
 def _astray(world: World, line: str, since: float, until: float) -> bool:
@@ -361,7 +373,7 @@ OUTCOMES = (
         "What was said to be done was executed.",
         NOISE,
         _lost,
-        (BARE_COMMAND, NOISY_ACK, SEVEN_BITS, STOPS_REPLY, ASTRAY),
+        (BARE_COMMAND, NOISY_ACK, SEVEN_BITS, STOPS_REPLY, FLAG_CLEARED, ASTRAY),
     ),
     Rule(
         "unknown",

@@ -105,6 +105,7 @@ FIXED = {
     2000497: "an error flag that noise had changed, whose error the next line showed (of the simulation itself)",
     2000775: "a stop at a full port that the next stop cut off (of the simulation itself)",
     2001878: "the address of the first line of a list, whose rest was late, taken for the prompt of program mode",
+    2027225: "an error flag that a program cleared, which an input started (of the simulation itself)",
 }
 DERIVED = 12
 """The number of seeds that follow from the commit."""

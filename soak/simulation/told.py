@@ -82,6 +82,8 @@ class Told:
     """When a yes was typed."""
     programs: dict[str, float] = field(default_factory=dict)
     """When the first program of a line was started that prints."""
+    started: list[tuple[float, str, str]] = field(default_factory=list)
+    """When an input started a program that prints, on which line and in which drive: that clears the error flag."""
     latches: list[tuple[float, bool]] = field(default_factory=list)
     """When the thread of a stop had done its work, and when `/resume` or the next session let automation run again."""
     halts: list[float] = field(default_factory=list)

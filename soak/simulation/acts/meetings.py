@@ -90,8 +90,11 @@ def prints(world: World, rng: Random) -> None:
     if not places:
         return
     place = rng.choice(places)
-    witness = world.witnesses[place.name, rng.choice(place.names)]
+    drive = rng.choice(place.names)
+    witness = world.witnesses[place.name, drive]
     if witness.device.programming is None:
+        if not witness.device.running:
+            world.history.told.started.append((world.loop.now, place.name, drive))
         LANGUAGES[place.language].print_on(witness, world.floor.now())
         world.floor.floor.wires[place.name].look_again()
         world.history.told.programs.setdefault(place.name, world.loop.now)
