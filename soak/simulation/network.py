@@ -13,6 +13,7 @@ import errno
 import socket
 from collections import deque
 from collections.abc import Callable, Iterator
+from contextvars import Context, copy_context
 from math import inf
 from random import Random
 from typing import TYPE_CHECKING, Any, cast
@@ -41,7 +42,7 @@ class Network:
         self.overtaken: list[tuple[float, float, str]] = []
         """When late or lost datagrams left and arrived, with their hosts: one that left later may have come before."""
         self._hosts: dict[str, Host] = {}
-        self._listening: dict[Address, Callable[[], asyncio.BaseProtocol]] = {}
+        self._listening: dict[Address, tuple[Callable[[], Any], Context]] = {}
         self._datagrams: dict[Address, Datagrams] = {}
         self._ends: list[End] = []
         self._numbers = 40000
@@ -101,12 +102,13 @@ class Network:
         await asyncio.sleep(self.delay() + (self.rng.random() * 3 if self.drawn("slow connect") else 0.0))
         while host.dark > self.loop.now:
             await asyncio.sleep(host.dark - self.loop.now)
-        make = self._listening.get(address)
-        if make is None or host.refuses > self.loop.now or self.drawn("refused"):
+        listens = self._listening.get(address)
+        if listens is None or host.refuses > self.loop.now or self.drawn("refused"):
             raise error(errno.ECONNREFUSED)
         near, far = self._connection(host)
         made.connected(near, host)
-        Served(far, make(), ("10.0.0.9", self.number()), address)
+        make, server = listens
+        server.copy().run(Served, far, make, ("10.0.0.9", self.number()), address)
 
     def pair(self, near: Socket, far: Socket, name: str) -> Host:
         """Connect two sockets through a host, as `ssh` does."""
@@ -126,7 +128,7 @@ class Network:
         address = host, port or self.number()
         if address in self._listening:
             raise error(errno.EADDRINUSE)
-        self._listening[address] = make
+        self._listening[address] = make, copy_context()
         return Server(address, lambda: self._listening.pop(address, None))
 
     def datagrams(self, make: Callable[[], Any], address: Address) -> tuple[asyncio.BaseTransport, Any]:
@@ -294,16 +296,16 @@ class Server:
 
 
 class Served(asyncio.Transport):
-    """The server's end of a connection, for an `asyncio` protocol."""
+    """The server's end of a connection, for an `asyncio` protocol, which works in the context of the server."""
 
-    def __init__(self, end: End, protocol: asyncio.BaseProtocol, peer: Address, address: Address) -> None:
+    def __init__(self, end: End, make: Callable[[], Any], peer: Address, address: Address) -> None:
         super().__init__({"peername": peer})
-        self._end, self._protocol = end, protocol
+        self._end, self._protocol, self._context = end, make(), copy_context()
         self._paused = self._closing = self._lost = False
         self._modbus = address[1] == 502
         self._before = b""
-        end.woken = self._woken
-        protocol.connection_made(self)
+        end.woken = lambda: self._context.copy().run(self._woken)
+        self._protocol.connection_made(self)
 
     def write(self, data: bytes | bytearray | memoryview) -> None:
         """Send bytes; a reply over Modbus may be late, doubled, or have the number of another transaction."""
