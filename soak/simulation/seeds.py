@@ -106,6 +106,8 @@ FIXED = {
     2000775: "a stop at a full port that the next stop cut off (of the simulation itself)",
     2001878: "the address of the first line of a list, whose rest was late, taken for the prompt of program mode",
     2027225: "an error flag that a program cleared, which an input started (of the simulation itself)",
+    2028059: "operators that came to a session which had been killed (of the simulation itself)",
+    2003021: "a port that a share opened in the name of its client (of the simulation itself)",
 }
 DERIVED = 12
 """The number of seeds that follow from the commit."""

@@ -364,7 +364,9 @@ class World:
         return [each for each in self.beside_it if not each.done()]
 
     def beside(self, work: Coroutine[Any, Any, None]) -> None:
-        """Let work of the session's process run beside the prompt."""
+        """Let work of the session's process run beside the prompt; nobody does it while that is dead."""
+        if self.process.dead:
+            return work.close()
         self.beside_it.append(self.process.start(work))
 
     async def end(self) -> None:
