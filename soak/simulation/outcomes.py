@@ -277,6 +277,8 @@ def _credited(world: World) -> Iterator[str | Granted]:
             breach = f"{words}: {origin}"
             if world.place(shown.line).language == "pmx" and _damage(history, shown.line, shown.began, shown.at):
                 breach = Granted(BARE_VALUE, words)  # noise made the number of another controller of that of the first
+            elif origin == OF_A_PROGRAM and _asked_r3(world, shown):
+                breach = Granted(BARE_VALUE, words)
         elif own and all(each.restarts == shown.restarts for each in own if each.until >= shown.began):
             breach = _never_held(world, shown, f"{words}: it never held that")
         if breach:
@@ -285,6 +287,7 @@ def _credited(world: World) -> Iterator[str | Granted]:
 
 
 SAVES = ("S", "STORE")
+OF_A_PROGRAM = "a program printed it"
 
 
 def _saved(history: History, shown: Shown, own: list[Held]) -> bool:
@@ -303,8 +306,15 @@ def _origin(shown: Shown, numbers: dict[str, Held]) -> str:
         if held is not None and not own:
             return f"{held.line}:{held.drive} held it from {held.at:.3f} to {held.until:.3f}"
         if TICKS <= int(number) < TICKS + 1_000_000:
-            return "a program printed it"
+            return OF_A_PROGRAM
     return ""
+
+
+def _asked_r3(world: World, shown: Shown) -> bool:
+    """Whether noise, on a line without a checksum, made R3 of what was asked for: the program counts in it."""
+    found = _damage(world.history, shown.line, shown.began, shown.at)
+    made = any(each.after.count(b"3") > each.before.count(b"3") for each in found)
+    return made and not world.place(shown.line).checked
 
 
 def _never_held(world: World, shown: Shown, words: str) -> str | Granted:

@@ -108,6 +108,7 @@ FIXED = {
     2027225: "an error flag that a program cleared, which an input started (of the simulation itself)",
     2028059: "operators that came to a session which had been killed (of the simulation itself)",
     2003021: "a port that a share opened in the name of its client (of the simulation itself)",
+    2004140: "a print of R1 that noise had made one of R3, in which a program counts (of the simulation itself)",
 }
 DERIVED = 12
 """The number of seeds that follow from the commit."""
