@@ -334,10 +334,23 @@ def mark(state: MCodeState, request: Request) -> Procedure[None]:
 
 def print_mark(state: MCodeState, priority: Priority, rows: str | None = None) -> Procedure[tuple[str, ...] | None]:
     """Have the drive print a fresh mark; return the lines up to the mark, or None. `rows`: as for a Request."""
+    reply = yield _mark(state, priority, rows)
+    return reply.lines if reply.end is End.DONE else None
+
+
+def rest_of_list(state: MCodeState, priority: Priority) -> Procedure[tuple[str, ...] | None]:
+    """Have the drive print a fresh mark after a list; return the lines before it, or None where some may be missing."""
+    reply = yield _mark(state, priority)
+    if reply.end is not End.DONE or reply.collided:  # a damaged line may be one of the list
+        state.reply_lost()
+        return None
+    return reply.lines[:-1]
+
+
+def _mark(state: MCodeState, priority: Priority, rows: str | None = None) -> Request:
     own = fresh(state, state.address, state.codec.party)
     asked = state.codec.request(state.address, f"PR {own.item}")
-    reply = yield replace(asked, expect=re.escape(own.shown), gather=True, rows=rows, signed=True, priority=priority)
-    return reply.lines if reply.end is End.DONE else None
+    return replace(asked, expect=re.escape(own.shown), gather=True, rows=rows, signed=True, priority=priority)
 
 
 def ends_in_program_mode(reply: Reply) -> bool:

@@ -326,11 +326,10 @@ def immediate(state: MCodeState, request: Request) -> Procedure[tuple[str, ...]]
         # Print a mark after a list: EM 1 to 3 give a list no end.
         lines = reply.lines
         if state.codec.em != 0:
-            rest = yield from exchange.print_mark(state, request.priority)
+            rest = yield from exchange.rest_of_list(state, request.priority)
             if rest is None:
-                state.reply_lost()
-                raise NoAnswer(f"{who(state)}: the list may be incomplete: its end was not seen; ask again")
-            lines += rest[:-1]
+                raise NoAnswer(f"{who(state)}: the list may be incomplete: its end or a line was damaged; ask again")
+            lines += rest
             if not lines:
                 yield from exchange.check_error_flag(state, request)
         return tuple(line for line in lines if line)

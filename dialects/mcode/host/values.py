@@ -17,9 +17,9 @@ from multidrop.dialects.mcode.host.exchange import (
     check_printed,
     note_error,
     once,
-    print_mark,
     printed_value,
     question,
+    rest_of_list,
     sign,
     value,
 )
@@ -218,13 +218,12 @@ def listed(state: MCodeState, text: str) -> Procedure[tuple[str, ...]]:
             state.error_possible()
         lines = reply.lines
         if state.codec.em != 0 or reply.end is not End.DONE:
-            rest = yield from print_mark(state, Priority.OPERATOR)
+            rest = yield from rest_of_list(state, Priority.OPERATOR)
             if rest is None:
-                state.reply_lost()
                 stood = True
                 continue
             state.synchronised()
-            lines += rest[:-1]
+            lines += rest
         whole = reply.end in (End.DONE, End.SILENT)
         if reply.end in (End.REFUSED, End.NAK):  # an earlier error looks like the refusal of an empty list
             whole = stood or (reply.end is End.NAK and bool(reply.lines))

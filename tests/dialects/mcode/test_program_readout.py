@@ -11,6 +11,7 @@ from multidrop.dialects.mcode.host.state import MCodeState
 from multidrop.dialects.mcode.manual import program_file
 from multidrop.dialects.program_files import Difference, Held, Stored
 from tests.conftest import Bench
+from tests.support.cases import for_each
 from tests.support.examples import examples
 from tests.support.mcode_drives import one_drive
 
@@ -173,3 +174,27 @@ def test_a_program_whose_listing_was_lost_is_listed_again():
     device.execute = loses_the_first
     held = desk.run(MCODE.programs.read(state, (), lambda done, total: None), state)
     assert lost and [line.text for line in held.lines] == ["LB G1", "MR 100", "E"]
+
+
+@for_each("late", [False, True])
+@pytest.mark.parametrize("em", [1, 2, 3])
+def test_a_program_of_which_a_listed_line_was_damaged_is_listed_again(em, late):
+    desk, state = one_drive(Bench, em=em, party=True, check=1)
+    for line in ("PG 1", "LB G1", "MR 100", "E", "PG"):
+        assert not desk.devices["a"].execute(line, desk.now).refused
+    advance, held, damaged = desk.wire.advance, bytearray(), []
+
+    def damages_a_line(now):
+        held.extend(advance(now))
+        if late and not damaged and b"L" in desk.written[-1][:2]:  # all of it comes with the mark after the list
+            return b""
+        if b"  MR 100" in held and not damaged:
+            damaged.append(now)
+            held[:] = held.replace(b"  MR 100", b"   MR 100")
+        came = bytes(held)
+        held.clear()
+        return came
+
+    desk.wire.advance = damages_a_line
+    found = desk.run(MCODE.programs.read(state, (), lambda done, total: None), state)
+    assert damaged and [line.text for line in found.lines] == ["LB G1", "MR 100", "E"]
