@@ -110,6 +110,7 @@ FIXED = {
     2003021: "a port that a share opened in the name of its client (of the simulation itself)",
     2004140: "a print of R1 that noise had made one of R3, in which a program counts (of the simulation itself)",
     2004804: "a listing of which a line was damaged, whose backup was said to have the old program",
+    2030780: "a move for program mode, which a drive that had lost its power executed",
 }
 DERIVED = 12
 """The number of seeds that follow from the commit."""

@@ -28,7 +28,8 @@ from multidrop.dialects.state import Owed
 #
 # Only EM=0 shows program mode by its prompt (an address), so the host uses EM=0 as long as program mode lasts. It
 # checks the prompt of every line: a drive that was restarted is out of program mode and executes what it receives.
-# After a missing reply the host first sends an empty line, which is neither stored nor executed, and reads the prompt.
+# After a missing reply, and before a line that starts motion where it is executed, the host first sends an empty line,
+# which is neither stored nor executed, and reads the prompt.
 # (MCode reference 5.1.98; facts of real units.)
 
 
@@ -141,7 +142,8 @@ def put_back_found(state: MCodeState, owed: Sequence[Owed]) -> Procedure[None]:
 
 def program_line(state: MCodeState, request: Request) -> Procedure[tuple[str, ...]]:
     """Send a line in program mode: the drive stores it, and nothing else may be asked."""
-    if (state.reply_pending or state.settings_unknown) and not classify.leaves_program(request.text):
+    moves = classify.starts_motion(request.text)  # in a drive that was without power meanwhile
+    if (moves or state.reply_pending or state.settings_unknown) and not classify.leaves_program(request.text):
         yield from _make_sure(state, request, "was not sent")
     reply = yield replace(request, kind=Kind.PROGRAM)
     if reply.end in (End.TIMEOUT, End.DAMAGED):

@@ -52,6 +52,18 @@ def test_in_program_mode_nothing_is_asked(bench):
     assert len(desk.bench.written) == sent
 
 
+@pytest.mark.parametrize(("em", "check"), [(0, 0), (1, 0), (0, 1), (1, 2)])
+def test_a_restart_in_program_mode_executes_no_move_that_was_typed_to_be_stored(bench, em, check):
+    desk = Desk(bench, (em, check), party=True)
+    desk.type("S")
+    desk.type("PG 1")
+    desk.type("LB G1")
+    desk.restart()
+    with pytest.raises(DriveError, match="was not sent"):
+        desk.type("MR 5000")
+    assert desk.witness.executed("MR 5000") == []
+
+
 @pytest.mark.parametrize("saved", range(4))
 @pytest.mark.parametrize(("em", "party"), [(0, False), (0, True), (1, False), (3, True)])
 def test_a_restart_in_program_mode_is_noticed_and_no_move_is_told_as_stored(bench, em, party, saved):
