@@ -103,9 +103,9 @@ class Doubt:
             others = [replace(late, taken=late.nak) for late in others]
             self._late = own + others
         # Whether the reply is certainly that of this drive: it printed what only this request can print.
-        expected = request.expect is not None and reply.end is End.DONE
+        expected = request.expect is not None and (reply.end is End.DONE or reply.flagged)
         distinct = request.gather or not doubtful
-        executed = reply.acknowledged or request.kind is not Kind.QUIET
+        executed = reply.acknowledged or reply.flagged or request.kind is not Kind.QUIET
         if expected and distinct and executed:
             self._late = others
             return Weight(doubtful or any(late.taken for late in own), request.gather and bool(own))

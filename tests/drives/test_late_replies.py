@@ -302,6 +302,29 @@ def test_a_list_that_another_drives_answer_may_stand_in_is_not_taken():
         talk.send(done.reply)
 
 
+@pytest.mark.parametrize("sign", [b"\x15", b"\x06"])
+def test_a_print_behind_a_nak_is_owed_no_sign_any_more(sign):
+    """With an error set some units reply NAK to everything, and print."""
+    mode = MCode(em=1, party=True, checksum=1, escape=1)
+    line, ended = Line(mode), []
+
+    def at(now: float, data: bytes = b"") -> None:
+        if data:
+            line.receive(data, now)
+        ended.extend(event.reply for event in line.events(now) if isinstance(event, Finished))
+
+    asked = mode.request("a", "PR VR,DN")
+    line.ask(replace(asked, kind=Kind.QUIET, expect='3\\.010"a"', signed=True, settle=0.1, timeout=0.5))
+    at(0.0)
+    at(0.1, sign + sealed(b'3.010"a"') + b"\r\n")
+    at(2.0)
+    line.ask(mode.request("b", "MR 5"))
+    at(2.5)
+    at(2.6, b"\x06")
+    assert len(ended) == 2
+    assert not ended[-1].doubtful
+
+
 # --- a language whose marks are asked for behind a doubtful answer
 
 
