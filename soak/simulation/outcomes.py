@@ -9,9 +9,12 @@ from __future__ import annotations
 import re
 from bisect import bisect_left, bisect_right
 from collections.abc import Iterator
+from contextlib import suppress
 from math import inf
 
+from multidrop.transports.relay import Garbled
 from soak.languages import TICKS
+from soak.simulation.departures import for_drives
 from soak.simulation.history import Command, Damage, Executed, Held, History, Outcome, Shown
 from soak.simulation.rule import Grant, Granted, Rule
 from soak.simulation.world import NUMBER, World
@@ -320,13 +323,22 @@ def _asked_r3(world: World, shown: Shown) -> bool:
 def _never_held(world: World, shown: Shown, words: str) -> str | Granted:
     """Except a value that noise damaged, where no checksum showed that, or where it was right."""
     place, history = world.place(shown.line), world.history
-    heard = b"".join(data for at, data in history.received.get(shown.line, []) if shown.began <= at <= shown.at)
+    heard = _heard(world, shown)
     if not _damage(history, shown.line, shown.began - AFTER, shown.at):
         return Granted(BARE_VALUE, words) if not place.checked and _divided(history, shown, heard) else words
     if not place.checked:
         return Granted(BARE_VALUE, words)
     right = _sealed_frame if place.language == "tmcl" else _sealed_line
     return Granted(SEVEN_BITS, words) if right(heard, shown.text) else words
+
+
+def _heard(world: World, shown: Shown) -> bytes:
+    """What the drives of a line sent since a question; of a relay without its frames."""
+    received = world.history.received.get(shown.line, [])
+    heard = b"".join(data for at, data in received if shown.began <= at <= shown.at)
+    with suppress(Garbled):  # it begins within a frame
+        return for_drives("ssh", heard) if world.place(shown.line).kind == "ssh" else heard
+    return heard
 
 
 def _endings(history: History, shown: Shown) -> list[bytes]:

@@ -5,13 +5,16 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 
+from soak.simulation.history import Executed
 from soak.simulation.outcomes import BARE_COMMAND, became
 from soak.simulation.rule import Granted, Rule
-from soak.simulation.told import Put
+from soak.simulation.told import Put, Run
 from soak.simulation.world import NUMBER, World
 
 PLACE = re.compile(r"(?:backup: |before is in )(\S+)")
 """What names a backup."""
+CLEARS = "CP"
+"""What clears the programs of an MCode drive."""
 
 
 def _automation(world: World) -> Iterator[str]:
@@ -27,8 +30,17 @@ def _asked(world: World) -> Iterator[str | Granted]:
                 continue
             if guarded.asks and any(guarded.typed <= yes <= each.at for yes in told.yes):
                 continue
+            if each.text == CLEARS and any(_downloads(run, each) for run in told.runs.values()):
+                continue  # what is in the place of the file's program, as the download says
             words = f"{each.line}:{each.drive} {each.text!r}, typed at {guarded.typed:.3f}, executed without a yes"
             yield Granted(BARE_COMMAND, words) if became(world, each.line, each.at) else words
+
+
+def _downloads(run: Run, each: Executed) -> bool:
+    """Whether a program was downloaded to a drive as it executed a line."""
+    done = run.download
+    began = done is not None and (done.line, done.drive) == (each.line, each.drive) and 0 <= run.began <= each.at
+    return began and (run.ended < run.began or each.at <= run.ended)
 
 
 def _stored(world: World) -> Iterator[str | Granted]:

@@ -111,6 +111,8 @@ FIXED = {
     2004140: "a print of R1 that noise had made one of R3, in which a program counts (of the simulation itself)",
     2004804: "a listing of which a line was damaged, whose backup was said to have the old program",
     2030780: "a move for program mode, which a drive that had lost its power executed",
+    2005504: "the CP of a download, after one that was typed and not agreed to (of the simulation itself)",
+    2029961: "a checksum of seven bits in the frames of a relay (of the simulation itself)",
 }
 DERIVED = 12
 """The number of seeds that follow from the commit."""
