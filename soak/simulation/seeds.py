@@ -113,6 +113,7 @@ FIXED = {
     2030780: "a move for program mode, which a drive that had lost its power executed",
     2005504: "the CP of a download, after one that was typed and not agreed to (of the simulation itself)",
     2029961: "a checksum of seven bits in the frames of a relay (of the simulation itself)",
+    2031539: "an echo mode that a download had borrowed as the line was lost, which was taken for one that is put back",
 }
 DERIVED = 12
 """The number of seeds that follow from the commit."""

@@ -16,7 +16,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 from multidrop.dialects.codec import Kind, Priority, Procedure, Reply, Request
-from multidrop.dialects.errors import DriveError, NoAnswer, Refused
+from multidrop.dialects.errors import NoAnswer, Refused
 from multidrop.dialects.mcode.host import classify
 from multidrop.dialects.mcode.host.classify import NOTHING, Setting
 from multidrop.dialects.mcode.host.codec import NOBODY, PONG, SLOWEST, MCode, pongs
@@ -168,15 +168,14 @@ def set_wire(state: MCodeState, request: Request) -> Procedure[None]:
     """Send a communication setting, then read the drive's settings. Raises Refused or NoAnswer."""
     setting = classify.setting_of(request.text)
     assert setting is not None
-    places, before = places_after(state, setting), who(state)
+    places, before, found = places_after(state, setting), who(state), False
     try:
         yield from answered(state, request)
         found = yield from look_in(state, places)
-    except DriveError:  # stopped before the settings were read, or an error that need not come from this line
-        _lose(state, places)
-        raise
+    finally:
+        if not found:  # stopped or lost before the settings were read, or an error that need not come from this line
+            _lose(state, places)
     if not found:
-        _lose(state, places)
         raise NoAnswer(f"{before} was sent '{request.text}' and does not reply now; open it again later")
     if state.error:
         yield from refused(state, request)

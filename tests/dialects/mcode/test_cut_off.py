@@ -10,6 +10,7 @@ from multidrop.dialects.mcode.host import identify
 from multidrop.dialects.mcode.host.codec import MCode
 from multidrop.dialects.mcode.manual import program_file
 from multidrop.simulator.cell.spec import Faults
+from multidrop.transports import TransportLost
 from tests.support.cases import for_each
 from tests.support.faults import disturb
 from tests.support.mcode_drives import MODES, Witness
@@ -170,3 +171,24 @@ def test_a_download_says_what_is_owed_before_the_echo_mode_is_changed(bench):
     lines = program_file.read("PG 1\nLB G1\nE\nPG\n", "x")
     desk.run(MCODE.programs.download(state, lines, None, lambda done, total: None), state, at=look)
     assert (None, 0) not in seen and (OWED, 0) in seen and (state.restore, device.memory.echo_mode) == (None, 1)
+
+
+def lost_behind(procedure, text):
+    """Forward a conversation up to the reply to this request: the line is lost with the next one."""
+    request = next(procedure)
+    while request.text != text:
+        request = procedure.send((yield request))
+    procedure.send((yield request))
+    while True:
+        procedure.throw(TransportLost("the port is gone"))
+
+
+def test_an_echo_mode_that_was_borrowed_as_the_line_was_lost_stays_owed(bench):
+    desk, device, _ = left(bench)
+    [state] = found(desk, True)
+    lines = program_file.read("PG 1\nLB G1\nE\nPG\n", "x")
+    with pytest.raises(TransportLost):
+        desk.run(lost_behind(MCODE.programs.download(state, lines, None, lambda done, total: None), "EM=0"), state)
+    assert (state.restore, device.memory.echo_mode) == (OWED, 0)
+    assert desk.type(state, "PR EM") == ("1",)
+    assert (state.restore, device.memory.echo_mode) == (None, 1)
