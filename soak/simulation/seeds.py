@@ -114,6 +114,7 @@ FIXED = {
     2005504: "the CP of a download, after one that was typed and not agreed to (of the simulation itself)",
     2029961: "a checksum of seven bits in the frames of a relay (of the simulation itself)",
     2031539: "an echo mode that a download had borrowed as the line was lost, which was taken for one that is put back",
+    2032542: "a move by hand as its macro began, which was stopped early (of the simulation itself)",
 }
 DERIVED = 12
 """The number of seeds that follow from the commit."""

@@ -40,6 +40,8 @@ class Run:
     began: float = -1.0
     latches: int = 0
     """The number of latches before it began: a stop may come in the same moment."""
+    executed: int = 0
+    """The number of lines that drives had executed before it began: one may have been so in the same moment."""
     ended: float = -1.0
     automatic: bool = False
     """A macro or a script, which a stop keeps from beginning until `/resume`."""

@@ -99,6 +99,7 @@ def wrote(world: World, line: str, data: bytes) -> None:
 async def watched(world: World, run: Run, work: Awaitable[Any]) -> None:
     """Do the work of a run, and note its end; after an early one look at the drives."""
     run.began, run.latches, run.failure = world.loop.now, len(world.history.told.latches), ""
+    run.executed = len(world.history.executed)
     if run.download is not None:
         run.download.old = held(world, run.download.line, run.download.drive)
     try:
@@ -149,7 +150,8 @@ def examine(world: World, run: Run) -> None:
             continue
         moves = any(each.velocity for each in placed.unit.shadow.motion(now))
         text = f"{line}:{drive} after {run.typed!r} ({run.failure}) ended at {run.ended:.3f}"
-        if (line, drive, before.text) in run.moves and run.began <= before.at <= run.ended:
+        since = world.history.executed[run.executed :]
+        if (line, drive, before.text) in run.moves and before in since and before.at <= run.ended:
             if moves and not _said(world, line, run.began, TROUBLE):
                 told.unstopped.append(f"{text}: {before.text!r} goes on")
         elif (line, drive) in {move[:2] for move in run.moves}:
