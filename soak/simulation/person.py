@@ -45,6 +45,8 @@ class Person:
         self._session, self._loop, self._rng, self._typed = session, loop, rng, typed
         self._coming: deque[bytes] = deque()
         """Pieces on their way."""
+        self._reading = False
+        """The keyboard's thread writes a stop: it reads no further piece before it has passed this one on."""
         self._line = ""
         self._at = 0.0
         session.front.ask = lambda question: at_keyboard(self.keyboard, question)
@@ -72,7 +74,7 @@ class Person:
         """Type a stop that cuts in at an aim, or comes at a turn of the loop once that was not passed for some time."""
 
         def arrive() -> None:
-            if any(STOP_KEY in each for each in self._coming):
+            if not self._reading and any(STOP_KEY in each for each in self._coming):
                 piece = b""
                 while STOP_KEY not in piece:
                     piece += self._coming.popleft()
@@ -93,7 +95,11 @@ class Person:
         """One read of the keyboard's thread, which is then held up for so long, s, before it passes the bytes on."""
         self._typed(data)
         if STOP_KEY in data:
-            self.keyboard.stop_ahead()
+            self._reading = True
+            try:
+                self.keyboard.stop_ahead()
+            finally:
+                self._reading = False
         if held:
             self._at = max(self._at, self._loop.now + held)
             self._loop.call_at(self._at, self.keyboard._read, data)

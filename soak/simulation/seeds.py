@@ -115,6 +115,7 @@ FIXED = {
     2029961: "a checksum of seven bits in the frames of a relay (of the simulation itself)",
     2031539: "an echo mode that a download had borrowed as the line was lost, which was taken for one that is put back",
     2032542: "a move by hand as its macro began, which was stopped early (of the simulation itself)",
+    2034687: "a stop that was read while the thread wrote the one before (of the simulation itself)",
 }
 DERIVED = 12
 """The number of seeds that follow from the commit."""
