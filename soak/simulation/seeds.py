@@ -116,6 +116,7 @@ FIXED = {
     2031539: "an echo mode that a download had borrowed as the line was lost, which was taken for one that is put back",
     2032542: "a move by hand as its macro began, which was stopped early (of the simulation itself)",
     2034687: "a stop that was read while the thread wrote the one before (of the simulation itself)",
+    2033943: "the error of a PG too many after a download that failed, which the next move was blamed for",
 }
 DERIVED = 12
 """The number of seeds that follow from the commit."""

@@ -370,7 +370,7 @@ def leave_program(state: MCodeState) -> Procedure[int]:
 
     Returns the error that this found and cleared, 0 for none.
     """
-    for _ in range(2 * REPEATS):
+    for sent in range(2 * REPEATS):
         request = replace(state.codec.request(state.address, "PG"), kind=Kind.PROGRAM)
         reply = yield request
         code: int | None = 0
@@ -386,6 +386,8 @@ def leave_program(state: MCodeState) -> Procedure[int]:
             if (yield from print_mark(state, request.priority)) is not None:
                 state.left_program_mode()
         if not state.programming:
+            if sent and not code:  # the error of a PG too many, which may be late
+                state.error_possible()
             return code if code and code != NOT_PROGRAMMING else 0
     raise NoAnswer(f"{who(state)} could not be taken out of program mode: type PG, then open it again")
 

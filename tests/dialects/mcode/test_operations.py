@@ -358,6 +358,21 @@ def test_where_a_stop_prevents_that_program_mode_is_left_the_mode_is_read_before
     assert ProcedureRunner(MCODE.perform(state, "MR 1")).request.text == ""
 
 
+@pytest.mark.parametrize(("silent", "error"), [(0, False), (1, True)])
+def test_the_error_of_a_pg_too_many_is_read_before_the_next_line(silent, error):
+    """The reply to the first PG is late and ends program mode; that to the second, which is refused, comes behind it."""
+    state = MCodeState(MCode())
+    state.entered_program_mode(300)
+    procedure = ProcedureRunner(take_out(state, "taken out"))
+    for _ in range(silent):
+        procedure.answer(Reply((), end=End.TIMEOUT))
+        procedure.answer(Reply((), end=End.TIMEOUT))  # the mark
+    assert procedure.request.text == "PG"
+    procedure.answer(Reply((), prompt=">"))
+    assert procedure.request is None and not state.programming
+    assert state.error is error
+
+
 @pytest.mark.parametrize("check", [0, 1])
 def test_a_stop_in_a_reading_without_a_checksum_leaves_an_error_that_no_line_is_blamed_for(check):
     for reading in (lambda state: MCODE.motion(state, Priority.OPERATOR), lambda state: listed(state, "PR UV")):
