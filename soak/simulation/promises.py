@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
+from math import inf
 
 from soak.simulation.history import Executed
 from soak.simulation.outcomes import BARE_COMMAND, became
@@ -30,17 +31,23 @@ def _asked(world: World) -> Iterator[str | Granted]:
                 continue
             if guarded.asks and any(guarded.typed <= yes <= each.at for yes in told.yes):
                 continue
-            if each.text == CLEARS and any(_downloads(run, each) for run in told.runs.values()):
+            if each.text == CLEARS and any(_downloads(world, run, each) for run in told.runs.values()):
                 continue  # what is in the place of the file's program, as the download says
             words = f"{each.line}:{each.drive} {each.text!r}, typed at {guarded.typed:.3f}, executed without a yes"
             yield Granted(BARE_COMMAND, words) if became(world, each.line, each.at) else words
 
 
-def _downloads(run: Run, each: Executed) -> bool:
-    """Whether a program was downloaded to a drive as it executed a line."""
+def _downloads(world: World, run: Run, each: Executed) -> bool:
+    """Whether a program was downloaded to a drive as it executed a line; a kill ends a download without a word."""
     done = run.download
-    began = done is not None and (done.line, done.drive) == (each.line, each.drive) and 0 <= run.began <= each.at
-    return began and (run.ended < run.began or each.at <= run.ended)
+    if done is None or (done.line, done.drive) != (each.line, each.drive) or not 0 <= run.began <= each.at:
+        return False
+    ended = (
+        run.ended
+        if run.ended >= run.began
+        else min((at for at in world.history.deaths if at >= run.began), default=inf)
+    )
+    return each.at <= ended
 
 
 def _stored(world: World) -> Iterator[str | Granted]:

@@ -117,6 +117,7 @@ FIXED = {
     2032542: "a move by hand as its macro began, which was stopped early (of the simulation itself)",
     2034687: "a stop that was read while the thread wrote the one before (of the simulation itself)",
     2033943: "the error of a PG too many after a download that failed, which the next move was blamed for",
+    2033475: "a value with the reply to a mark behind it, whose CR noise had taken, which was shown as one value",
 }
 DERIVED = 12
 """The number of seeds that follow from the commit."""

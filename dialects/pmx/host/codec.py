@@ -32,7 +32,7 @@ WRITES_FLASH = re.compile(r"STORE|SA\d+=", re.ASCII)
 MARKED = re.compile(r"\?(?:Q(?:\d\d)?\d{3}|~~~)", re.ASCII)
 """The reply to a sync mark (`exchange`), and to what ends a half-sent line before a stop.
 
-A longer line that begins with it is two replies: its end was lost."""
+A longer line with it is two replies: the end of the first was lost."""
 NO_TEXT = b"\n\0"
 """Bytes that some gateways and drivers add."""
 
@@ -84,7 +84,7 @@ class Pmx(Codec):
             if request.gather:
                 return Decoded(Reply((*strays, text), acknowledged=True), at)
             wrong = len(text) > LONGEST or any(not " " <= c <= "~" for c in text)
-            if wrong or (MARKED.match(text) and text != f"?{request.text}"):
+            if wrong or (MARKED.search(text) and text != f"?{request.text}"):
                 reply = Reply(end=End.DAMAGED, detail=f"heard {text[:48]!r}")
             elif text.startswith("?"):
                 reply = Reply((text,), End.REFUSED)

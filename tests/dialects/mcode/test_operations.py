@@ -360,7 +360,7 @@ def test_where_a_stop_prevents_that_program_mode_is_left_the_mode_is_read_before
 
 @pytest.mark.parametrize(("silent", "error"), [(0, False), (1, True)])
 def test_the_error_of_a_pg_too_many_is_read_before_the_next_line(silent, error):
-    """The reply to the first PG is late and ends program mode; that to the second, which is refused, comes behind it."""
+    """The late reply to the first PG ends program mode; that to the second, which is refused, comes behind it."""
     state = MCodeState(MCode())
     state.entered_program_mode(300)
     procedure = ProcedureRunner(take_out(state, "taken out"))

@@ -375,5 +375,7 @@ def test_a_mark_that_lost_its_end_is_no_refusal_of_the_line_whose_reply_it_swall
     codec = Pmx()
     found = codec.decode(codec.request("01", "X5"), b"?Q03001OK\r")
     assert found is not None and (found.reply.end, found.reply.detail) == (End.DAMAGED, "heard '?Q03001OK'")
+    found = codec.decode(codec.request("02", "V1"), b"9786678?Q01004\r")
+    assert found is not None and (found.reply.end, found.reply.detail) == (End.DAMAGED, "heard '9786678?Q01004'")
     typed = codec.decode(codec.request("01", "Q1234"), b"?Q1234\r")
     assert typed is not None and typed.reply.end is End.REFUSED
