@@ -118,6 +118,7 @@ FIXED = {
     2034687: "a stop that was read while the thread wrote the one before (of the simulation itself)",
     2033943: "the error of a PG too many after a download that failed, which the next move was blamed for",
     2033475: "a value with the reply to a mark behind it, whose CR noise had taken, which was shown as one value",
+    2010419: "the error of a line that another client's stop made harmless, which a command was blamed for",
 }
 DERIVED = 12
 """The number of seeds that follow from the commit."""

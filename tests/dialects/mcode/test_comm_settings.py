@@ -154,6 +154,18 @@ def test_an_error_of_a_name_is_no_refusal_of_a_line_that_uses_none(bench, em):
         desk.type("EX G1")
 
 
+@pytest.mark.parametrize("em", range(4))
+def test_an_unknown_word_is_no_refusal_of_a_line_whose_words_are_all_known(bench, em):
+    """A port that is lent makes a half-sent line harmless at the stop of another program, which gives this error."""
+    desk = Desk(bench, (em, 0))
+    desk.device.fail(20, desk.bench.now)
+    with pytest.raises(Refused, match="error 20: .* or that is of another line and it was executed"):
+        desk.type("MA 100")
+    assert len(desk.witness.executed("MA 100")) == 1
+    with pytest.raises(Refused, match="refused 'NOSUCH=1': error 20"):
+        desk.type("NOSUCH=1")
+
+
 @pytest.mark.wide
 @pytest.mark.parametrize(("em", "check"), [(em, check) for em in range(4) for check in range(3)])
 @pytest.mark.parametrize("line", ["PR 1", "PR 0", "PR I1", 'PR "0 1"', 'PR "?"', 'PR ">ok"', "PR R1"])
