@@ -239,8 +239,8 @@ def refused(state: MCodeState, request: Request, acknowledged: bool = False) -> 
     if code == ErrorNumber.UNKNOWN_VARIABLE and not classify.uses_own_name(request.text):
         # A port that is lent makes a half-sent line harmless at the stop of another program.
         raise Refused(
-            f"{who(state)}: {described(code, state)}; it refused '{request.text}', or that is of another line and it was "
-            "executed",
+            f"{who(state)}: {described(code, state)}; it refused '{request.text}', or that is of another line and it "
+            "was executed",
             code,
         )
     caveat = "; a program runs, whose error it may be" if (yield from _runs(state)) else ""
