@@ -1,6 +1,7 @@
 """A drive's late answer is never told as another's, however the bytes of the two answers come: a line in memory."""
 
 import re
+from collections.abc import Callable
 from dataclasses import replace
 from itertools import combinations
 
@@ -8,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from multidrop.dialects import End, Kind, NoAnswer, Request
+from multidrop.dialects import End, Kind, NoAnswer, Reply, Request
 from multidrop.dialects.mcode.family import MCODE
 from multidrop.dialects.mcode.host.codec import MCode
 from multidrop.dialects.mcode.host.framing import sealed
@@ -36,6 +37,18 @@ def answer(frame: bytes, mode: MCode) -> bytes:
     if text.endswith(";"):
         return head + line
     return head + (sealed(line) if mode.checksum else line) + b"\r\n"
+
+
+def timed(line: Line) -> tuple[Callable[..., None], list[Reply]]:
+    """A function that lets bytes come at a time, and the replies that have ended by then."""
+    ended: list[Reply] = []
+
+    def at(now: float, data: bytes = b"") -> None:
+        if data:
+            line.receive(data, now)
+        ended.extend(event.reply for event in line.events(now) if isinstance(event, Finished))
+
+    return at, ended
 
 
 class Two:
@@ -143,71 +156,6 @@ def test_a_late_answer_is_never_the_value_of_another_drive(em, check, text, sign
         assert two.result == own(text)
 
 
-@pytest.mark.parametrize(("beginning", "doubtful"), [(b"Performax-2", True), (b"Performax-2ED-SA?\r", False)])
-def test_the_rest_of_a_reply_that_had_begun_may_look_like_any_value(beginning, doubtful):
-    """The wait for 03 ends within its reply, and the rest comes where 02 was asked."""
-    line, ended = Line(Pmx(), timeout=0.3), []
-
-    def at(now: float, data: bytes = b"") -> None:
-        if data:
-            line.receive(data, now)
-        ended.extend(event.reply for event in line.events(now) if isinstance(event, Finished))
-
-    line.ask(pmx("ID", "03", kind=Kind.PRINT, expect="Performax-2ED-SA"))
-    at(0.0)
-    at(0.1, beginning)
-    at(0.5)
-    line.ask(pmx("V1", "02"))
-    at(1.0)
-    at(1.1, b"ED-SA\r")
-    assert ended[0].end is End.DAMAGED
-    assert ended[-1].lines == ("ED-SA",) and ended[-1].doubtful is doubtful
-
-
-def test_a_doubtful_reply_of_another_drive_stands_in_front_of_the_mark():
-    """02 is asked, gets what is left of 03's reply, and its own goes to 01, which was asked before the mark."""
-    line, ended = Line(Pmx(), timeout=0.3), []
-
-    def at(now: float, data: bytes = b"") -> None:
-        if data:
-            line.receive(data, now)
-        ended.extend(event.reply for event in line.events(now) if isinstance(event, Finished))
-
-    line.ask(pmx("ID", "03", kind=Kind.PRINT, expect="Performax-2ED-SA"))
-    at(0.0)
-    at(0.1, b"Performax-2")
-    at(0.5)
-    line.ask(pmx("V1", "02"))
-    at(1.0)
-    at(1.1, b"ED-SA\r")
-    line.ask(pmx("MSTX", "01"))
-    at(1.2)
-    at(1.3, b"202\r")
-    assert ended[-1].lines == ("202",) and ended[-1].doubtful
-    line.ask(pmx("Q02001", "02", kind=Kind.PRINT, expect=r"\?Q02001", gather=True))
-    at(1.4)
-    at(1.5, b"?Q02001\r")
-    assert ended[-1].lines == ("202", "?Q02001")
-
-
-def test_a_late_refusal_of_another_drive_is_not_certain():
-    """A command that reads nothing is replied to with OK, and with a refusal: either may come late."""
-    line, ended = Line(Pmx(), timeout=0.3), []
-
-    def at(now: float, data: bytes = b"") -> None:
-        if data:
-            line.receive(data, now)
-        ended.extend(event.reply for event in line.events(now) if isinstance(event, Finished))
-
-    line.ask(pmx("X7000", "01"))
-    at(0.0)
-    at(0.5)
-    line.ask(pmx("V2=5", "02"))
-    at(1.0)
-    at(1.1, b"?Moving\r")
-    assert ended[-1].end is End.REFUSED and ended[-1].doubtful
-
-
 @pytest.mark.wide
 @pytest.mark.parametrize("text", PRINTS)
 @pytest.mark.parametrize(("em", "check"), MODES)
@@ -306,12 +254,8 @@ def test_a_list_that_another_drives_answer_may_stand_in_is_not_taken():
 def test_a_print_behind_a_nak_is_owed_no_sign_any_more(sign):
     """With an error set some units reply NAK to everything, and print."""
     mode = MCode(em=1, party=True, checksum=1, escape=1)
-    line, ended = Line(mode), []
-
-    def at(now: float, data: bytes = b"") -> None:
-        if data:
-            line.receive(data, now)
-        ended.extend(event.reply for event in line.events(now) if isinstance(event, Finished))
+    line = Line(mode)
+    at, ended = timed(line)
 
     asked = mode.request("a", "PR VR,DN")
     line.ask(replace(asked, kind=Kind.QUIET, expect='3\\.010"a"', signed=True, settle=0.1, timeout=0.5))
@@ -330,6 +274,59 @@ def test_a_print_behind_a_nak_is_owed_no_sign_any_more(sign):
 
 def pmx(text: str, address: str, **changes: object) -> Request:
     return replace(Pmx().request(address, text), **changes)
+
+
+@pytest.mark.parametrize(("beginning", "doubtful"), [(b"Performax-2", True), (b"Performax-2ED-SA?\r", False)])
+def test_the_rest_of_a_reply_that_had_begun_may_look_like_any_value(beginning, doubtful):
+    """The wait for 03 ends within its reply, and the rest comes where 02 was asked."""
+    line = Line(Pmx(), timeout=0.3)
+    at, ended = timed(line)
+
+    line.ask(pmx("ID", "03", kind=Kind.PRINT, expect="Performax-2ED-SA"))
+    at(0.0)
+    at(0.1, beginning)
+    at(0.5)
+    line.ask(pmx("V1", "02"))
+    at(1.0)
+    at(1.1, b"ED-SA\r")
+    assert ended[0].end is End.DAMAGED
+    assert ended[-1].lines == ("ED-SA",) and ended[-1].doubtful is doubtful
+
+
+def test_a_doubtful_reply_of_another_drive_stands_in_front_of_the_mark():
+    """02 is asked, gets what is left of 03's reply, and its own goes to 01, which was asked before the mark."""
+    line = Line(Pmx(), timeout=0.3)
+    at, ended = timed(line)
+
+    line.ask(pmx("ID", "03", kind=Kind.PRINT, expect="Performax-2ED-SA"))
+    at(0.0)
+    at(0.1, b"Performax-2")
+    at(0.5)
+    line.ask(pmx("V1", "02"))
+    at(1.0)
+    at(1.1, b"ED-SA\r")
+    line.ask(pmx("MSTX", "01"))
+    at(1.2)
+    at(1.3, b"202\r")
+    assert ended[-1].lines == ("202",) and ended[-1].doubtful
+    line.ask(pmx("Q02001", "02", kind=Kind.PRINT, expect=r"\?Q02001", gather=True))
+    at(1.4)
+    at(1.5, b"?Q02001\r")
+    assert ended[-1].lines == ("202", "?Q02001")
+
+
+def test_a_late_refusal_of_another_drive_is_not_certain():
+    """A command that reads nothing is replied to with OK, and with a refusal: either may come late."""
+    line = Line(Pmx(), timeout=0.3)
+    at, ended = timed(line)
+
+    line.ask(pmx("X7000", "01"))
+    at(0.0)
+    at(0.5)
+    line.ask(pmx("V2=5", "02"))
+    at(1.0)
+    at(1.1, b"?Moving\r")
+    assert ended[-1].end is End.REFUSED and ended[-1].doubtful
 
 
 FIRST = [[b"101\r202\r"], [b"101\r", b"202\r"], [b"101\r2", b"02\r"], [b"101\r"], [b"101\r20"]]
@@ -371,12 +368,8 @@ def test_what_came_behind_a_doubtful_answer_stands_in_front_of_the_mark(first, o
 
 def test_what_came_before_the_mark_of_another_drive_may_be_the_reply_that_is_owed():
     """The mark of the slow drive goes first, and the reply of the other one comes before it."""
-    line, ended = Line(Pmx(), timeout=0.3), []
-
-    def at(now: float, data: bytes = b"") -> None:
-        if data:
-            line.receive(data, now)
-        ended.extend(event.reply for event in line.events(now) if isinstance(event, Finished))
+    line = Line(Pmx(), timeout=0.3)
+    at, ended = timed(line)
 
     def mark(address: str) -> Request:
         return pmx(f"Q{address}001", address, kind=Kind.PRINT, expect=rf"\?Q{address}001", gather=True)

@@ -230,17 +230,12 @@ def refused(state: MCodeState, request: Request, acknowledged: bool = False) -> 
             f"{who(state)}: {described(code, state)}, now cleared; an ACK of '{request.text}' came, too: it is not "
             "known whether it was executed"
         )
-    if _came_by_itself(request, code):
+    # A port that is lent makes a half-sent line harmless at the stop of another program.
+    elsewhere = code == ErrorNumber.UNKNOWN_VARIABLE and not classify.uses_own_name(request.text)
+    if elsewhere or _came_by_itself(request, code):
+        other = "is of another line" if elsewhere else "came by itself"
         raise Refused(
-            f"{who(state)}: {described(code, state)}; it refused '{request.text}', or that came by itself and it was "
-            "executed",
-            code,
-        )
-    if code == ErrorNumber.UNKNOWN_VARIABLE and not classify.uses_own_name(request.text):
-        # A port that is lent makes a half-sent line harmless at the stop of another program.
-        raise Refused(
-            f"{who(state)}: {described(code, state)}; it refused '{request.text}', or that is of another line and it "
-            "was executed",
+            f"{who(state)}: {described(code, state)}; it refused '{request.text}', or that {other} and it was executed",
             code,
         )
     caveat = "; a program runs, whose error it may be" if (yield from _runs(state)) else ""
