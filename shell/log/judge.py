@@ -17,6 +17,7 @@ from multidrop.dialects import Diagnostic
 from multidrop.shell.events import By
 from multidrop.shell.line_syntax import EVERYONE, DriveLine, parse
 from multidrop.shell.log.files import BEGIN, Entry, Line
+from multidrop.shell.log.moments import BACK
 
 RULES = {
     "twice": "A typed command is sent once; again only after a NAK and a question, three times at most.",
@@ -81,6 +82,8 @@ class _Session:
         self.marked = marked
         self._stops = 0
         self._stop: datetime | None = None
+        self._before: datetime | None = None
+        """The time of the entry before."""
         self._due: set[str] = set()
         """Buses on which the stop is sent next."""
         self._buses: set[str] = set()
@@ -111,6 +114,7 @@ class _Session:
 
     def take(self, entry: Entry) -> Iterator[tuple[str, str]]:
         """Take an entry, where commands and stops are marked; yield each rule that it breaks, and how."""
+        self._keep_time(entry.time)
         if entry.kind == "log":
             self.marked, self._begun = entry.marks, self._begun or entry.text.startswith(BEGIN)
         elif not self.marked:
@@ -153,6 +157,13 @@ class _Session:
             yield from self._printed(entry)
         elif entry.kind in ("notice", "failed"):
             yield from self._said(entry)
+
+    def _keep_time(self, now: datetime) -> None:
+        """Move the time of the last stop with a clock that was set back."""
+        back = (self._before or now) - now
+        if self._stop is not None and back >= BACK:
+            self._stop -= back
+        self._before = now
 
     def _report(self, bus: str) -> None:
         """Something was said of a bus; empty: of all."""

@@ -304,3 +304,17 @@ def test_a_checksum_behind_the_mark_of_a_drive_alone_names_no_drive(tmp_path: Pa
     heard = {"kind": "received", "bus": "l", "drive": "!", "text": "\u0006v73882858~\u00db\r\n"}
     shown = {"kind": "printed", "bus": "l", "drive": "!", "text": "v73882858"}
     assert found([*HEAD, typed('PR "v",R1', "!"), sent, heard, shown], tmp_path) == []
+
+
+@pytest.mark.parametrize("first", ["stop", "command"])
+def test_a_clock_that_was_set_back_keeps_the_stop_before_what_came_after_it(first: str, tmp_path: Path) -> None:
+    sent = {"stop": [ESC, *READ], "command": [command("R2=1")[0], ESC]}[first]
+    rows = [*HEAD, STOP, *sent, typed("MR 1"), *command("MR 1")]
+    path = tmp_path / "day.jsonl"
+    hours = [12, 12, 12, *([11] * (len(rows) - 5)), 12, 12]
+    entries = (
+        Entry(datetime(2026, 3, 2, hour, at, tzinfo=UTC), **row)
+        for at, (hour, row) in enumerate(zip(hours, rows, strict=True))
+    )
+    path.write_bytes(b"".join(map(line_of, entries)))
+    assert [each.rule for each in judged(files.whole(path)).breaches] == {"stop": [], "command": ["first"]}[first]
