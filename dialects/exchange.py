@@ -12,10 +12,11 @@ from dataclasses import dataclass
 from typing import Generic, TypeVar
 
 from multidrop.dialects.codec import End, Procedure, Reply, Request
-from multidrop.dialects.errors import NoAnswer, Refused
+from multidrop.dialects.errors import NoAnswer, Refused, Stopped
 from multidrop.dialects.state import DriveState
 
 S = TypeVar("S", bound=DriveState)
+T = TypeVar("T")
 
 
 def _once(request: Request) -> Procedure[Reply]:
@@ -61,7 +62,9 @@ class Exchange(Generic[S]):
 
     def synchronised(self, state: S, request: Request) -> Procedure[None]:
         """Make sure that no reply is outstanding before a request. Raises NoAnswer."""
-        if state.reply_pending and (yield from self.mark(state, request, False)) is None:
+        if not state.reply_pending:
+            return
+        if (yield from unsent_if_stopped(self.who(state), request, self.mark(state, request, False))) is None:
             raise NoAnswer(f"{self.who(state)} does not reply: '{request.text}' was not sent")
 
     def beyond_doubt(self, state: S, request: Request) -> Procedure[None]:
@@ -72,6 +75,14 @@ class Exchange(Generic[S]):
                 f"{self.who(state)}: a late reply came, perhaps to '{request.text}': it is not known whether that was "
                 "executed; it was sent once"
             )
+
+
+def unsent_if_stopped(who: str, request: Request, steps: Procedure[T]) -> Procedure[T]:
+    """Take the steps before a request. A stop that cuts them off keeps it from being sent."""
+    try:
+        return (yield from steps)
+    except Stopped:
+        raise Stopped(f"{who}: stopped; '{request.text}' was not sent") from None
 
 
 def unanswered(who: str, request: Request, reply: Reply | None = None) -> NoAnswer:

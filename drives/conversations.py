@@ -290,10 +290,9 @@ class Conversation(Generic[T]):
         """Describe what a stop leaves open: of the command that was sent last, not of what was asked about it."""
         if self._executed:
             return f"'{self._executed}' was executed before the stop"
-        if self._unproven or sent:
-            doubtful = self._unproven.text if self._unproven is not None else text
-            return f"'{doubtful}' was stopped; it is not known whether it was executed"
-        return f"'{text}' was stopped; it was not sent"
+        if self._unproven is not None:
+            return f"'{self._unproven.text}' was stopped; it is not known whether it was executed"
+        return f"'{text}' was stopped before its reply came" if sent else f"stopped; '{text}' was not sent"
 
     # The end
 

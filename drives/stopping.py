@@ -271,6 +271,9 @@ class Stopping:
             link.debris.stop_written(halt.data, link.line.transmitted)
             for drive in halt.affected:
                 drive.state.stopped()
+            for drive in self._roster.all_drives:
+                if drive.state.codec.stop_replies:  # those to the stop of one may be late, and reach another
+                    drive.state.reply_outstanding()
             # Every drive on the line has refused the rest of a line, or may have.
             if written.invalidates or written.before or link.transport.may_invalidate:
                 for drive in self._roster.all_drives:

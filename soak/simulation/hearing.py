@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
+from multidrop.dialects import Codec
 from multidrop.drives.bus import Bus
 from multidrop.drives.events import Ended, Sent
 from multidrop.drives.stopping import stop_forms
@@ -83,10 +85,19 @@ def typed(world: World, data: bytes, session: Session, who: str = "") -> None:
         world.history.stops.append(stop)
 
 
+def _unsure(bus: Bus) -> Iterator[bytes]:
+    """The same with settings in doubt: an owed stop that is written as this one waits for the line makes them so."""
+    names: dict[Codec, list[str]] = {}
+    for drive in bus.roster.all_drives:
+        names.setdefault(drive.state.codec, []).append(drive.state.address or drive.state.name)
+    for half_sent in (False, True):
+        yield b"".join(codec.stop(each, sure=False, half_sent=half_sent) for codec, each in names.items())
+
+
 def _forms(world: World, bus: Bus) -> tuple[bytes, ...]:
     """What a stop of a line may begin with."""
     forms, kind = stop_forms(bus.roster), world.place(bus.name).kind
-    found = (forms.immediate,) if forms.framed else (forms.immediate, forms.unterminated)
+    found = (forms.immediate,) if forms.framed else (forms.immediate, forms.unterminated, *_unsure(bus))
     if kind == "rfc2217":
         purge = b"" if forms.framed else telnet.message(telnet.Setting.PURGE, telnet.PURGE_UNSENT)
         return tuple(purge + telnet.escaped(each) for each in found)

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import os.path
 import re
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass, field
 
 from multidrop.transports.relay import Garbled, Kind, frame
@@ -12,7 +13,7 @@ from soak.languages import LANGUAGES
 from soak.simulation.bounds import beyond
 from soak.simulation.departures import DEPARTURES, for_drives
 from soak.simulation.history import Stop
-from soak.simulation.outcomes import ASTRAY, OUTCOMES, arrived_late
+from soak.simulation.outcomes import ASTRAY, BARE_COMMAND, OUTCOMES, arrived_late, became
 from soak.simulation.promises import PROMISES
 from soak.simulation.rule import Grant, Granted, Rule
 from soak.simulation.world import World
@@ -59,8 +60,16 @@ def _first(world: World) -> Iterator[str | Granted]:
                     begins = [*_behind_one_drop(world, line, first, begins)]
                     if any(_begins_with_a_stop(world, line, each) for each in begins):
                         continue  # one of a stop before it that the far end had not taken: the next follows it
-                if not any(form.startswith(each) or each.startswith(form) for form in forms for each in begins):
+                if not any(_begins(each, form, forms) for form in forms for each in begins):
                     yield f"{line}: stop at {stop.at:.6f}, {begun!r} left at {after[0][0]:.6f}"
+
+
+def _begins(left: bytes, form: bytes, forms: Collection[bytes]) -> bool:
+    """Whether what left begins with a form of a stop, of which another one (`/stop`) may cut off what is not sent."""
+    if form.startswith(left) or left.startswith(form):
+        return True
+    cut = len(os.path.commonprefix([form, left]))
+    return cut > 0 and any(left.startswith(each, cut) or each.startswith(left[cut:]) for each in forms)
 
 
 def _begins_with_a_stop(world: World, line: str, left: bytes) -> bool:
@@ -113,9 +122,14 @@ def _restored(world: World) -> Iterator[str | Granted]:
         silent = f"{line}: {drive} does not reply"  # what is owed to it is kept for the session after this one
         warned = any(line in text and said.search(text) for _, text in world.history.notices)
         asked = any(text == silent and at >= world.history.began[-1] for at, text in world.history.notices)
-        borrowed = (each for each in world.history.executed if each.text == "EM=0")
-        late = any(arrived_late(world, each) for each in borrowed if (each.line, each.drive) == (line, drive))
-        yield Granted(ASTRAY, found) if late else Granted(SAID, found) if warned or asked else found
+        own = [each for each in world.history.executed if (each.line, each.drive, each.text) == (line, drive, "EM=0")]
+        grants = {
+            ASTRAY: any(arrived_late(world, each) for each in own),
+            BARE_COMMAND: bool(own) and became(world, line, own[-1].at),
+            SAID: warned or asked,
+        }
+        grant = next((each for each, holds in grants.items() if holds), None)
+        yield Granted(grant, found) if grant else found
 
 
 def _ends(world: World) -> Iterator[str]:
@@ -147,7 +161,7 @@ RULES = (
         "A setting that a session has borrowed from a drive is restored by it, or by the next one.",
         "What a report means",
         _restored,
-        (SAID, ASTRAY),
+        (SAID, ASTRAY, BARE_COMMAND),
     ),
     Rule("bounded", "What waits in a session is bounded.", "What a report means", beyond),
     Rule("log", "A session log breaks no rule of `log judge`.", "What a report means", _logged),

@@ -159,7 +159,7 @@ def _confirms_lost(world: World, command: Command) -> Grant | None:
     if not world.place(command.line).checked:
         if _damage(world.history, command.line, command.began - AFTER, command.ended):
             return BARE_COMMAND
-        return STOPS_REPLY if _stopped_by_another(world, command) or _stop_unanswered(world, command) else None
+        return STOPS_REPLY if _stopped_by_another(world, command) else None
     if _made(world.history, command, ACK):
         return NOISY_ACK
     return SEVEN_BITS if _executed_as_another(world, command) else None
@@ -184,20 +184,6 @@ def arrived_late(world: World, executed: Executed) -> bool:
     """Whether a line was executed as its datagram arrived twice or late."""
     host = world.place(executed.line).host
     return any(name == host and executed.at - PROMPTLY <= at <= executed.at for at, name in world.network.astray)
-
-
-def _stop_unanswered(world: World, command: Command) -> bool:
-    """Whether a PMX owed a reply to a stop of its own client as a command began: fewer have come than lines left."""
-    history, line = world.history, command.line
-    own = [stop.at for stop in history.stops if stop.who == command.who and not world.climate.calm]
-    since = min((at for at in own if 0 <= command.began - at <= AFTER), default=inf)
-    left = sum(
-        data.count(b"\r")
-        for at, port, data in history.written
-        if port == line + command.who and since <= at < command.began
-    )
-    came = sum(data.count(b"\r") for at, data in history.received.get(line, []) if since <= at < command.began)
-    return came < left and world.place(line).language == "pmx"
 
 
 def _stopped_by_another(world: World, command: Command) -> bool:

@@ -86,7 +86,7 @@ async def opened(*numbers, kind=Wire, **answers):
     return bus, wire
 
 
-@pytest.mark.parametrize(("left", "said"), [(True, "it is not known"), (False, "it was not sent")])
+@pytest.mark.parametrize(("left", "said"), [(True, "it is not known"), (False, "was not sent")])
 async def test_the_reply_to_a_stop_that_the_loop_has_not_taken_over_is_none_to_a_command(left, said):
     bus, _ = await opened("00", kind=Overtaken, **{"V1=5": None})
     send = bus.drives["00"].send
@@ -152,6 +152,55 @@ async def test_one_that_was_only_spoken_to_is_stopped_too_and_alone_at_first():
     assert forms.immediate in (b"@00ABORT\r", b"@05ABORT\r")
     assert {b"@00ABORT\r", b"@05ABORT\r", b"@05SR0=0\r"} <= {forms.immediate, *(piece.data for piece in forms.repeats)}
     assert await spoken == ("0",)
+    await bus.close()
+
+
+class Delayed(Wire):
+    """Every reply is late, in the order of the lines."""
+
+    def _hear(self, line):
+        answer = "OK" if line[3:].startswith(("ABORT", "SR")) else self.answers.get(line[3:], f"?{line[3:]}")
+        if answer is not None:
+            self._loop.call_later(self.latency, self._received, answer.encode() + b"\r")
+
+
+@pytest.mark.parametrize("only", [None, "00", "01"])
+async def test_a_late_reply_to_a_stop_is_none_to_a_command_that_is_lost(only):
+    bus, wire = await opened("00", "01", kind=Delayed, **{"V1=5": None})
+    wire.latency = 0.25
+    bus.stop(None if only is None else [bus.drives[only]])
+    with pytest.raises(NoAnswer, match="it is not known whether 'V1=5' was executed"):
+        await bus.drives["00"].send("V1=5")
+    written = [data[3:-1] for _, data in wire.written if data[1:3] == b"00"]
+    assert written[written.index(b"V1=5") - 1].startswith(b"Q00"), "a mark is before it"
+    await bus.close()
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [("V1=5", "stopped; 'V1=5' was not sent"), ("V1", "stopped; 'V1' was not sent")],
+)
+async def test_a_line_whose_mark_a_stop_cuts_off_is_not_sent(text, said):
+    bus, wire = await opened("00", kind=Delayed)
+    wire.latency = 0.25
+    bus.drives["00"].state.reply_outstanding()
+    sent = asyncio.ensure_future(bus.drives["00"].send(text))
+    while not any(data.startswith(b"@00Q") for _, data in wire.written):
+        await asyncio.sleep(0.01)
+    bus.stop()
+    with pytest.raises(Stopped, match=said):
+        await sent
+    assert not any(text.encode() in data for _, data in wire.written)
+    await bus.close()
+
+
+async def test_a_question_that_a_stop_cuts_off_has_no_reply():
+    bus, _ = await opened("00", PX=None)
+    sent = asyncio.ensure_future(bus.drives["00"].send("PX"))
+    await asyncio.sleep(0.05)
+    bus.stop()
+    with pytest.raises(Stopped, match="'PX' was stopped before its reply came"):
+        await sent
     await bus.close()
 
 

@@ -10,6 +10,7 @@ from functools import lru_cache, partial
 from multidrop.dialects.certifying import repaired
 from multidrop.dialects.codec import End, Kind, Priority, Procedure, Reply, Request
 from multidrop.dialects.errors import DriveError, Inexpressible, NoAnswer, Refused, Stopped
+from multidrop.dialects.exchange import unsent_if_stopped
 from multidrop.dialects.family import Motion
 from multidrop.dialects.mcode.host import classify, exchange
 from multidrop.dialects.mcode.host.before_request import before_request, find_again, first_print, value_of
@@ -35,7 +36,7 @@ from multidrop.dialects.state import Owed
 
 def enter_program(state: MCodeState, request: Request) -> Procedure[tuple[str, ...]]:
     """Send PG n in EM=0, the only mode that shows whether the drive entered program mode."""
-    request = yield from before_request(state, request)
+    request = yield from unsent_if_stopped(who(state), request, before_request(state, request))
     try:
         if state.codec.em != 0:
             yield from echo_everything(state)
@@ -309,13 +310,13 @@ def immediate(state: MCodeState, request: Request) -> Procedure[tuple[str, ...]]
     """Send a line that is executed at once, not stored."""
     if state.unconfirmed is not None and (lines := (yield from first_print(state, request))) is not None:
         return lines
-    request = yield from before_request(state, request)
+    request = yield from unsent_if_stopped(who(state), request, before_request(state, request))
     if request.kind is Kind.SETTING:
         yield from set_wire(state, request)
         return ()
     if request.kind is Kind.PRINT:
         return (yield from _print(state, request))
-    before = yield from rest_before(state, request)
+    before = yield from unsent_if_stopped(who(state), request, rest_before(state, request))
     if classify.acts_on_program(request.text):
         state.may_not_step()
     if classify.word_of(request.text)[0] == "EX":

@@ -97,6 +97,8 @@ def _asked_again(state: TmclState, request: Request, lost: NoAnswer) -> Procedur
         yield from synchronised(state, request)
     except NoAnswer:
         raise lost from None
+    except Stopped:
+        raise Stopped(f"{who(state)}: '{request.text}' was stopped before its reply came") from None
     if state.programming:  # it would store the request
         raise lost
     try:

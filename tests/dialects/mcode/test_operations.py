@@ -337,6 +337,15 @@ def test_a_stop_thrown_into_a_conversation_ends_it():
     assert procedure.request is None
 
 
+def test_a_stop_in_a_question_before_a_line_names_the_line_as_not_sent():
+    state = checked()
+    state.program_read(error=False, running=True)
+    procedure = ProcedureRunner(MCODE.perform(state, "R2=1"))
+    assert procedure.request.text.startswith("PR EF")
+    with pytest.raises(Stopped, match="stopped; 'R2=1' was not sent"):
+        procedure.fail(Stopped("stopped"))
+
+
 def test_a_line_is_not_sent_after_a_stop_that_came_as_the_echo_mode_was_put_back():
     state = checked()
     state.owes(Owed(3, "", "LMDCM", "", ""))
