@@ -189,9 +189,14 @@ class Conversation(Generic[T]):
             self._end(error=Stopped(f"{self._name}: interrupted"))
         elif self._ticket:
             ticket, self._ticket = self._ticket, 0
-            self._link.withdraw(ticket)
-            self._doubts()
-            self._state.reply_outstanding()
+            if not self._link.withdraw(ticket):
+                self._doubts()
+                self._state.reply_outstanding()
+            if self._unproven is not None:
+                text = (
+                    f"'{self._unproven.text}' was interrupted; it is not known whether it was {_done(self._unproven)}"
+                )
+                self._link.notify(f"{self._name}: {text}", self._state.address, warning=True)
             self._fail(Stopped(f"{self._name}: interrupted"))
         else:
             self._interrupted = True
@@ -255,8 +260,7 @@ class Conversation(Generic[T]):
             self._doubts()
         error = (self._link.away or error).again()
         if (doubtful := self._unproven) is not None:
-            done = "stored" if doubtful.kind is Kind.PROGRAM else "executed"
-            error = TransportLost(f"{error}; it is not known whether '{doubtful.text}' was {done}")
+            error = TransportLost(f"{error}; it is not known whether '{doubtful.text}' was {_done(doubtful)}")
             error.unproven = doubtful.text
         elif self._executed:
             error = type(error)(f"{error}; '{self._executed}' was executed before that")
@@ -322,6 +326,10 @@ class Conversation(Generic[T]):
     @property
     def _name(self) -> str:
         return self._state.label or self._state.address or self._link.name
+
+
+def _done(command: Request) -> str:
+    return "stored" if command.kind is Kind.PROGRAM else "executed"
 
 
 async def awaited(start: Callable[[OnOver[T]], Conversation[T]]) -> T:

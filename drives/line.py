@@ -170,9 +170,10 @@ class Line:
         insort(self._queue, Waiting(request.priority, self._tickets, request))
         return self._tickets
 
-    def withdraw(self, ticket: int) -> None:
-        if self._queue:
-            self._queue = [each for each in self._queue if each.ticket != ticket]
+    def withdraw(self, ticket: int) -> bool:
+        """Remove a request that has not been written; whether it was one."""
+        queued, self._queue = len(self._queue), [each for each in self._queue if each.ticket != ticket]
+        return len(self._queue) < queued
 
     @property
     def waiting(self) -> Sequence[Request]:

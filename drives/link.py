@@ -129,10 +129,9 @@ class Link:
         self._waiting[ticket] = on_answer
         return ticket
 
-    def withdraw(self, ticket: int) -> None:
-        """Call back no more, and remove the request if it has not been written."""
-        if self._waiting.pop(ticket, None) is not None:
-            self.line.withdraw(ticket)
+    def withdraw(self, ticket: int) -> bool:
+        """Call back no more, and remove the request if it has not been written; whether it was not."""
+        return self._waiting.pop(ticket, None) is not None and self.line.withdraw(ticket)
 
     def write_raw(self, data: bytes) -> bool:
         """Write a person's own bytes past the queue, once; False where a stop went first. Raises TransportLost.

@@ -8,7 +8,7 @@ from multidrop.dialects import DriveState, Priority, Procedure, Reply, Request, 
 from multidrop.dialects.mcode.host.codec import MCode
 from multidrop.dialects.state import Owed
 from multidrop.drives.conversations import Conversations
-from multidrop.drives.events import Sent
+from multidrop.drives.events import Notice, Sent
 from multidrop.drives.line import Line
 from multidrop.drives.link import Link
 from multidrop.drives.port_journal import Keeper
@@ -130,6 +130,26 @@ async def test_a_waiting_conversation_that_is_cancelled_gives_up_its_turn():
     second.cancel()
     assert await first == "5" and await third == "5" and second.cancelled()
     assert desk.sent == ["PR P", "PR D"]
+
+
+@pytest.mark.parametrize(
+    ("text", "silent", "said"),
+    [
+        ("R2=1", True, ["desk: 'R2=1' was interrupted; it is not known whether it was executed"]),
+        ("PR P", True, []),
+        ("R2=1", False, []),
+    ],
+)
+async def test_a_command_whose_caller_goes_before_its_reply_is_not_lost_without_a_word(text, silent, said):
+    desk = Desk()
+    desk.pipe.silent = silent
+    told = []
+    desk.link.watch(lambda event: told.append(event.text) if isinstance(event, Notice) else None)
+    running = desk.run(text)
+    await asyncio.sleep(0.05)
+    running.cancel()
+    await asyncio.gather(running, return_exceptions=True)
+    assert told == said and desk.sent == [text]
 
 
 async def test_a_cancelled_conversation_cleans_up_before_the_next_one_begins():
