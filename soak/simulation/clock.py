@@ -84,14 +84,21 @@ class SimulatedLoop(asyncio.BaseEventLoop):
         """Let the loop do nothing for so long, while drives, the kernel, threads and the person go on."""
         until = self.now + seconds
         self._starved = True
-        while handles := [each for each in self._scheduled if each._when <= until and _of_the_world(each)]:  # type: ignore[attr-defined]
-            handle = min(handles)
-            self._scheduled.remove(handle)  # type: ignore[attr-defined]
-            heapq.heapify(self._scheduled)  # type: ignore[attr-defined]
-            handle._scheduled = False
-            self.now = max(self.now, handle._when)
-            if not handle.cancelled():
-                handle._run()
+        timers: list[asyncio.TimerHandle] = self._scheduled  # type: ignore[attr-defined]
+        later: list[asyncio.TimerHandle] = []
+        while timers and timers[0]._when <= until:  # type: ignore[attr-defined]
+            timer = heapq.heappop(timers)
+            if not _of_the_world(timer):
+                later.append(timer)
+                continue
+            timer._scheduled = False  # type: ignore[attr-defined]
+            self.now = max(self.now, timer._when)  # type: ignore[attr-defined]
+            if timer.cancelled():
+                self._timer_cancelled_count -= 1  # type: ignore[attr-defined]
+            else:
+                timer._run()
+        for timer in later:
+            heapq.heappush(timers, timer)
         self._starved = False
         self.now = until
 

@@ -8,7 +8,7 @@ import logging
 import shutil
 import tempfile
 import threading
-from collections.abc import Collection, Iterable, Iterator
+from collections.abc import Callable, Collection, Coroutine, Iterable, Iterator
 from contextlib import ExitStack
 from functools import partial
 from pathlib import Path
@@ -16,6 +16,8 @@ from random import Random
 from types import SimpleNamespace
 from typing import Any
 
+from multidrop.dialects.state import DriveState
+from multidrop.drives.conversations import Conversations
 from multidrop.drives.events import LOG
 from multidrop.simulator import wire
 from multidrop.transports import pipe, usb
@@ -74,7 +76,7 @@ def lived(seed: int, steps: Iterable[int], keep: bool = False, without: Collecti
             stack.enter_context(disk.installed())
             stack.enter_context(world.kernel.installed())
             stack.enter_context(contextlib.chdir(folder))
-            for seam in ((wire, "harmed", world.harmed), *SEAMS):
+            for seam in ((wire, "harmed", world.harmed), (Conversations, "keep", _kept(world)), *SEAMS):
                 stack.enter_context(_replaced(*seam))
             locks = SimpleNamespace(**{**vars(threading), "Lock": cut_ins.lock})
             for shared in (pipe, usb):
@@ -88,6 +90,17 @@ def lived(seed: int, steps: Iterable[int], keep: bool = False, without: Collecti
         history.defects += cut_ins.deadlocks
         history.defects += [str(each.get("exception") or each.get("message")) for each in loop.defects]
     return world
+
+
+def _kept(world: World) -> Callable[[Conversations, DriveState], Coroutine[None, None, None]]:
+    keep = Conversations.keep
+
+    async def kept(conversations: Conversations, state: DriveState) -> None:
+        if world.kept is not None:
+            world.kept()
+        await keep(conversations, state)
+
+    return kept
 
 
 def _noted(history: History, loop: SimulatedLoop, what: str, path: str) -> None:

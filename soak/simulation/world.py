@@ -9,7 +9,7 @@ from __future__ import annotations
 import asyncio
 import re
 import threading
-from collections.abc import Coroutine
+from collections.abc import Callable, Coroutine
 from contextlib import AsyncExitStack
 from contextvars import Context
 from dataclasses import dataclass, field, replace
@@ -120,6 +120,8 @@ class World:
     """The number of stops that were typed, arrived or on their way."""
     cut: dict[tuple[str, str], list[float]] = field(default_factory=dict)
     """When the power of each drive was switched, or its values were put back."""
+    kept: Callable[[], None] | None = None
+    """Called where a session writes down what it owes a drive."""
     beside_it: list[asyncio.Task[None]] = field(default_factory=list)
     """What runs beside the prompt."""
 

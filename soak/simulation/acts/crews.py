@@ -9,6 +9,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 from collections.abc import Mapping
+from contextvars import copy_context
 from dataclasses import replace
 from random import Random
 from typing import TYPE_CHECKING, Any
@@ -28,10 +29,10 @@ if TYPE_CHECKING:
     from soak.simulation.places import Place
     from soak.simulation.world import World
 
-LOOK = 0.0004
-"""The time between two looks at what a session does, s."""
+AT_ONCE = 0.002
+"""The time in which a session writes down what it owes, s."""
 WAIT = 8.0
-"""The longest time that is looked, s."""
+"""The longest time until it does, s."""
 QUESTIONS = 0.4
 """The part of the commands that are questions: see `soak.languages`."""
 INTO_THE_PIPE = "pipe DescriptorPipe.write: with"
@@ -188,18 +189,19 @@ def stop_at_a_full_port(world: World, rng: Random) -> float:
 def stop_while_owed(world: World, rng: Random) -> float:
     """Send a program, and stop as the session writes down what it owes the drive."""
     download(world, rng)
-    until = world.loop.now + WAIT
+    until, context = world.loop.now + WAIT, copy_context()
 
-    def look() -> None:
-        if world.ending or not world.ready.is_set() or world.loop.now > until:
-            return
-        talks = [each for bus in world.session.buses.values() for each in bus._conversations.under_way]
-        if any(each._keeping is not None and not each._keeping.done() for each in talks):
+    def press() -> None:
+        if not world.ending and world.ready.is_set():
             world.stops += 1
-            return world.person.type(STOP + b"/resume\r")
-        world.loop.call_later(LOOK, look)
+            world.person.type(STOP + b"/resume\r")
 
-    look()
+    def kept() -> None:
+        world.kept = None
+        if world.loop.now <= until:
+            world.loop.call_later(rng.random() * AT_ONCE, press, context=context)
+
+    world.kept = kept
     return 3.0
 
 
