@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import time
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from pathlib import Path
@@ -16,6 +17,7 @@ from multidrop.shell.state.backups import Copy, Drafts
 from multidrop.tui.app import MultidropApp
 from multidrop.tui.screens.dialogs import Confirm, Search
 from multidrop.tui.screens.program import ProgramPage
+from multidrop.tui.texts import OpenText
 from tests.support.fake_session import FakeAssist, FakeSession, demo_session, settle
 from tests.support.real_screen import real_screen, until
 
@@ -240,6 +242,21 @@ async def test_a_break_point_is_set_at_a_label_or_an_address_and_removed_there(f
         await until(pilot, lambda: bool(shown(pilot).findings.addresses))
         typed(pilot, "ctrl+b", "down", "ctrl+b")
         await until(pilot, lambda: sent(pilot)[1:] == ["/break press:a off", "/break press:a 6"])
+
+
+async def test_keys_that_are_typed_while_a_slow_disk_reads_the_file_wait_for_it(folder: Path) -> None:
+    async with page(folder, file="") as pilot:
+        app = pilot.app
+        assert isinstance(app, MultidropApp)
+        read = app.texts.open
+
+        def slow(name: str) -> OpenText:
+            time.sleep(0.2)
+            return read(name)
+
+        app.texts.open = slow  # type: ignore[method-assign]
+        typed(pilot, "a.mxt", "enter", "end", "Z")
+        await until(pilot, lambda: shown(pilot).editor.text == TEXT.replace("PG 1", "PG 1Z", 1))
 
 
 async def test_what_is_no_text_is_refused_and_what_the_drive_holds_is_read_into_a_new_file(folder: Path) -> None:

@@ -258,7 +258,8 @@ class ProgramPage(Page):
             await self.open_file(file)
 
     async def open_file(self, name: str) -> None:
-        """Show a file; offer the copy of an earlier session, if there is one. A slow disk holds up nothing else."""
+        """Show a file; offer the copy of an earlier session, if there is one. A slow disk holds up only the keys."""
+        self.host.keyboard.hold()
         try:
             text = await asyncio.to_thread(self.host.texts.open, name)
             draft = await asyncio.to_thread(self.host.texts.draft, text)
@@ -266,6 +267,8 @@ class ProgramPage(Page):
             self.host.show_line(str(problem), "x")
             self.notify(str(problem), timeout=6)
             return
+        finally:
+            self.host.keyboard.release()
         self.take_text()
         self._show_text(text)
         if draft is not None:

@@ -47,7 +47,7 @@ class Keyboard:
         self._waiting: deque[Typed] = deque()
         self._awake = False
         self._turning = False
-        self._held = False
+        self._held = 0
         self._deaf_until = 0.0
         self._deaf = 0
 
@@ -78,11 +78,11 @@ class Keyboard:
         return text
 
     def hold(self) -> None:
-        """Make keys wait until their meaning is known."""
-        self._held = True
+        """Make keys wait until their meaning is known: until each `hold` has its `release`."""
+        self._held += 1
 
     def release(self) -> None:
-        self._held = False
+        self._held -= 1
         self._wake()
 
     def turn_deaf(self) -> None:
