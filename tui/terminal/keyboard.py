@@ -82,7 +82,7 @@ class Keyboard:
         self._held += 1
 
     def release(self) -> None:
-        self._held -= 1
+        self._held = max(0, self._held - 1)
         self._wake()
 
     def turn_deaf(self) -> None:
