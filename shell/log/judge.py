@@ -72,7 +72,7 @@ class Typed:
     """What was received since it was sent last."""
     reported: bool = False
     at: datetime = datetime.min.replace(tzinfo=UTC)
-    """When it was sent last."""
+    """When it, or a question about it, was sent last."""
 
 
 class _Session:
@@ -205,6 +205,7 @@ class _Session:
         last = [each for key, each in self._last.items() if key[:2] == place]
         for each in last:
             each.asked += not entry.command
+            each.at = entry.time
         if not entry.command:
             return
         yield from self._over(place)
@@ -221,7 +222,6 @@ class _Session:
         if typed.sent and not again:
             yield "twice", f"{entry.command!r} was sent {typed.sent + 1} times"
         typed.sent, typed.asked, typed.heard = typed.sent + 1, 0, ""
-        typed.at = entry.time
 
     def _over(self, place: Place) -> Iterator[tuple[str, str]]:
         """The next command leaves for a drive: what was sent to it before is over."""

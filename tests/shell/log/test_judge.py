@@ -223,6 +223,13 @@ def test_a_line_of_another_tab_is_typed_while_the_one_before_waits_for_its_reply
     assert found([*rows, *command("MR 2")], tmp_path, apart=0.1) == [("silence", 6)]
 
 
+def test_a_computer_that_stands_still_may_ask_late_what_became_of_a_command(tmp_path: Path) -> None:
+    question, reply = asked("EF", "0")
+    rows = [*HEAD, typed("MR 1"), command("MR 1")[0], question, typed("MR 2")]
+    assert found([*rows, reply, *command("MR 2")], tmp_path, apart=3.0) == []
+    assert found([*rows, *command("MR 2")], tmp_path, apart=3.0) == [("silence", 7)]
+
+
 @pytest.mark.parametrize(("readings", "breaches"), [(1, ["stopped"]), (2, [])])
 def test_an_earlier_stop_may_be_confirmed_as_another_one_comes(
     readings: int, breaches: list[str], tmp_path: Path
