@@ -13,6 +13,7 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Callable, Coroutine, Iterable, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 from multidrop.dialects import DriveError, DriveState, Family, Hints, NoAnswer, StopPiece
@@ -52,31 +53,28 @@ class Restarts:
         before = {name: value for facts in known for name, value in facts.items()}
         running = self._tasks.get(drive)
         if (sign or rested or before) and (running is None or running.done()):
-            work = self._look(drive, sign, rested, before)
+            work = partial(self._look, drive, sign, rested, before)
             self._tasks[drive] = self._begin(f"looking for a restart of {drive.shown}", work)
 
     def homes(self, drive: Drive, axis: str) -> None:
         if (before := self._homings.pop((drive, axis), None)) is not None:
             before.cancel()
-        work = self._to_its_end(drive, axis)
-        task = self._begin(f"watching the homing of {drive.shown}", work)
-        self._homings[drive, axis] = task
+        work = partial(self._to_its_end, drive, axis)
+        self._homings[drive, axis] = self._begin(f"watching the homing of {drive.shown}", work)
 
     def close(self) -> None:
         for task in (*self._tasks.values(), *self._homings.values()):
             task.cancel()
 
-    def _begin(self, what: str, work: Coroutine[Any, Any, None]) -> asyncio.Task[None]:
+    def _begin(self, what: str, work: Callable[[], Coroutine[Any, Any, None]]) -> asyncio.Task[None]:
         async def guarded() -> None:
             trouble: list[str] = []
             with isolated(f"{what} on {self._link.name}", trouble):
-                await work
+                await work()
             if trouble:
                 self._link.notify(trouble[0], warning=True)
 
-        task = asyncio.get_running_loop().create_task(guarded())
-        task.add_done_callback(lambda done: work.close())  # one that is cancelled before it begins awaits nothing
-        return task
+        return asyncio.get_running_loop().create_task(guarded())
 
     async def _look(self, drive: Drive, sign: str, rested: Mapping[str, int], before: Mapping[str, Value]) -> None:
         """Read the drive once; say a restart that shows, once.
