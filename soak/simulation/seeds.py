@@ -119,6 +119,14 @@ FIXED = {
     2033943: "the error of a PG too many after a download that failed, which the next move was blamed for",
     2033475: "a value with the reply to a mark behind it, whose CR noise had taken, which was shown as one value",
     2010419: "the error of a line that another client's stop made harmless, which a command was blamed for",
+    2029565: "a late reply to a stop of PMX, shown as the value of the next question",
+    2016287: "late replies to a stop of a PMX on USB, taken for those to commands that were lost",
+    2011419: "an EM=0 that noise addressed to another drive (of the simulation itself)",
+    2015948: "settings that an owed stop put in doubt as the next stop waited (of the simulation itself)",
+    2032857: "a `/stop` that cut off one at a full port (of the simulation itself)",
+    2014300: "a clock that was set back after a stop, which `log judge` took for one set before it",
+    2037383: "a command whose caller went before its reply, of which nothing was said",
+    7002033: "a question after a command that a starved loop asked late, which `log judge` took for none",
 }
 DERIVED = 12
 """The number of seeds that follow from the commit."""
