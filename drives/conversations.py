@@ -16,10 +16,10 @@ from dataclasses import replace
 from typing import Any, Generic, TypeVar
 from weakref import WeakKeyDictionary
 
-from multidrop.dialects import DriveState, End, Kind, Owed, Procedure, Request, Stopped
+from multidrop.dialects import DriveState, End, Inexpressible, Kind, Owed, Procedure, Refused, Request, Stopped
 from multidrop.drives.events import Concluded, Outcome, Transaction, Witnesses
 from multidrop.drives.link import Link, LostInFlight
-from multidrop.drives.port_journal import Keeper
+from multidrop.drives.port_journal import GLOBAL, Keeper
 from multidrop.transports import TransportLost
 
 T = TypeVar("T")
@@ -162,7 +162,7 @@ class Conversation(Generic[T]):
         self._last: Transaction | None = None
         self._taken: list[Transaction] = []
         """Its transactions, where they are witnessed."""
-        self._cleaning_up = self._interrupted = False
+        self._cleaning_up = self._interrupted = self._orphaned = False
         self.over: asyncio.Future[None] = asyncio.get_running_loop().create_future()
 
     def begin(self) -> None:
@@ -180,7 +180,7 @@ class Conversation(Generic[T]):
         self._send()
 
     def interrupt(self) -> None:
-        """Stop it, with its clean-up, because its caller has gone."""
+        """Stop it, with its clean-up."""
         if self._cleaning_up or self._outcome is not None:
             return
         if not self.begun:
@@ -192,14 +192,21 @@ class Conversation(Generic[T]):
             if not self._link.withdraw(ticket):
                 self._doubts()
                 self._state.reply_outstanding()
-            if self._unproven is not None:
-                text = (
-                    f"'{self._unproven.text}' was interrupted; it is not known whether it was {_done(self._unproven)}"
-                )
-                self._link.notify(f"{self._name}: {text}", self._state.address, warning=True)
             self._fail(Stopped(f"{self._name}: interrupted"))
         else:
             self._interrupted = True
+
+    def abandon(self) -> None:
+        """Interrupt it, because its caller has gone and hears no outcome; say what is not known of its command."""
+        self.interrupt()
+        command, error = self._unproven, self._outcome.error if self._outcome is not None else None
+        if command is None or self._orphaned or isinstance(error, Refused | Inexpressible):
+            return
+        if self._outcome is not None and error is None:
+            return
+        self._orphaned = True
+        text = f"'{command.text}' was interrupted; it is not known whether it was {_done(command)}"
+        self._link.notify(f"{self._name}: {text}", self._state.address, warning=True)
 
     # Steps
 
@@ -250,7 +257,7 @@ class Conversation(Generic[T]):
 
     def _doubts(self) -> None:
         """Note that the command that is queued or in flight may be executed."""
-        if self._request is not None and self._request.kind not in ASKING and not self._cleaning_up:
+        if self._request is not None and _acts(self._request) and not self._cleaning_up:
             self._unproven = self._request
 
     def _lost(self, error: TransportLost) -> None:
@@ -275,7 +282,7 @@ class Conversation(Generic[T]):
             self._on_ended(transaction)
         if self._all.witnesses.all:
             self._taken.append(transaction)
-        if request.kind not in ASKING and (sent or reply.end is not End.STOPPED) and not self._cleaning_up:
+        if _acts(request) and (sent or reply.end is not End.STOPPED) and not self._cleaning_up:
             proven = reply.acknowledged and not reply.doubtful
             self._unproven = None if proven else request
             self._executed = request.text if proven and request.kind is not Kind.PROGRAM else ""
@@ -285,18 +292,21 @@ class Conversation(Generic[T]):
             self._cleaning_up = True
             if sent:
                 self._state.reply_outstanding()
-            return self._procedure.throw(Stopped(f"{self._name}: {self._fate(request.text, sent)}"))
+            return self._procedure.throw(Stopped(f"{self._name}: {self._fate(request, sent)}"))
         if sent:  # a second stop in the middle of the clean-up, which goes on
             return self._procedure.send(replace(reply, end=End.TIMEOUT))
         return self._request
 
-    def _fate(self, text: str, sent: bool) -> str:
+    def _fate(self, request: Request, sent: bool) -> str:
         """Describe what a stop leaves open: of the command that was sent last, not of what was asked about it."""
         if self._executed:
             return f"'{self._executed}' was executed before the stop"
-        if self._unproven is not None:
-            return f"'{self._unproven.text}' was stopped; it is not known whether it was executed"
-        return f"'{text}' was stopped before its reply came" if sent else f"stopped; '{text}' was not sent"
+        unanswered = request if sent and request.kind is Kind.QUIET else None
+        if (doubtful := self._unproven or unanswered) is not None:
+            return f"'{doubtful.text}' was stopped; it is not known whether it was {_done(doubtful)}"
+        if sent:
+            return f"'{request.text}' was stopped before its reply came"
+        return f"stopped; '{request.text}' was not sent"
 
     # The end
 
@@ -328,6 +338,11 @@ class Conversation(Generic[T]):
         return self._state.label or self._state.address or self._link.name
 
 
+def _acts(request: Request) -> bool:
+    """Whether it is a command: one to all drives has no reply, and an empty line asks for a prompt."""
+    return bool(request.text) and (request.kind not in ASKING or request.address in GLOBAL)
+
+
 def _done(command: Request) -> str:
     return "stored" if command.kind is Kind.PROGRAM else "executed"
 
@@ -348,5 +363,5 @@ async def awaited(start: Callable[[OnOver[T]], Conversation[T]]) -> T:
     try:
         return await future
     except asyncio.CancelledError:
-        conversation.interrupt()
+        conversation.abandon()
         raise

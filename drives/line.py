@@ -173,7 +173,8 @@ class Line:
     def withdraw(self, ticket: int) -> bool:
         """Remove a request that has not been written; whether it was one."""
         queued, self._queue = len(self._queue), [each for each in self._queue if each.ticket != ticket]
-        return len(self._queue) < queued
+        kept_back = isinstance(self._state, Flight) and self._state.ticket == ticket and not self._state.sent
+        return kept_back or len(self._queue) < queued
 
     @property
     def waiting(self) -> Sequence[Request]:

@@ -265,7 +265,9 @@ class Stopping:
             if not halt.whole:  # the bytes may stop other drives as well
                 others = [drive for drive in self._roster.all_drives if drive not in halt.drives]
                 halt.others = tuple(drive for drive in others if _hears(drive.state, halt.data))
-                only = {*GLOBAL, *(drive.address for drive in halt.affected)}
+                # A late reply to the stop would pass for that to what waits for another drive, behind its mark.
+                failed = (each for each in self._roster.all_drives if each.state.codec.stop_replies)
+                only = {*GLOBAL, *(drive.address for drive in (*halt.affected, *failed))}
             link.line.stop(at, *written.forms.repeats, only=only)
             link.line.wrote(halt.data, at, whole=written.invalidates)
             link.debris.stop_written(halt.data, link.line.transmitted)

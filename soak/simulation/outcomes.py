@@ -311,11 +311,19 @@ def _never_held(world: World, shown: Shown, words: str) -> str | Granted:
     place, history = world.place(shown.line), world.history
     heard = _heard(world, shown)
     if not _damage(history, shown.line, shown.began - AFTER, shown.at):
-        return Granted(BARE_VALUE, words) if not place.checked and _divided(history, shown, heard) else words
+        harmed = not place.checked and (_divided(history, shown, heard) or _late_beside(world, shown))
+        return Granted(BARE_VALUE, words) if harmed else words
     if not place.checked:
         return Granted(BARE_VALUE, words)
     right = _sealed_frame if place.language == "tmcl" else _sealed_line
     return Granted(SEVEN_BITS, words) if right(heard, shown.text) else words
+
+
+def _late_beside(world: World, shown: Shown) -> bool:
+    """Whether another drive of the line did not reply in time: its late reply may have met this one on the wire."""
+    others = [f"{name} does not reply" for name in world.place(shown.line).names if name != shown.drive]
+    said = [text for at, text in world.history.notices if shown.began - AFTER <= at <= shown.at]
+    return any(text.startswith(each) for text in said for each in others)
 
 
 def _heard(world: World, shown: Shown) -> bytes:

@@ -127,6 +127,9 @@ FIXED = {
     2014300: "a clock that was set back after a stop, which `log judge` took for one set before it",
     2037383: "a command whose caller went before its reply, of which nothing was said",
     7002033: "a question after a command that a starved loop asked late, which `log judge` took for none",
+    7006117: "two lines of a list that another drive's print made one, in the backup of a line without a checksum",
+    7006503: "a value that another controller's late reply met on the line (of the simulation itself)",
+    7008855: "a kill that met a stop as the simulation looked at a queue (of the simulation itself)",
 }
 DERIVED = 12
 """The number of seeds that follow from the commit."""

@@ -23,6 +23,7 @@ from soak.simulation.acts.operators import OPERATORS
 from soak.simulation.acts_kill import files, kill, power_cut
 from soak.simulation.bounds import sample
 from soak.simulation.cut_ins import drawn_aim
+from soak.simulation.process import Killed
 
 if TYPE_CHECKING:
     from soak.simulation.world import World
@@ -194,4 +195,5 @@ async def tell(world: World, step: int) -> None:
         world.history.note(world.loop.now, "step", f"{step}: {act.name}")
         pause = max(pause, act.do(world, rng) or 0.0)
     await asyncio.sleep(pause)
-    sample(world)
+    with contextlib.suppress(Killed):  # of a stop that cut in here: it ends the program, and not its story
+        sample(world)

@@ -152,6 +152,63 @@ async def test_a_command_whose_caller_goes_before_its_reply_is_not_lost_without_
     assert told == said and desk.sent == [text]
 
 
+def notices(desk: Desk) -> list[str]:
+    told: list[str] = []
+    desk.link.watch(lambda event: told.append(event.text) if isinstance(event, Notice) else None)
+    return told
+
+
+INTERRUPTED = "desk: 'R2=1' was interrupted; it is not known whether it was executed"
+
+
+@pytest.mark.parametrize("at", ["the question after it", "the clean-up after a stop", "its end"])
+async def test_nor_one_whose_caller_goes_later(at):
+    desk = Desk()
+    desk.pipe.silent = True
+    told = notices(desk)
+    running = desk.run("R2=1", "PR EF", after=("PR EM",))
+    await asyncio.sleep(0.05)
+    conversation = desk.conversations.under_way[0]
+    if at == "the question after it":
+        while len(desk.sent) < 2:
+            await asyncio.sleep(0.01)
+        running.cancel()
+    elif at == "its end":  # in the turn that settles the outcome
+        conversation.over.add_done_callback(lambda _: running.cancel())
+        desk.stop()
+    else:
+        desk.stop()
+        await asyncio.sleep(0.3)
+        running.cancel()
+    await asyncio.gather(running, return_exceptions=True)
+    assert running.cancelled() and told == [INTERRUPTED]
+
+
+async def test_of_a_command_that_a_stop_kept_from_the_port_nothing_is_said():
+    desk = Desk()
+    desk.pipe.write = lambda data: False
+    told = notices(desk)
+    running = desk.run("R2=1")
+    await asyncio.sleep(0.01)
+    running.cancel()
+    await asyncio.gather(running, return_exceptions=True)
+    assert told == []
+
+
+async def test_a_command_to_all_drives_that_a_stop_cuts_off_may_be_executed():
+    desk = Desk(codec=(party := MCode(em=1, party=True)))
+    state = DriveState(party, "*")
+
+    def broadcast() -> Procedure[None]:
+        yield party.request("*", "MR 100")
+
+    running = asyncio.ensure_future(desk.conversations.run(broadcast(), state))
+    await asyncio.sleep(0.01)
+    desk.stop()
+    with pytest.raises(Stopped, match="'MR 100' was stopped; it is not known whether it was executed"):
+        await running
+
+
 async def test_a_cancelled_conversation_cleans_up_before_the_next_one_begins():
     desk = Desk()
     first, second = desk.run("PR P", "PR V", after=("PR EM", "PR ES")), desk.run("PR A")

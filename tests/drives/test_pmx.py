@@ -176,6 +176,21 @@ async def test_a_late_reply_to_a_stop_is_none_to_a_command_that_is_lost(only):
     await bus.close()
 
 
+async def test_a_command_that_waits_as_another_controller_is_stopped_is_not_sent():
+    """A late reply to that stop would pass for its own: it has its mark behind it."""
+    bus, wire = await opened("00", "01", PX=None)
+    asked = asyncio.ensure_future(bus.drives["01"].send("PX"))
+    await asyncio.sleep(0.02)
+    waits = asyncio.ensure_future(bus.drives["00"].send("V1=5"))
+    await asyncio.sleep(0.02)
+    bus.stop([bus.drives["01"]])
+    with pytest.raises(Stopped, match="00: stopped; 'V1=5' was not sent"):
+        await waits
+    await asyncio.gather(asked, return_exceptions=True)
+    assert not any(b"V1=5" in data for _, data in wire.written)
+    await bus.close()
+
+
 @pytest.mark.parametrize(
     ("text", "said"),
     [("V1=5", "stopped; 'V1=5' was not sent"), ("V1", "stopped; 'V1' was not sent")],

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import threading
 import time
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
@@ -20,6 +21,7 @@ from multidrop.tui.screens.program import ProgramPage
 from multidrop.tui.texts import OpenText
 from tests.support.fake_session import FakeAssist, FakeSession, demo_session, settle
 from tests.support.real_screen import real_screen, until
+from tests.support.until import PATIENCE
 
 pytestmark = pytest.mark.tui
 
@@ -257,6 +259,30 @@ async def test_keys_that_are_typed_while_a_slow_disk_reads_the_file_wait_for_it(
         app.texts.open = slow  # type: ignore[method-assign]
         typed(pilot, "a.mxt", "enter", "end", "Z")
         await until(pilot, lambda: shown(pilot).editor.text == TEXT.replace("PG 1", "PG 1Z", 1))
+
+
+async def test_who_leaves_the_page_while_a_disk_hangs_has_the_keys_again(folder: Path) -> None:
+    async with page(folder, file="") as pilot:
+        app = pilot.app
+        assert isinstance(app, MultidropApp)
+        read, gate = app.texts.open, threading.Event()
+
+        def hangs(name: str) -> OpenText:
+            gate.wait(PATIENCE)
+            return read(name)
+
+        app.texts.open = hangs  # type: ignore[method-assign]
+        typed(pilot, "a.mxt", "enter")
+        await until(pilot, lambda: isinstance(app.screen, ProgramPage))
+        try:
+            typed(pilot, "escape")
+            await until(pilot, lambda: app.screen is app.main)
+            typed(pilot, "PR P")
+            await until(pilot, lambda: app.main.entry.value == "PR P")
+        finally:
+            gate.set()
+        await settle(pilot)
+        assert app.screen is app.main and app.main.entry.value == "PR P"
 
 
 async def test_what_is_no_text_is_refused_and_what_the_drive_holds_is_read_into_a_new_file(folder: Path) -> None:

@@ -49,6 +49,7 @@ from multidrop.tui.screens.program_rows import (
     target_of,
     with_target,
 )
+from multidrop.tui.terminal.keyboard import Hold
 from multidrop.tui.texts import OpenText
 
 PAUSE = 0.4
@@ -76,6 +77,8 @@ class ProgramPage(Page):
         self._edited_at: float | None = None
         """The time of the last edit that was not taken in; None: there is none."""
         self._taking_in = False
+        self._reads = Hold(host.keyboard)
+        """Keys wait for a file."""
         self._compared: tuple[object, str] = ((), "")
         """The lines of the drive to which the text was compared, and the product for which it was checked."""
         self._warned = ""
@@ -103,6 +106,7 @@ class ProgramPage(Page):
 
     def on_unmount(self) -> None:
         """Keep the text as it was left."""
+        self._reads.end()
         self.take_text()
         self.host.texts.take = None
 
@@ -234,7 +238,8 @@ class ProgramPage(Page):
         elif name and name.endswith("/"):
             await self.action_open(name)
         elif name:
-            await self.open_file(name)
+            self._reads.begin()
+            self.run_worker(self.open_file(name))
 
     async def upload(self) -> None:
         """Read what the drive holds into a new file, and open that."""
@@ -259,7 +264,7 @@ class ProgramPage(Page):
 
     async def open_file(self, name: str) -> None:
         """Show a file; offer the copy of an earlier session, if there is one. A slow disk holds up only the keys."""
-        self.host.keyboard.hold()
+        self._reads.begin()
         try:
             text = await asyncio.to_thread(self.host.texts.open, name)
             draft = await asyncio.to_thread(self.host.texts.draft, text)
@@ -268,7 +273,7 @@ class ProgramPage(Page):
             self.notify(str(problem), timeout=6)
             return
         finally:
-            self.host.keyboard.release()
+            self._reads.end()
         self.take_text()
         self._show_text(text)
         if draft is not None:

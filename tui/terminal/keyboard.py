@@ -213,3 +213,21 @@ async def _worked_off(node: DOMNode) -> None:
         with suppress(TimeoutError):
             async with asyncio.timeout(PATIENCE):
                 await done.wait()
+
+
+class Hold:
+    """One reason for which keys wait. It may begin and end more than once."""
+
+    def __init__(self, keyboard: Keyboard) -> None:
+        self._keyboard = keyboard
+        self._on = False
+
+    def begin(self) -> None:
+        if not self._on:
+            self._on = True
+            self._keyboard.hold()
+
+    def end(self) -> None:
+        if self._on:
+            self._on = False
+            self._keyboard.release()

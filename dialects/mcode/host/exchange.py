@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from functools import lru_cache
 
@@ -11,7 +12,7 @@ from multidrop.dialects.errors import DriveError, Inexpressible, NoAnswer, Refus
 from multidrop.dialects.exchange import unanswered
 from multidrop.dialects.mcode.host import classify
 from multidrop.dialects.mcode.host.classify import INTEGER, NOTHING
-from multidrop.dialects.mcode.host.framing import ACK
+from multidrop.dialects.mcode.host.framing import ACK, UNPRINTED
 from multidrop.dialects.mcode.host.state import MCodeState, described, who
 from multidrop.dialects.mcode.manual import errors
 from multidrop.dialects.mcode.manual.errors import ErrorNumber
@@ -347,6 +348,11 @@ def rest_of_list(state: MCodeState, priority: Priority) -> Procedure[tuple[str, 
         state.reply_lost()
         return None
     return reply.lines[:-1]
+
+
+def lacks_lines(reply: Reply, lines: Iterable[str]) -> bool:
+    """Whether the reply to a list shows that one of its lines was damaged: a drive lists characters that print."""
+    return bool(reply.collided) or any(UNPRINTED.search(line) for line in lines)
 
 
 def _mark(state: MCodeState, priority: Priority, rows: str | None = None) -> Request:

@@ -145,7 +145,7 @@ def program_line(state: MCodeState, request: Request) -> Procedure[tuple[str, ..
     """Send a line in program mode: the drive stores it, and nothing else may be asked."""
     moves = classify.starts_motion(request.text)  # in a drive that was without power meanwhile
     if (moves or state.reply_pending or state.settings_unknown) and not classify.leaves_program(request.text):
-        yield from _make_sure(state, request, "was not sent")
+        yield from unsent_if_stopped(who(state), request, _make_sure(state, request, "was not sent"))
     reply = yield replace(request, kind=Kind.PROGRAM)
     if reply.end in (End.TIMEOUT, End.DAMAGED):
         state.reply_lost()
@@ -328,13 +328,14 @@ def immediate(state: MCodeState, request: Request) -> Procedure[tuple[str, ...]]
     if request.kind is Kind.LIST:
         # Print a mark after a list: EM 1 to 3 give a list no end.
         lines = reply.lines
+        rest: tuple[str, ...] | None = ()
         if state.codec.em != 0:
             rest = yield from exchange.rest_of_list(state, request.priority)
-            if rest is None:
-                raise NoAnswer(f"{who(state)}: the list may be incomplete: its end or a line was damaged; ask again")
-            lines += rest
-            if not lines:
+            lines += rest or ()
+            if rest is not None and not lines:
                 yield from exchange.check_error_flag(state, request)
+        if rest is None or exchange.lacks_lines(reply, lines):
+            raise NoAnswer(f"{who(state)}: the list may be incomplete: its end or a line was damaged; ask again")
         return tuple(line for line in lines if line)
     if not reply.acknowledged:
         late = yield from exchange.check_error_flag(state, request, silent=reply.end is End.SILENT)

@@ -15,6 +15,7 @@ from multidrop.dialects.mcode.host.codec import EVERY_DRIVE
 from multidrop.dialects.mcode.host.exchange import (
     REPEATS,
     check_printed,
+    lacks_lines,
     note_error,
     once,
     printed_value,
@@ -219,7 +220,7 @@ def listed(state: MCodeState, text: str) -> Procedure[tuple[str, ...]]:
         lines = reply.lines
         if state.codec.em != 0 or reply.end is not End.DONE:
             rest = yield from rest_of_list(state, Priority.OPERATOR)
-            if rest is None:
+            if rest is None or lacks_lines(reply, lines):
                 stood = True
                 continue
             state.synchronised()

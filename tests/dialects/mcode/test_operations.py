@@ -346,6 +346,16 @@ def test_a_stop_in_a_question_before_a_line_names_the_line_as_not_sent():
         procedure.fail(Stopped("stopped"))
 
 
+def test_a_stop_in_the_question_for_the_prompt_names_the_line_for_program_mode_as_not_sent():
+    state = checked()
+    state.may_be_in_program_mode()
+    state.reply_outstanding()
+    procedure = ProcedureRunner(MCODE.perform(state, "R1=7"))
+    assert procedure.request.text == ""
+    with pytest.raises(Stopped, match="stopped; 'R1=7' was not sent"):
+        procedure.fail(Stopped("stopped"))
+
+
 def test_a_line_is_not_sent_after_a_stop_that_came_as_the_echo_mode_was_put_back():
     state = checked()
     state.owes(Owed(3, "", "LMDCM", "", ""))

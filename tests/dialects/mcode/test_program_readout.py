@@ -4,6 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from multidrop.dialects.errors import NoAnswer
 from multidrop.dialects.mcode.family import MCODE
 from multidrop.dialects.mcode.host import program_readout as listings
 from multidrop.dialects.mcode.host.codec import MCode
@@ -196,5 +197,32 @@ def test_a_program_of_which_a_listed_line_was_damaged_is_listed_again(em, late):
         return came
 
     desk.wire.advance = damages_a_line
+    found = desk.run(MCODE.programs.read(state, (), lambda done, total: None), state)
+    assert damaged and [line.text for line in found.lines] == ["LB G1", "MR 100", "E"]
+
+
+@for_each("words", ["read", "typed"])
+@pytest.mark.parametrize("em", [0, 1, 2, 3])
+def test_without_a_checksum_a_line_with_what_no_drive_lists_is_damaged(em, words):
+    """Another drive printed at the same time: two lines became one."""
+    desk, state = one_drive(Bench, em=em, party=True)
+    for line in ("PG 1", "LB G1", "MR 100", "E", "PG"):
+        assert not desk.devices["a"].execute(line, desk.now).refused
+    advance, held, damaged = desk.wire.advance, bytearray(), []
+
+    def collides(now):
+        held.extend(advance(now))
+        if b"\r\n6  MR 100" in held and (words == "typed" or not damaged):
+            damaged.append(now)
+            held[:] = held.replace(b"\r\n6  MR 100", b"\x00\x10 MR 100")
+        came = bytes(held)
+        held.clear()
+        return came
+
+    desk.wire.advance = collides
+    if words == "typed":
+        with pytest.raises(NoAnswer, match="the list may be incomplete: its end or a line was damaged; ask again"):
+            desk.type(state, "L")
+        return
     found = desk.run(MCODE.programs.read(state, (), lambda done, total: None), state)
     assert damaged and [line.text for line in found.lines] == ["LB G1", "MR 100", "E"]
