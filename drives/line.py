@@ -317,6 +317,8 @@ class Line:
         if found.strays:  # first: a proof forgets which replies are outstanding
             self._publish(now, found.strays)
         heard = self.inbox.buffer
+        if found.reply.end in (End.TIMEOUT, End.DAMAGED):  # what came may be the late reply to a doubtful one
+            self._doubt.stray(flight.request.codec.parse_unsolicited(heard)[0])
         weight = self._doubt.weigh(flight.request, found.reply, now, heard)
         reply = copy_with(found.reply, raw=heard[: found.used], doubtful=weight.doubtful)
         reply = self._doubt.with_evidence(flight.request, reply)

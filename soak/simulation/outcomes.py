@@ -20,8 +20,6 @@ from soak.simulation.rule import Grant, Granted, Rule
 from soak.simulation.world import NUMBER, World
 
 ACK, NAK = b"\x06", b"\x15"
-REPEATED = 2.0
-"""The time, s, in which all pieces of a stop are written."""
 AFTER = 2.0
 """The longest time, s, between a damaged byte of a line and the end of that line: late bytes, and a slow wire."""
 
@@ -42,6 +40,8 @@ BARE_COMMAND = Grant("a damaged command without a checksum", "Noise on the line"
 FLAG_CLEARED = Grant("a flag that a program clears", "A flag that a program clears")
 NO_SIGN = Grant("a mode without a sign of execution", "0010")
 RUNS = Grant("a program that runs in the drive", "What a report means")
+STOP_PIECE = re.compile(rb"ABORT|SR[01]=0")
+"""A piece of a stop of PMX."""
 BARE_VALUE = Grant("a damaged value without a checksum", "Noise on the line")
 
 
@@ -189,10 +189,11 @@ def arrived_late(world: World, executed: Executed) -> bool:
 def _stopped_by_another(world: World, command: Command) -> bool:
     """Whether a PMX replied, about the time of a command, to a stop that is not of its own client."""
     history = world.history
-    own = [stop.at for stop in history.stops if stop.who == command.who]
     since = command.began - AFTER
     passed = [at for at, line in history.passed if line == command.line and since <= at <= command.ended]
-    others = any(not any(at - REPEATED <= each <= at for each in own) for at in passed)
+    client = command.line + command.who
+    own = [at for at, port, data in history.written if port == client and STOP_PIECE.search(data)]
+    others = any(not any(at - PROMPTLY <= each <= at for each in own) for at in passed)
     return others and world.place(command.line).language == "pmx"
 
 

@@ -130,6 +130,8 @@ FIXED = {
     7006117: "two lines of a list that another drive's print made one, in the backup of a line without a checksum",
     7006503: "a value that another controller's late reply met on the line (of the simulation itself)",
     7008855: "a kill that met a stop as the simulation looked at a queue (of the simulation itself)",
+    8000469: "a value of another controller, whose own came as the mark of a third one was awaited in vain",
+    8000715: "a stop of the computer that lends the port, soon after one of its client (of the simulation itself)",
 }
 DERIVED = 12
 """The number of seeds that follow from the commit."""

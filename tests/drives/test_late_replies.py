@@ -315,6 +315,29 @@ def test_a_doubtful_reply_of_another_drive_stands_in_front_of_the_mark():
     assert ended[-1].lines == ("202", "?Q02001")
 
 
+def test_what_came_before_a_mark_that_gets_no_reply_counts_as_well():
+    """03's late reply passes for 01's, and 01's own comes while the mark of 03 waits in vain."""
+    line = Line(Pmx(), timeout=0.3)
+    at, ended = timed(line)
+
+    line.ask(pmx("V1", "03"))
+    at(0.0)
+    at(0.5)
+    line.ask(pmx("V1", "01"))
+    at(1.0)
+    at(1.1, b"303\r")
+    assert ended[-1].lines == ("303",) and ended[-1].doubtful
+    line.ask(pmx("Q03001", "03", kind=Kind.PRINT, expect=r"\?Q03001", gather=True))
+    at(1.2)
+    at(1.3, b"101\r")
+    at(2.0)
+    assert ended[-1].end is not End.DONE
+    line.ask(pmx("Q01001", "01", kind=Kind.PRINT, expect=r"\?Q01001", gather=True))
+    at(2.5)
+    at(2.6, b"?Q01001\r")
+    assert ended[-1].lines == ("101", "?Q01001"), "a late reply came: 303 is not shown"
+
+
 def test_a_late_refusal_of_another_drive_is_not_certain():
     """A command that reads nothing is replied to with OK, and with a refusal: either may come late."""
     line = Line(Pmx(), timeout=0.3)
