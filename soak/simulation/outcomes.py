@@ -94,7 +94,7 @@ def _twice(world: World) -> Iterator[str | Granted]:
             yield Granted(BARE_COMMAND, words)
         elif _made(world.history, command, NAK) and _took(world.history, command, ACK) and _no_error(world, command):
             yield Granted(NOISY_NAK, words)
-        elif _doubled(world, command) or _astray(world, command.line, times[-1] - PROMPTLY, times[-1]):
+        elif _doubled(world, command) or astray(world, command.line, times[-1] - PROMPTLY, times[-1]):
             yield Granted(ASTRAY, words)  # a line of a download that came once program mode had ended, too
         else:
             yield words
@@ -125,7 +125,7 @@ def _refused(world: World) -> Iterator[str | Granted]:
             bare = not world.place(command.line).checked
             noise = _damage(world.history, command.line, command.began - AFTER, command.ended)
             noise = noise or _before(world, command)
-            if _astray(world, command.line, command.began - AFTER, command.ended):
+            if astray(world, command.line, command.began - AFTER, command.ended):
                 yield Granted(ASTRAY, words)
             else:
                 yield Granted(BARE_REFUSAL, words) if bare and noise else words
@@ -152,7 +152,7 @@ def _lost(world: World) -> Iterator[str | Granted]:
 
 def _confirms_lost(world: World, command: Command) -> Grant | None:
     """What can have confirmed a command that was lost."""
-    if _astray(world, command.line, command.began, command.ended):
+    if astray(world, command.line, command.began, command.ended):
         return ASTRAY
     if _cleared(world, command):
         return FLAG_CLEARED
@@ -174,7 +174,7 @@ def _cleared(world: World, command: Command) -> bool:
     return any(command.began <= at <= command.ended for at in own)
 
 
-def _astray(world: World, line: str, since: float, until: float) -> bool:
+def astray(world: World, line: str, since: float, until: float) -> bool:
     """Whether a datagram of a line arrived twice or late in a time, or so before it that its reply came then."""
     host = world.place(line).host
     return any(name == host and since - AFTER <= at <= until for at, name in world.network.astray)
@@ -272,8 +272,8 @@ def _credited(world: World) -> Iterator[str | Granted]:
         elif own and all(each.restarts == shown.restarts for each in own if each.until >= shown.began):
             breach = _never_held(world, shown, f"{words}: it never held that")
         if breach:
-            astray = _astray(world, shown.line, shown.began, shown.at) or _overtaken(world, shown)
-            yield Granted(ASTRAY, words) if astray else breach
+            late = astray(world, shown.line, shown.began, shown.at) or _overtaken(world, shown)
+            yield Granted(ASTRAY, words) if late else breach
 
 
 SAVES = ("S", "STORE")

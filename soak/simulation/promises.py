@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from math import inf
 
 from soak.simulation.history import Executed
-from soak.simulation.outcomes import BARE_COMMAND, became
+from soak.simulation.outcomes import ASTRAY, BARE_COMMAND, astray, became
 from soak.simulation.rule import Granted, Rule
 from soak.simulation.told import Put, Run
 from soak.simulation.world import NUMBER, World
@@ -81,7 +81,9 @@ def _programs(world: World) -> Iterator[str | Granted]:
         if not whole:
             when = f"{run.began:.3f} to {run.ended:.3f}"
             words = f"{run.typed!r} from {when} ({run.failure or 'done'}): {done.old}, {done.new}"
-            yield Granted(BARE_COMMAND, words) if became(world, done.line, run.ended, run.began) else words
+            late = astray(world, done.line, run.began, run.ended)
+            grant = BARE_COMMAND if became(world, done.line, run.ended, run.began) else ASTRAY if late else None
+            yield Granted(grant, words) if grant else words
 
 
 def _raw(world: World) -> Iterator[str]:
@@ -141,7 +143,7 @@ PROMISES = (
         "A download leaves the old program, the new one, or a backup that is named.",
         "What a report means",
         _programs,
-        (BARE_COMMAND,),
+        (BARE_COMMAND, ASTRAY),
     ),
     Rule("raw", "What leaves in raw mode is what was typed, and stops.", "What a report means", _raw),
 )
