@@ -162,7 +162,7 @@ class Conversation(Generic[T]):
         self._last: Transaction | None = None
         self._taken: list[Transaction] = []
         """Its transactions, where they are witnessed."""
-        self._cleaning_up = self._interrupted = self._orphaned = False
+        self._cleaning_up = self._interrupted = False
         self.over: asyncio.Future[None] = asyncio.get_running_loop().create_future()
 
     def begin(self) -> None:
@@ -199,12 +199,10 @@ class Conversation(Generic[T]):
     def abandon(self) -> None:
         """Interrupt it, because its caller has gone and hears no outcome; say what is not known of its command."""
         self.interrupt()
-        command, error = self._unproven, self._outcome.error if self._outcome is not None else None
-        if command is None or self._orphaned or isinstance(error, Refused | Inexpressible):
+        command, outcome = self._unproven, self._outcome
+        known = outcome is not None and (outcome.error is None or isinstance(outcome.error, Refused | Inexpressible))
+        if command is None or known:
             return
-        if self._outcome is not None and error is None:
-            return
-        self._orphaned = True
         text = f"'{command.text}' was interrupted; it is not known whether it was {_done(command)}"
         self._link.notify(f"{self._name}: {text}", self._state.address, warning=True)
 

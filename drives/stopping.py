@@ -261,21 +261,20 @@ class Stopping:
             written = ahead or self._write_now(halt)
             halt.data = written.data
             halt.missed.update(written.forms.missed)
+            # A late reply to the stop of one would pass for that to a request of another, with its mark behind it.
+            repliers = [drive for drive in self._roster.all_drives if drive.state.codec.stop_replies]
             only = None
             if not halt.whole:  # the bytes may stop other drives as well
                 others = [drive for drive in self._roster.all_drives if drive not in halt.drives]
                 halt.others = tuple(drive for drive in others if _hears(drive.state, halt.data))
-                # A late reply to the stop would pass for that to what waits for another drive, behind its mark.
-                failed = (each for each in self._roster.all_drives if each.state.codec.stop_replies)
-                only = {*GLOBAL, *(drive.address for drive in (*halt.affected, *failed))}
+                only = {*GLOBAL, *(drive.address for drive in (*halt.affected, *repliers))}
             link.line.stop(at, *written.forms.repeats, only=only)
             link.line.wrote(halt.data, at, whole=written.invalidates)
             link.debris.stop_written(halt.data, link.line.transmitted)
             for drive in halt.affected:
                 drive.state.stopped()
-            for drive in self._roster.all_drives:
-                if drive.state.codec.stop_replies:  # those to the stop of one may be late, and reach another
-                    drive.state.reply_outstanding()
+            for drive in repliers:
+                drive.state.reply_outstanding()
             # Every drive on the line has refused the rest of a line, or may have.
             if written.invalidates or written.before or link.transport.may_invalidate:
                 for drive in self._roster.all_drives:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import threading
-import time
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from pathlib import Path
@@ -246,18 +245,30 @@ async def test_a_break_point_is_set_at_a_label_or_an_address_and_removed_there(f
         await until(pilot, lambda: sent(pilot)[1:] == ["/break press:a off", "/break press:a 6"])
 
 
+def disk_that_hangs(app: MultidropApp) -> threading.Event:
+    """Let every file wait until the event is set."""
+    read, gate = app.texts.open, threading.Event()
+
+    def hangs(name: str) -> OpenText:
+        gate.wait(PATIENCE)
+        return read(name)
+
+    app.texts.open = hangs  # type: ignore[method-assign]
+    return gate
+
+
 async def test_keys_that_are_typed_while_a_slow_disk_reads_the_file_wait_for_it(folder: Path) -> None:
     async with page(folder, file="") as pilot:
         app = pilot.app
         assert isinstance(app, MultidropApp)
-        read = app.texts.open
-
-        def slow(name: str) -> OpenText:
-            time.sleep(0.2)
-            return read(name)
-
-        app.texts.open = slow  # type: ignore[method-assign]
-        typed(pilot, "a.mxt", "enter", "end", "Z")
+        gate = disk_that_hangs(app)
+        try:
+            typed(pilot, "a.mxt", "enter", "end", "Z")
+            await until(pilot, lambda: isinstance(app.screen, ProgramPage))
+            await until(pilot, lambda: app.keyboard.idle or app.keyboard._held)
+            assert not app.keyboard.idle
+        finally:
+            gate.set()
         await until(pilot, lambda: shown(pilot).editor.text == TEXT.replace("PG 1", "PG 1Z", 1))
 
 
@@ -265,16 +276,10 @@ async def test_who_leaves_the_page_while_a_disk_hangs_has_the_keys_again(folder:
     async with page(folder, file="") as pilot:
         app = pilot.app
         assert isinstance(app, MultidropApp)
-        read, gate = app.texts.open, threading.Event()
-
-        def hangs(name: str) -> OpenText:
-            gate.wait(PATIENCE)
-            return read(name)
-
-        app.texts.open = hangs  # type: ignore[method-assign]
-        typed(pilot, "a.mxt", "enter")
-        await until(pilot, lambda: isinstance(app.screen, ProgramPage))
+        gate = disk_that_hangs(app)
         try:
+            typed(pilot, "a.mxt", "enter")
+            await until(pilot, lambda: isinstance(app.screen, ProgramPage))
             typed(pilot, "escape")
             await until(pilot, lambda: app.screen is app.main)
             typed(pilot, "PR P")

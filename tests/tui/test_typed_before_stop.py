@@ -206,14 +206,14 @@ async def test_a_stop_that_automation_is_refused_by_is_not_undone_by_a_key_behin
 async def test_what_a_stop_drops_is_told_with_the_line_that_it_belonged_to(waiting: bool) -> None:
     async with demo() as (screen, session, assist):
         if waiting:
-            screen.app.keyboard.hold()
+            screen.app.keyboard.hold("a test")
             screen.write(b"MR 51")
             await screen.read_all()
         else:
             await screen.type(b"MR 51")
         screen.write(b"200\rPR P\rS" + STOP + b"PR")
         await screen.read_all()
-        screen.app.keyboard.release()
+        screen.app.keyboard.release("a test")
         await screen.rest()
         assert session.sent == []
         await screen.shows("stopped; 3 lines were not sent: MR 51200 · PR P · S")

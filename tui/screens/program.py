@@ -49,7 +49,6 @@ from multidrop.tui.screens.program_rows import (
     target_of,
     with_target,
 )
-from multidrop.tui.terminal.keyboard import Hold
 from multidrop.tui.texts import OpenText
 
 PAUSE = 0.4
@@ -77,8 +76,6 @@ class ProgramPage(Page):
         self._edited_at: float | None = None
         """The time of the last edit that was not taken in; None: there is none."""
         self._taking_in = False
-        self._reads = Hold(host.keyboard)
-        """Keys wait for a file."""
         self._compared: tuple[object, str] = ((), "")
         """The lines of the drive to which the text was compared, and the product for which it was checked."""
         self._warned = ""
@@ -106,7 +103,7 @@ class ProgramPage(Page):
 
     def on_unmount(self) -> None:
         """Keep the text as it was left."""
-        self._reads.end()
+        self.host.keyboard.release(self)
         self.take_text()
         self.host.texts.take = None
 
@@ -238,7 +235,7 @@ class ProgramPage(Page):
         elif name and name.endswith("/"):
             await self.action_open(name)
         elif name:
-            self._reads.begin()
+            self.host.keyboard.hold(self)
             self.run_worker(self.open_file(name))
 
     async def upload(self) -> None:
@@ -264,7 +261,7 @@ class ProgramPage(Page):
 
     async def open_file(self, name: str) -> None:
         """Show a file; offer the copy of an earlier session, if there is one. A slow disk holds up only the keys."""
-        self._reads.begin()
+        self.host.keyboard.hold(self)
         try:
             text = await asyncio.to_thread(self.host.texts.open, name)
             draft = await asyncio.to_thread(self.host.texts.draft, text)
@@ -273,7 +270,7 @@ class ProgramPage(Page):
             self.notify(str(problem), timeout=6)
             return
         finally:
-            self._reads.end()
+            self.host.keyboard.release(self)
         self.take_text()
         self._show_text(text)
         if draft is not None:

@@ -227,14 +227,14 @@ class Start(Over[None]):
             return False
         self._opening = True
         if keys:
-            self._keyboard.hold()
+            self._keyboard.hold(self)
         self.show(text)
         return True
 
     def _end(self, keys: bool = True) -> None:
         self._opening = False
         if keys:
-            self._keyboard.release()
+            self._keyboard.release(self)
 
     def on_screen_resume(self) -> None:
         """Close if something is open and no other screen covers this one."""

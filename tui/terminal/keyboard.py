@@ -47,7 +47,7 @@ class Keyboard:
         self._waiting: deque[Typed] = deque()
         self._awake = False
         self._turning = False
-        self._held = 0
+        self._held = set[object]()
         self._deaf_until = 0.0
         self._deaf = 0
 
@@ -77,12 +77,12 @@ class Keyboard:
         self._waiting.clear()
         return text
 
-    def hold(self) -> None:
-        """Make keys wait until their meaning is known: until each `hold` has its `release`."""
-        self._held += 1
+    def hold(self, by: object) -> None:
+        """Make keys wait until their meaning is known: until each who holds them has released them."""
+        self._held.add(by)
 
-    def release(self) -> None:
-        self._held = max(0, self._held - 1)
+    def release(self, by: object) -> None:
+        self._held.discard(by)
         self._wake()
 
     def turn_deaf(self) -> None:
@@ -213,21 +213,3 @@ async def _worked_off(node: DOMNode) -> None:
         with suppress(TimeoutError):
             async with asyncio.timeout(PATIENCE):
                 await done.wait()
-
-
-class Hold:
-    """One reason for which keys wait. It may begin and end more than once."""
-
-    def __init__(self, keyboard: Keyboard) -> None:
-        self._keyboard = keyboard
-        self._on = False
-
-    def begin(self) -> None:
-        if not self._on:
-            self._on = True
-            self._keyboard.hold()
-
-    def end(self) -> None:
-        if self._on:
-            self._on = False
-            self._keyboard.release()
