@@ -29,6 +29,9 @@ from multidrop.shell.connect.url_forms import URL_FORMS
 SHIPPED = ROOT / "multidrop" / "shipped"
 PATH = re.compile(r"(FILE|SCRIPT|CELL|PATH)\b")
 """The beginning of the metavars of arguments that are files."""
+BRACKETED = re.compile(r"\[(?:[^\[\]]|\[[^\[\]]*\])*\]\S*|\((?:[^()]|\([^()]*\))*\)\S*|\S+")
+"""One part of a usage line: an option with its value, a group, or a word."""
+USAGE_WIDTH = 77
 VALUES = {"URL": "url", "URL2": "url", "PORT-OR-URL": "url", "ADDR": "drive", "NAME": "macro", "NAME|off": "macro"}
 """What is listed for a metavar; NAME in the commands on macros only."""
 
@@ -241,10 +244,34 @@ def manual() -> str:
     """The man page."""
     parser = build()
     parser.add_all()
+    for each in (parser, *parts(parser)):
+        each.usage = folded_usage(each)
     page = Manpage(parser)
     page.date, page.source, page.manual = "", f"multidrop {multidrop.__version__}", "User commands"
     page.description = "terminal and scripting shell for motion drives"
     return re.sub(r"\n\.SH *\n", "\n", str(page)).rstrip() + "\n" + roff(SECTIONS)
+
+
+def parts(parser: argparse.ArgumentParser) -> Iterator[argparse.ArgumentParser]:
+    """The parsers of all commands below a parser."""
+    for action in parser._actions:
+        if isinstance(action, argparse._SubParsersAction):
+            for part in action.choices.values():
+                yield part
+                yield from parts(part)
+
+
+def folded_usage(parser: argparse.ArgumentParser) -> str:
+    """The usage of a command, folded here: each version of argparse folds it in another way."""
+    with mock.patch.dict(os.environ, COLUMNS="10000"):
+        usage = parser.format_usage().removeprefix("usage: ").removeprefix(parser.prog).strip()
+    head = f"usage: {parser.prog}"
+    lines = [head]
+    for word in BRACKETED.findall(usage):
+        if len(f"{lines[-1]} {word}") > USAGE_WIDTH and len(lines[-1]) > len(head):
+            lines.append(" " * len(head))
+        lines[-1] += f" {word}"
+    return "\n".join(lines).removeprefix("usage: ").replace("%", "%%")
 
 
 def roff(sections: Mapping[str, Sequence[tuple[str, str]]]) -> str:

@@ -69,7 +69,7 @@ def run(chosen: argparse.Namespace) -> int:
                 jobs = chosen.jobs or workers.cores()
                 for todo in report.rounds():
                     cases = map(plan.case, todo)
-                    report.take_all(workers.results(plan.job, cases, len(todo), jobs, interruption))
+                    report.take_all(workers.results(plan.job, cases, len(todo), jobs, interruption, say=report.say))
         except KeyboardInterrupt:
             return report.finish(interruption, INTERRUPTED)
         except (Diagnostic, TransportLost) as problem:
@@ -120,6 +120,7 @@ class Report:
         """The cases of the round that are not reported yet."""
         self._cut = False
         """The sweep ended early."""
+        self._said: set[str] = set()
         self._reported: list[int] = []
         self._failed: dict[int, Result] = {}
         if table.known:
@@ -173,6 +174,13 @@ class Report:
 
     def erase(self) -> None:
         self._status.erase()
+
+    def say(self, text: str) -> None:
+        """Print a line about the whole sweep, once."""
+        if text not in self._said:
+            self._said.add(text)
+            self.erase()
+            write(sys.stderr, text)
 
     def finish(self, interruption: Interruption, code: int) -> int:
         """Report the rest; return the exit code, `code` unless that is 0 and a case failed."""

@@ -19,6 +19,7 @@ from multiprocessing import connection
 from multiprocessing.context import BaseContext
 from typing import ParamSpec, TypeVar
 
+from multidrop.dialects.files import why
 from multidrop.shell.signals import FROM_TERMINAL, SIGNALS, Interruption
 from multidrop.shell.streams.stdout import WATCHER
 from multidrop.shell.sweeps import trial
@@ -34,8 +35,11 @@ T = TypeVar("T")
 class Pools:
     """Pools of processes, one after the other: one in which a process dies is at its end."""
 
-    def __init__(self, job: Job, jobs: int, interruption: Interruption, run: Run) -> None:
-        self._job, self._jobs, self._interruption, self._run = job, jobs, interruption, run
+    def __init__(
+        self, job: Job, jobs: int, interruption: Interruption, run: Run, say: Callable[[str], None] = lambda text: None
+    ) -> None:
+        """`say` takes one line for a person where no process can begin."""
+        self._job, self._jobs, self._interruption, self._run, self._say = job, jobs, interruption, run, say
         self._context = _context()
         self._suspects: list[Case] = []
         """The cases that the end of a pool cut off: one of them was the cause."""
@@ -45,6 +49,10 @@ class Pools:
         """Whether processes can begin at all; otherwise this one runs the cases."""
 
     def results(self, todo: Iterator[list[Case]]) -> Iterator[list[Result]]:
+        if not self._can_begin():
+            for case in (case for cases in todo for case in cases):
+                yield self._here(case)
+            return
         yield from self._in_a_pool(todo)
         while self._suspects:
             suspects, self._suspects = self._suspects, []
@@ -54,6 +62,18 @@ class Pools:
                 yield from self._in_a_pool(todo)
         for case in (case for cases in (*self._rests, *todo) for case in cases):
             yield self._here(case)
+
+    def _can_begin(self) -> bool:
+        """Whether this system has what processes share: semaphores, which need /dev/shm on Linux."""
+        try:
+            ProcessPoolExecutor(1, mp_context=self._context).shutdown()
+        except (OSError, ImportError, NotImplementedError) as problem:
+            self._impossible(why(problem) if isinstance(problem, OSError) else str(problem))
+        return self._possible
+
+    def _impossible(self, reason: str) -> None:
+        self._possible = False
+        self._say(f"no other process can be started ({reason}), so all cases run in this one, which takes longer")
 
     def _in_a_pool(self, todo: Iterator[list[Case]]) -> Iterator[list[Result]]:
         running: dict[Future[list[Result]], list[Case]] = {}
@@ -97,8 +117,8 @@ class Pools:
         with self._pool(1) as pool:
             try:
                 self._outcome(pool, trial.version)
-            except (BrokenProcessPool, OSError):
-                self._possible = False
+            except (BrokenProcessPool, OSError) as problem:
+                self._impossible(why(problem) if isinstance(problem, OSError) else "it ends at once")
                 return self._here(case)
             try:
                 return self._outcome(pool, self._run, self._job, [case])

@@ -44,9 +44,18 @@ def cores() -> int:
 
 
 def results(
-    job: Job, cases: Iterator[Case], count: int, jobs: int, interruption: Interruption, run: Run = trial.chunk
+    job: Job,
+    cases: Iterator[Case],
+    count: int,
+    jobs: int,
+    interruption: Interruption,
+    run: Run = trial.chunk,
+    say: Callable[[str], None] = lambda text: None,
 ) -> Iterator[list[Result]]:
-    """Run `count` cases in `jobs` processes; yield the results of each chunk as it ends."""
+    """Run `count` cases in `jobs` processes; yield the results of each chunk as it ends.
+
+    `say` takes one line for a person where no process can be started, and this one runs all cases.
+    """
     seconds = 0.0
     for case in islice(cases, FIRST):
         begin = time.process_time()
@@ -59,7 +68,7 @@ def results(
         size = max(1, round(min(CHUNK, work / jobs / 8) / max(seconds, 1e-6)))
         from multidrop.shell.sweeps.pools import Pools  # 20 ms, which a small sweep is spared
 
-        yield from Pools(job, jobs, interruption, run).results(chunks(cases, size))
+        yield from Pools(job, jobs, interruption, run, say).results(chunks(cases, size))
     for case in cases:
         with interruption.open():
             found = run(job, [case])

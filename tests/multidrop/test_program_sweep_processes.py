@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import os
 import signal
@@ -60,6 +61,22 @@ def test_an_interrupted_sweep_reports_what_is_done_and_leaves_no_process(folder:
     assert 20 <= len(cases) == last["summary"]["cases"] < 5000
     assert f"ended after {len(cases)} cases of 5000" in (folder / "r.xml").read_text()
     assert gone(process.pid)
+
+
+def test_where_no_process_can_be_started_one_line_says_so_and_this_one_runs_all_cases(
+    folder: Path, multidrop: Command, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def absent(*arguments: object) -> None:
+        raise FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT))
+
+    monkeypatch.setattr(workers, "WORTH", 0.0)
+    monkeypatch.setattr("multiprocessing.synchronize._multiprocessing.SemLock", absent)  # as without /dev/shm
+    ended = multidrop("program", "sweep", "go.mxt", "--vary", "seed=1..40", "--jobs", "2", "--json")
+    said = [line for line in ended.stderr.splitlines() if "process" in line]
+    assert said == [
+        "no other process can be started (No such file or directory), so all cases run in this one, which takes longer"
+    ]
+    assert ended.returncode == 0 and json.loads(ended.stdout.splitlines()[-1])["summary"]["cases"] == 40
 
 
 @pytest.mark.fork
