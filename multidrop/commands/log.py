@@ -109,13 +109,15 @@ def judge(chosen: argparse.Namespace) -> int:
                 write(sys.stdout, f"{line.where}: {text(entry)[:STAMP]} {rule}: {said}")
 
     code = _reported(work)
-    counts = (
-        f"{counted(found.commands, 'command')}, {counted(found.stops, 'stop')}"
-        + ", older sessions left out" * bool(found.unmarked)
-    )
-    broken = counted(len(found.breaches), "breach", "breaches") if found.breaches else f"all {len(RULES)} rules held"
-    write(sys.stderr, f"{path}: {broken} ({counts})")
-    return code or (BROKEN if found.breaches else 0)
+    if found.unreadable:
+        lines = counted(len(found.unreadable), "line cannot be read", "lines cannot be read")
+        write(sys.stderr, f"{lines}, first {found.unreadable[0]}: what they held was not judged")
+    counts = [counted(found.commands, "command"), counted(found.stops, "stop")]
+    counts += [counted(found.gaps, "gap")] * bool(found.gaps) + ["older sessions left out"] * bool(found.unmarked)
+    held = "no breach in the rest" if found.unreadable or found.gaps else f"all {len(RULES)} rules held"
+    broken = counted(len(found.breaches), "breach", "breaches") if found.breaches else held
+    write(sys.stderr, f"{path}: {broken} ({', '.join(counts)})")
+    return code or (BROKEN if found.breaches or found.unreadable else 0)
 
 
 def at(chosen: argparse.Namespace) -> int:

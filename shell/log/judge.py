@@ -312,6 +312,10 @@ class Judgement:
     stops: int = 0
     unmarked: int = 0
     """Sessions of a version whose logs cannot be judged."""
+    unreadable: list[str] = field(default_factory=list)
+    """The places of lines that are not entries: nothing is known of what they held."""
+    gaps: int = 0
+    """The places where the log says that entries are missing."""
     breaches: list[Breach] = field(default_factory=list)
 
 
@@ -322,7 +326,10 @@ def judged(lines: Iterable[Line]) -> Judgement:
         entry = line.entry
         if entry is None or entry.kind == "missing" or (entry.kind == "log" and entry.text.startswith(BEGIN)):
             session = _Session(session.marked)
+        if entry is None and line.data.strip():
+            found.unreadable.append(line.where)
         if entry is not None:
+            found.gaps += entry.kind == "missing"
             found.commands += bool(entry.command)
             found.stops += entry.kind == "stop"
             found.sessions += entry.kind == "log"

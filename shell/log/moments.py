@@ -422,19 +422,19 @@ class Run:
         self._blocks: list[tuple[Path, int, int, int]] = []
         """Of each block the part, its offset, its size and its lines."""
         found: list[list[bytes]] = []
-        session = False
+        readable = False
         for block in _back(parts(path)):
+            readable = readable or next(_newest(block), None) is not None
             found.append(_STEP.findall(block.data))
             self._blocks.append((block.path, block.offset, len(block.data), block.data.count(b"\n")))
-            session = block.first
         self._counts = [len(each) for each in reversed(found)]
         self._blocks.reverse()
         self.steps = [step for each in reversed(found) for step in each]
-        if not self.steps and not session:
+        if not readable:
             raise Diagnostic("is not a session log", str(path), "a log of this version is one JSON object a line")
 
     def line(self, index: int) -> Line:
-        """The line of a step. Raises Diagnostic where the log was rotated since it was read."""
+        """The line of a step. Raises Diagnostic where that is no entry, or the log was rotated since it was read."""
         step = self.steps[index]
         before: dict[Path, int] = {}
         for (path, offset, size, lines), count in zip(self._blocks, self._counts, strict=True):
@@ -449,7 +449,10 @@ class Run:
                 if match is None or match[0] != step:
                     raise _rotated(path)
                 begin, data = block.line(match.start())
-                return Line(path, number + block.data.count(b"\n", 0, begin) + 1, data, entry_of(data))
+                line = Line(path, number + block.data.count(b"\n", 0, begin) + 1, data, entry_of(data))
+                if line.entry is None:
+                    raise Diagnostic("is not an entry of a session log", line.where, "the log is damaged there")
+                return line
             index -= count
             before[path] += lines
         raise IndexError(index)

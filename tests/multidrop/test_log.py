@@ -223,6 +223,44 @@ def test_judge_prints_a_line_a_breach_also_as_json(log, done):
     assert code == 1
 
 
+@pytest.mark.parametrize("torn", [b"{\n", b'{"time": "2026', b"\x00\xff\n", line_of(GOOD[1]).replace(b"bus", b"bos")])
+def test_judge_counts_the_lines_that_it_cannot_read_and_does_not_say_that_all_rules_held(torn, log, done):
+    whole_log = b"".join(map(line_of, GOOD))
+    log.write_bytes(whole_log + torn)
+    code, lines, err = done("judge", log)
+    assert (code, lines) == (1, [])
+    assert err == [
+        f"1 line cannot be read, first {log}:6: what they held was not judged",
+        f"{log}: no breach in the rest (0 commands, 1 stop)",
+    ]
+    log.write_bytes(b"\xff\n" + whole_log + b"\n\n" + torn)  # blank lines hold nothing
+    _, _, [first, _] = done("judge", log)
+    assert first == f"2 lines cannot be read, first {log}:1: what they held was not judged"
+
+
+def test_judge_names_gaps(log, done):
+    log.write_bytes(b"".join(map(line_of, (*GOOD, entry("missing", "12 entries", "", "")))))
+    assert done("judge", log) == (0, [], [f"{log}: no breach in the rest (0 commands, 1 stop, 1 gap)"])
+
+
+def test_bisect_refuses_a_file_that_has_no_entry_of_this_version(log, done, tmp_path):
+    other = tmp_path / "other.jsonl"
+    other.write_bytes(b"".join(map(line_of, ENTRIES)).replace(b"+00:00", b""))  # times without a zone
+    log.write_bytes(other.read_bytes())
+    for words in (("show", other), ("judge", other), ("bisect", log, other)):
+        code, lines, [err] = done(*words)
+        assert (code, lines) == (2, []) and "one JSON object a line" in err, words
+
+
+def test_bisect_names_a_damaged_line_at_the_first_difference(log, done, tmp_path):
+    other = tmp_path / "other.jsonl"
+    damaged = [*map(line_of, ENTRIES)]
+    damaged[5] = damaged[5].replace(b'"512"', b"512")
+    other.write_bytes(b"".join(damaged))
+    code, lines, [err] = done("bisect", log, other)
+    assert (code, lines) == (2, []) and err.startswith(f"{other}:6: is not an entry of a session log")
+
+
 @pytest.mark.parametrize(
     ("content", "why"),
     [
