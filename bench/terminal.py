@@ -27,6 +27,7 @@ def environment(folder: Path) -> dict[str, str]:
         "PYTHONPATH": str(ROOT),
         "MULTIDROP_CONFIG_DIR": str(folder / "conf"),
         "MULTIDROP_STATE_DIR": str(folder / "state"),
+        "MULTIDROP_DATA_DIR": str(folder / "data"),
         "TERM": "xterm-256color",
         "COLORTERM": "truecolor",
     }

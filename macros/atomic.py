@@ -1,4 +1,7 @@
-"""Files written whole or not at all: one that replaces a user's file, with its mode, owner and links, or a new one."""
+"""Files written whole or not at all: one that replaces a user's file, with its mode, owner and links, or a new one.
+
+Also the private files of the state folder: regular files of ours, in folders that no one else may enter.
+"""
 
 from __future__ import annotations
 
@@ -6,6 +9,7 @@ import contextlib
 import errno
 import os
 import re
+import stat
 import sys
 import time
 from pathlib import Path
@@ -29,18 +33,24 @@ def safe_name(text: str) -> str:
     return f"{name[:-1]}%2E" if name.endswith(".") else name
 
 
-def write_atomically(path: Path, data: bytes, mode: int = 0o666, *, synced: bool = True) -> None:
+def write_atomically(path: Path, data: bytes, mode: int = 0o666, *, synced: bool = True, private: bool = False) -> None:
     """Replace a file's content, or create the file with `mode` less the umask. On OSError the old file is unchanged.
 
     A new file in the same folder replaces the old one only once all of it is on the disk. A link stays a link. Not
-    `synced`: it survives the process, not the machine, and takes microseconds.
+    `synced`: it survives the process, not the machine, and takes microseconds. `private`: a file of the state folder;
+    what stands there in its place, such as a link or a pipe, is replaced and never followed.
     """
-    make_folder(path.parent)
-    target = Path(os.path.realpath(path))
+    if private:
+        private_folder(path.parent)
+        target = path
+    else:
+        make_folder(path.parent)
+        target = Path(os.path.realpath(path))
     beside = target.with_name(f".{target.name}.{os.urandom(4).hex()}.tmp")
     try:
         with open(os.open(beside, os.O_WRONLY | os.O_CREAT | os.O_EXCL, mode), "wb") as file:
-            _take_over(target, file.fileno())
+            if not private or _is_regular(target):
+                _take_over(target, file.fileno())
             file.write(data)
             file.flush()
             if synced:
@@ -55,6 +65,7 @@ def write_atomically(path: Path, data: bytes, mode: int = 0o666, *, synced: bool
             sync_folder(target.parent)
 
 
+NOT_REGULAR = "it is not a regular file; remove it"
 PATIENCE = 0.3
 """The longest wait, s, for another program that has the file open on Windows, such as one that looks for viruses."""
 
@@ -109,8 +120,10 @@ def make_folder(folder: Path, mode: int = 0o777) -> None:
     Every maker of a folder calls it: the next one syncs only the names that it makes itself.
     """
     made = [each for each in (folder, *folder.parents) if not each.exists()]
-    folder.mkdir(mode, parents=True, exist_ok=True)
     try:
+        for each in reversed(made):
+            each.mkdir(mode, exist_ok=True)
+        folder.mkdir(mode, exist_ok=True)  # raises where a file has its name
         for each in made:
             sync_folder(each.parent)
     except OSError:
@@ -118,6 +131,45 @@ def make_folder(folder: Path, mode: int = 0o777) -> None:
             with contextlib.suppress(OSError):  # another process uses it
                 each.rmdir()
         raise
+
+
+def private_folder(folder: Path) -> None:
+    """Make a folder that only its owner may enter, or take the rights of others on it away. Raises OSError."""
+    make_folder(folder, 0o700)
+    if sys.platform == "win32":
+        return  # the profile of a user is private there
+    state = folder.stat()
+    if state.st_uid == os.geteuid() and stat.S_IMODE(state.st_mode) & 0o077:
+        folder.chmod(0o700)
+
+
+def open_private(path: Path, flags: int = os.O_RDONLY, mode: int = 0o600) -> int:
+    """Open a regular file of the state folder; return its descriptor. A link is not followed, a pipe not waited for.
+
+    Raises OSError, also for anything but a regular file.
+    """
+    flags |= getattr(os, "O_CLOEXEC", 0) | getattr(os, "O_BINARY", 0)
+    try:
+        descriptor = os.open(path, flags | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0), mode)
+    except OSError as problem:
+        if problem.errno in (errno.ELOOP, errno.ENXIO, errno.EMLINK):
+            raise OSError(problem.errno, NOT_REGULAR, str(path)) from None
+        raise
+    if not stat.S_ISREG(os.fstat(descriptor).st_mode):
+        os.close(descriptor)
+        raise OSError(errno.EINVAL, NOT_REGULAR, str(path))
+    return descriptor
+
+
+def _is_regular(path: Path) -> bool:
+    """Whether a regular file has this name; a link to one is not one."""
+    return os.path.lexists(path) and stat.S_ISREG(path.lstat().st_mode)
+
+
+def read_private(path: Path) -> bytes:
+    """Read a regular file of the state folder. Raises OSError."""
+    with open(open_private(path), "rb") as file:
+        return file.read()
 
 
 def _take_over(old: Path, new: int) -> None:

@@ -43,6 +43,7 @@ def multidrop_folders(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A configuration and a state of multidrop for one test only."""
     monkeypatch.setenv("MULTIDROP_CONFIG_DIR", str(tmp_path / "multidrop-config"))
     monkeypatch.setenv("MULTIDROP_STATE_DIR", str(tmp_path / "multidrop-state"))
+    monkeypatch.setenv("MULTIDROP_DATA_DIR", str(tmp_path / "multidrop-data"))
     return tmp_path
 
 

@@ -192,6 +192,7 @@ SECTIONS = {
     "ENVIRONMENT": [
         ("MULTIDROP_CONFIG_DIR", "the folder of the configuration and the macros"),
         ("MULTIDROP_STATE_DIR", "the folder of the history and of what an interrupted session left"),
+        ("MULTIDROP_DATA_DIR", "the folder of the backups of programs"),
     ],
     "FILES": [("~/.config/multidrop/multidrop.toml", "saved connections: tables [connections.NAME] with a url")],
 }

@@ -32,7 +32,7 @@ key = "shop-7.key"
 
 `own_units = ["pallet"]`, above all tables, names further units. An axis of a controller is `"00.x"` in `units`.
 A relative path begins at the folder of the configuration file. `MULTIDROP_CONFIG_DIR` moves the configuration and the
-macros; `MULTIDROP_STATE_DIR` moves the history.
+macros; `MULTIDROP_STATE_DIR` moves the history, `MULTIDROP_DATA_DIR` the backups.
 """
 
 from __future__ import annotations
@@ -50,6 +50,7 @@ from multidrop.dialects.files import opened, text_of, toml_of, utf8_of, why
 from multidrop.dialects.text import visible
 from multidrop.macros.atomic import write_atomically
 from multidrop.shell.broken_configuration import TABLES, WrongConfiguration, salvage
+from multidrop.shell.file_owners import other_writer
 from multidrop.shell.roles import TIMES
 
 if TYPE_CHECKING:
@@ -74,6 +75,8 @@ class SavedConnection:
     url: str
     names: Mapping[str, str] = field(default_factory=dict)
     units: Mapping[str, Scale] = field(default_factory=dict)
+    folder: str = ""
+    """The folder of the configuration file, where a relative path in the URL starts; empty: the current one."""
 
 
 @dataclass(frozen=True)
@@ -168,6 +171,8 @@ class Settings:
     """The errors of the file, of which only what is right counts."""
     in_doubt: Mapping[str, str] = field(default_factory=dict)
     """The errors that take names, units or guards from a saved connection; an empty name: from every line."""
+    data: Path = field(default_factory=lambda: data_folder())
+    """The folder of what belongs to the user and is never deleted here: backups."""
 
     @property
     def macros(self) -> Path:
@@ -207,6 +212,15 @@ def state_folder() -> Path:
     return user_state_path("multidrop", appauthor=False)
 
 
+def data_folder() -> Path:
+    """The folder of the backups; may not exist."""
+    if given := os.environ.get("MULTIDROP_DATA_DIR"):
+        return Path(given)
+    from platformdirs import user_data_path
+
+    return user_data_path("multidrop", appauthor=False)
+
+
 def config_file() -> Path:
     """The configuration file; may not exist."""
     return config_folder() / "multidrop.toml"
@@ -226,6 +240,12 @@ def load(lenient: bool = False) -> Settings:
         if isinstance(problem.__cause__, FileNotFoundError):
             return Settings()
         raise
+    if writer := other_writer(path):
+        hint = f"chmod go-w {path.parent} {path}, or give both to your account"
+        unused = Diagnostic(f"can be changed by {writer}, so it is not used", str(path), hint)
+        if lenient:
+            return Settings(problems=(unused,), in_doubt={"": str(unused)})
+        raise WrongConfiguration((unused,))
     return parse(text, str(path), lenient)
 
 
@@ -324,7 +344,8 @@ def _connection(name: str, found: Any, where: str, own: Sequence[str]) -> SavedC
         if not re.fullmatch(r"[^\s:@/]+", label) or visible(label) != label:
             hint = "invalid: spaces, control characters, :, @ and /"
             raise Diagnostic(f"{key}.names: {label!r} is not a name", where, hint)
-    return SavedConnection(name, url, names, _units(f"{key}.units", table.get("units", {}), where, own))
+    scales = _units(f"{key}.units", table.get("units", {}), where, own)
+    return SavedConnection(name, url, names, scales, os.path.abspath(os.path.dirname(where)))
 
 
 def _guards(found: Any, where: str) -> Guarding:

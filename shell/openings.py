@@ -120,13 +120,12 @@ class Openings:
         """The URL of an open bus, without the name of a saved connection, and with the stable name of its port."""
         connection = self._workspace.of(bus).connection
         assert connection is not None, bus.name  # only a search has none, and keeps its bus for itself
-        saved = self._workspace.settings.connections.get(connection.name)
-        text = saved.url if saved is not None else connection.text
-        if connection.scheme == SIMULATED and not connection.bus:
-            return f"{text.partition('?')[0]}#{self._workspace.of(bus).in_cell}"
+        if connection.scheme == SIMULATED:
+            text = connection.anchored  # a saved connection is opened from any folder
+            return text if connection.bus else f"{text.partition('?')[0]}#{self._workspace.of(bus).in_cell}"
         if connection.scheme == "serial":
-            return text.replace(connection.target, port_name(connection), 1)
-        return text
+            return connection.text.replace(connection.target, port_name(connection), 1)
+        return connection.text
 
     async def raw_on(self, bus: Bus) -> None:
         """Put an open bus into raw mode. Raises TransportLost where it is lost."""

@@ -83,7 +83,7 @@ def _counted(folder: Path) -> dict[str, int]:
 
 async def _write_files(folder: Path, number: int) -> None:
     """Record, set keys, log and type until the kill."""
-    settings = Settings({}, folder / "config", folder / "state")
+    settings = Settings({}, folder / "config", folder / "state", data=folder / "data")
     session, history = Session(settings), History(settings.history)
     await session.open(f"sim:{folder / 'cell.toml'}")
     os.chdir(folder)
@@ -154,7 +154,7 @@ async def _serve(folder: Path) -> None:
 
 async def _opened(folder: Path) -> tuple[Session, list[str]]:
     said: list[str] = []
-    session = Session(Settings({}, folder / "config", folder / "state"))
+    session = Session(Settings({}, folder / "config", folder / "state", data=folder / "data"))
     session.subscribe(lambda event: said.append(event.text) if isinstance(event, Notified) else None)
     await session.open(f"serial:{folder / 'w.tty'}?baud=115200&drives=a&party=1")
     return session, said

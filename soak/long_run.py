@@ -182,7 +182,7 @@ def _write(folder: Path, served: bool) -> None:
 
 
 def _session(folder: Path) -> Session:
-    return Session(Settings({}, folder / "config", folder / "state"))
+    return Session(Settings({}, folder / "config", folder / "state", data=folder / "data"))
 
 
 def resident() -> int:

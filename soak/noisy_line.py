@@ -148,7 +148,7 @@ class NoisyLine:
         return sum(each.boots for each in self.witnesses.values())
 
     async def _open(self) -> None:
-        settings = Settings({}, self._folder / "config", self._folder / "state")
+        settings = Settings({}, self._folder / "config", self._folder / "state", data=self._folder / "data")
         self.session = Session(settings, reconnect=True)
         await self._opener(self.session)
         [self.bus] = self.session.buses.values()

@@ -149,8 +149,9 @@ def _states(tmp_path_factory):
 
 @pytest.fixture(autouse=True)
 def _state_folder(_states, request):
-    """A state folder for each test, created on first use."""
-    os.environ["MULTIDROP_STATE_DIR"] = f"{_states}/{zlib.crc32(request.node.nodeid.encode()):08x}"
+    """A state folder and a data folder for each test, created on first use."""
+    folder = f"{_states}/{zlib.crc32(request.node.nodeid.encode()):08x}"
+    os.environ["MULTIDROP_STATE_DIR"], os.environ["MULTIDROP_DATA_DIR"] = folder, f"{folder}-data"
 
 
 @pytest.fixture

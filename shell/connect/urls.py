@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
@@ -75,6 +76,12 @@ class Connection:
         return self.name or (PurePath(self.target).name if self.target else self.host) or self.scheme
 
     @property
+    def anchored(self) -> str:
+        """The text with the whole path of a cell file, so that it means the same in any folder."""
+        written = _parsed(self.text).target if self.scheme == "sim" else ""
+        return self.text.replace(written, os.path.abspath(self.target), 1) if written else self.text
+
+    @property
     def by_port(self) -> str:
         """The name of its bus beside another one of the same host; empty where no port tells them apart."""
         return f"{self.short}-{self.port}" if self.port and not (self.name or self.target) else ""
@@ -86,7 +93,7 @@ def parse(text: str, saved: Mapping[str, SavedConnection] | None = None) -> Conn
     if saved and text in saved:
         found = saved[text]
         try:
-            return replace(parse(found.url), name=found.name, labels=found.names)
+            return replace(_anchored(parse(found.url), found.folder), name=found.name, labels=found.names)
         except Diagnostic as problem:
             raise Diagnostic(str(problem), f"connection {found.name}") from None
     try:
@@ -96,6 +103,15 @@ def parse(text: str, saved: Mapping[str, SavedConnection] | None = None) -> Conn
             hint = "write it without the password; for ssh, set up a key with ssh-copy-id"
             raise Diagnostic("no URL here has a password", url_without_secrets(text), hint) from None
         raise Diagnostic(problem.message, without_secrets(problem.where), problem.hint) from None
+
+
+def _anchored(connection: Connection, folder: str) -> Connection:
+    """Start a relative path at a folder (empty: the current one). The name of a port, as COM3, is not a path."""
+    path = connection.target
+    is_path = connection.scheme == "sim" or (connection.scheme == "serial" and re.search(r"[/\\]|^\.", path))
+    if not path or not is_path:
+        return connection
+    return replace(connection, target=os.path.abspath(os.path.join(folder, os.path.expanduser(path))))
 
 
 def _parsed(text: str) -> Connection:

@@ -20,7 +20,7 @@ from typing import Any, NamedTuple
 
 from multidrop.dialects import Diagnostic
 from multidrop.dialects.files import opened, why
-from multidrop.macros.atomic import make_folder
+from multidrop.macros.atomic import private_folder, read_private, write_atomically
 from multidrop.shell.configuration import Settings
 from multidrop.shell.secrets import without_secrets
 
@@ -138,7 +138,7 @@ def fresh(settings: Settings) -> Path:
     """The name of a new log in the folder; the oldest ones there give way. Raises Diagnostic."""
     place = folder(settings)
     try:
-        make_folder(place)
+        private_folder(place)
         # Remove the oldest logs of the folder until the rest fits.
         total = 0
         for path in sorted((each for each in place.iterdir() if ENDING in each.name), key=_changed, reverse=True):
@@ -157,16 +157,14 @@ def note(settings: Settings, path: Path) -> None:
             return
         listed = folder(settings) / "elsewhere"
         known = [each for each in _elsewhere(settings) if each != path.resolve()]
-        make_folder(listed.parent)
+        private_folder(listed.parent)
         text = "".join(f"{each}\n" for each in [*known, path.resolve()][-NOTED:])
-        beside = listed.with_name(f".elsewhere-{PROCESS}")
-        beside.write_text(text, encoding="utf-8", errors="surrogateescape")
-        beside.replace(listed)
+        write_atomically(listed, text.encode("utf-8", "surrogateescape"), 0o600, synced=False, private=True)
 
 
 def _elsewhere(settings: Settings) -> list[Path]:
     try:
-        text = (folder(settings) / "elsewhere").read_text(encoding="utf-8", errors="surrogateescape")
+        text = read_private(folder(settings) / "elsewhere").decode("utf-8", "surrogateescape")
     except OSError:
         return []
     return [Path(line) for line in text.splitlines() if line]

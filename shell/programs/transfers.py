@@ -212,7 +212,7 @@ class _Download:
         head += [] if program else ["the drive holds no program and no variable"]
         text = "".join(f"{line}\n" for line in (*(f"{self._programs.remark} {line}" for line in head), *program))
         ending = drive.program_files.endings[0]
-        path = await asyncio.to_thread(write_backup, workspace.settings.state, at, bus, drive.address, ending, text)
+        path = await asyncio.to_thread(write_backup, workspace.settings.data, at, bus, drive.address, ending, text)
         workspace.notify(f"backup: {path}", bus=bus, outcome=True)
         return path
 

@@ -23,7 +23,7 @@ from pathlib import Path
 from multidrop.dialects import Diagnostic
 from multidrop.dialects.files import lines_of
 from multidrop.dialects.text import counted, visible
-from multidrop.macros.atomic import make_folder, write_atomically
+from multidrop.macros.atomic import open_private, private_folder, read_private, write_atomically
 from multidrop.shell.events import FAILURES
 from multidrop.shell.line_syntax import NOWHERE, DriveLine, Place, TypedLine, VerbLine, parse
 
@@ -53,7 +53,7 @@ class History:
     def lines(self) -> list[str]:
         """The lines of the file, oldest first."""
         try:
-            found = self.path.read_text(encoding="utf-8", errors="replace").split("\n")
+            found = read_private(self.path).decode("utf-8", "replace").replace("\r\n", "\n").split("\n")
         except OSError:
             return []
         lines = [line for line in found[:-1] if _whole(line)]
@@ -66,7 +66,7 @@ class History:
         if not line.strip() or "\n" in line or "\r" in line:
             return
         with contextlib.suppress(OSError):
-            make_folder(self.path.parent)
+            private_folder(self.path.parent)
             with self._opened() as (descriptor, _):
                 os.write(descriptor, f"{_gap(descriptor)}{line}\n".encode("utf-8", "replace"))
 
@@ -75,12 +75,12 @@ class History:
 
         def write_last(data: bytes) -> None:
             lines = [line for line in data.split(b"\n")[:-1] if _whole(line.decode("utf-8", "replace"))]
-            write_atomically(self.path, b"".join(line + b"\n" for line in lines[-KEPT:]), PRIVATE)
+            write_atomically(self.path, b"".join(line + b"\n" for line in lines[-KEPT:]), PRIVATE, private=True)
 
         if sys.platform == "win32":  # where an open file is not replaced
             with contextlib.suppress(OSError), self._alone() as locked:
                 if locked:
-                    write_last(self.path.read_bytes())
+                    write_last(read_private(self.path))
             return
         with contextlib.suppress(OSError), self._opened() as (descriptor, locked):
             if not locked:
@@ -88,7 +88,7 @@ class History:
             with open(descriptor, "rb", closefd=False) as old:
                 write_last(old.read())
                 late = old.read()  # from a process that had the file open, and no lock
-            with open(self.path, "ab") as new:
+            with open(open_private(self.path, os.O_WRONLY | os.O_APPEND), "ab") as new:
                 new.write(late)
 
     @contextlib.contextmanager
@@ -103,7 +103,7 @@ class History:
                     os.close(descriptor)
             return
         for tried in range(TRIES):
-            descriptor = os.open(self.path, os.O_RDWR | os.O_APPEND | os.O_CREAT, PRIVATE)
+            descriptor = open_private(self.path, os.O_RDWR | os.O_APPEND | os.O_CREAT, PRIVATE)
             try:
                 locked = _lock(descriptor)
                 if tried + 1 == TRIES or _is_at(descriptor, self.path):

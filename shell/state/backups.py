@@ -1,4 +1,7 @@
-"""Backups of texts: drafts of an editor, sources of what was downloaded, and what a drive held before a download."""
+"""Backups of texts: drafts of an editor, sources of what was downloaded, and what a drive held before a download.
+
+The last are the user's own: they lie in the data folder, the others in the state folder.
+"""
 
 from __future__ import annotations
 
@@ -80,13 +83,13 @@ class Sources:
 # Backups of what drives hold
 
 
-def write_backup(state: Path, at: datetime, bus: str, address: str, ending: str, text: str) -> Path:
+def write_backup(data: Path, at: datetime, bus: str, address: str, ending: str, text: str) -> Path:
     """Write a new text file that can be downloaded; return its absolute path. Raises Diagnostic. For a thread.
 
     Its name has date, time, bus and drive, then a number. It appears whole and is on the disk on return. No file is
     ever replaced or deleted here.
     """
-    folder = (state / "backups").absolute()
+    folder = (data / "backups").absolute()
     parts = (f"{at:%Y-%m-%d-%H%M%S}", quote(bus, safe=""), quote(address, safe=""))
     name = "-".join(filter(None, parts))
     try:
@@ -100,5 +103,5 @@ def write_backup(state: Path, at: datetime, bus: str, address: str, ending: str,
                 number += 1
                 path = folder / f"{name}-{number}{ending}"
     except OSError as problem:
-        hint = "nothing was sent; free the disk, or name another folder in MULTIDROP_STATE_DIR"
+        hint = "nothing was sent; free the disk, or name another folder in MULTIDROP_DATA_DIR"
         raise Diagnostic(f"the backup cannot be written: {why(problem)}", str(folder), hint) from None

@@ -25,7 +25,7 @@ from urllib.parse import quote
 from multidrop.dialects import DriveState, Owed
 from multidrop.dialects.state import Remembered
 from multidrop.drives.port_journal import Keeper
-from multidrop.macros.atomic import make_folder, safe_name, sync_folder
+from multidrop.macros.atomic import open_private, private_folder, safe_name, sync_folder
 from multidrop.shell.state.store import Damaged, Store, digest
 
 if sys.platform == "win32":
@@ -54,8 +54,6 @@ class PortMemory:
         """The baud rate at which they replied last; 0: not known, or the port has none."""
         self.remark = ""
         self._store, self._name = Store(path.parent), path.name
-        if not path.is_file():  # a pipe in its place would be waited for
-            return
         try:
             self.drives, self.baud = self._store.load(self._name, self._parsed)
         except Damaged:
@@ -195,9 +193,8 @@ class PortState(Keeper):
 
         Raises BlockingIOError if another process holds it, OSError.
         """
-        make_folder(self._store.folder)  # a record in it is to survive a power cut
-        flags = os.O_RDWR | os.O_CREAT | getattr(os, "O_CLOEXEC", 0) | getattr(os, "O_BINARY", 0)
-        line = os.open(self._store.folder / f"{self._name}.line", flags, 0o600)
+        private_folder(self._store.folder)  # a record in it is to survive a power cut
+        line = open_private(self._store.folder / f"{self._name}.line", os.O_RDWR | os.O_CREAT)
         try:
             if sys.platform == "win32":
                 os.lseek(line, LINE, os.SEEK_SET)

@@ -13,7 +13,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, TypeVar
 
-from multidrop.macros.atomic import write_atomically
+from multidrop.macros.atomic import read_private, write_atomically
 
 T = TypeVar("T")
 
@@ -31,7 +31,7 @@ class Store:
     def write(self, name: str, content: object, indent: int | None = None, *, synced: bool = True) -> None:
         """Replace a file, whole or not at all. Raises OSError. For a thread where it is `synced`."""
         text = json.dumps(content, indent=indent) + ("\n" if indent else "")
-        write_atomically(self.folder / name, text.encode(), 0o600, synced=synced)
+        write_atomically(self.folder / name, text.encode(), 0o600, synced=synced, private=True)
         if self._most:
             with contextlib.suppress(OSError):  # this file is written, whichever session deletes the old ones
                 for old in sorted(self.folder.glob("*.json"), key=lambda each: each.stat().st_mtime)[: -self._most]:
@@ -40,7 +40,7 @@ class Store:
     def load(self, name: str, parse: Callable[[Any], T]) -> T:
         """Parse a file. Raises OSError, and Damaged where `parse` fails."""
         try:
-            return parse(json.loads((self.folder / name).read_text(encoding="utf-8")))
+            return parse(json.loads(read_private(self.folder / name).decode()))
         except (ValueError, TypeError, KeyError, RecursionError):
             raise Damaged(name) from None
 

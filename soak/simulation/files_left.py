@@ -15,7 +15,14 @@ from soak.simulation.history import History
 
 def unreadable(folder: Path, when: str, history: History) -> list[str]:
     """The files of a state and a configuration folder that are damaged, `when` they were found."""
-    return [f"{when}: {each}" for each in (*_state(folder / "state", history), *_macros(folder / "config" / "macros"))]
+    return [
+        f"{when}: {each}"
+        for each in (
+            *_state(folder / "state", history),
+            *_state(folder / "data", history),
+            *_macros(folder / "config" / "macros"),
+        )
+    ]
 
 
 def _state(state: Path, history: History) -> Iterator[str]:
@@ -50,7 +57,7 @@ def breaches_in_logs(folder: Path, history: History) -> Iterator[str]:
 
 def backups(folder: Path) -> dict[str, str]:
     """The backups of programs that are on the disk, by path."""
-    found = sorted((folder / "state" / "backups").rglob("*"))
+    found = sorted((folder / "data" / "backups").rglob("*"))
     return {str(path): path.read_text() for path in found if path.is_file() and path.suffix != ".tmp"}
 
 

@@ -230,7 +230,7 @@ class World:
         """The settings of a person, who has the connections of all lines."""
         text = "".join(f'[connections.{each.name}]\nurl = "{self._url(each)}"\n' for each in self.places)
         text += "[log]\nalways = true\nmegabytes = 0.02\nfiles = 3\n" * (Random(f"{self.seed} log").random() < LOGGED)
-        return replace(parse(text, "world"), folder=folder / "config", state=folder / "state")
+        return replace(parse(text, "world"), folder=folder / "config", state=folder / "state", data=folder / "data")
 
     def _url(self, place: Place) -> str:
         """How a person names a line: a serial port by the link that follows it, or by the node that it has now."""

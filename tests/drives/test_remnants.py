@@ -99,7 +99,7 @@ class Left(CellSession):
     def __init__(self, folder, stale, owed=(), **settings):
         super().__init__(folder, bus("line", *(party(name, **settings) for name in "ab")))
         self.stale, self.owed = stale, owed
-        self.session = Session(Settings({}, folder / "config", folder / "state"), self.open)
+        self.session = Session(Settings({}, folder / "config", folder / "state", data=folder / "data"), self.open)
         self.session.questions.agreed = True
         self.session.subscribe(self.events.append)
 

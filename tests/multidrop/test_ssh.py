@@ -54,7 +54,7 @@ async def test_a_drive_behind_a_real_sshd_moves_and_comes_back_after_each_kill_w
 ) -> None:
     with ssh_server(tmp_path) as server, multidrop.simulate(text=CELL) as cell:
         port = cell.url(scheme="pty")
-        session = Session(Settings({}, tmp_path / "conf", tmp_path / "state"), reconnect=True)
+        session = Session(Settings({}, tmp_path / "conf", tmp_path / "state", data=tmp_path / "data"), reconnect=True)
         (bus,) = await session.open(f"ssh://127.0.0.1:{server}{port}?drives=a")
         await session.run("MR 5120")
         await session.run("/wait stopped")

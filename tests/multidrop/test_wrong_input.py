@@ -359,7 +359,7 @@ def test_a_nasty_line_is_carried_out_or_told(
 
     @in_virtual_time
     async def typed() -> None:
-        session = Session(Settings({}, tmp_path / "conf", tmp_path / "state"))
+        session = Session(Settings({}, tmp_path / "conf", tmp_path / "state", data=tmp_path / "data"))
         await session.open("sim:cell.toml?timeout=0.3")
         pairs = enumerate(product(LINES, NASTY))
         for line in (each.replace("%s", text) for number, (each, text) in pairs if nightly or number % 5 == 0):

@@ -155,7 +155,7 @@ async def test_a_planted_deviation_is_found_over_modbus(tmp_path, question):
         floor = RunningFloor(Floor(read(MODBUS, "cell")))
         stack.callback(floor.close)
         [served] = await serve_bus(floor, floor.floor.cell.buses[0], stack)
-        session = Session(Settings({}, tmp_path / "config", tmp_path / "state"))
+        session = Session(Settings({}, tmp_path / "config", tmp_path / "state", data=tmp_path / "data"))
         stack.push_async_callback(session.close)
         await session.open(served.endpoint, "w")
         sent, answer = [], ModbusPort._answer

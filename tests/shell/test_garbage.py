@@ -28,7 +28,7 @@ class Desk:
 
     def __init__(self, folder) -> None:
         self.folder = folder
-        self.session = Session(Settings({}, folder / "conf", folder / "state"))
+        self.session = Session(Settings({}, folder / "conf", folder / "state", data=folder / "data"))
         self.answers: list[str] = []
         self.session.subscribe(self._heard)
 

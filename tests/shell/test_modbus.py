@@ -44,7 +44,7 @@ async def session(tmp_path):
         floor = RunningFloor(Floor(load(tmp_path / "cell.toml")))
         stack.callback(floor.close)
         served = [each for bus in floor.floor.cell.buses for each in await serve_bus(floor, bus, stack)]
-        made = Session(Settings({}, tmp_path / "config", tmp_path / "state"))
+        made = Session(Settings({}, tmp_path / "config", tmp_path / "state", data=tmp_path / "data"))
         stack.push_async_callback(made.close)
         made.questions.agreed = True
         made.events = []

@@ -29,7 +29,7 @@ async def opened(folder, *drives, query="", reconnect=False):
     """A line in raw mode from the beginning."""
     shop = CellSession(folder, bus("line", *(drives or (ALONE,)), baud=0))
     await shop.session.close()
-    settings = Settings({}, folder / "config", folder / "state")
+    settings = Settings({}, folder / "config", folder / "state", data=folder / "data")
     shop.session = Session(settings, raw=True, reconnect=reconnect)
     shop.session.subscribe(shop.events.append)
     await shop.session.open_all([shop.url + query])

@@ -28,7 +28,7 @@ async def session(tmp_path, monkeypatch):
         "line": SavedConnection("line", "sim:cell.toml#press?timeout=0.3", {"b": "gantry"}),
         "door": SavedConnection("door", "sim:cell.toml#eth", {"!": "door"}),
     }
-    made = Session(Settings(saved, tmp_path / "config", tmp_path / "state"))
+    made = Session(Settings(saved, tmp_path / "config", tmp_path / "state", data=tmp_path / "data"))
     made.events = []
     made.subscribe(made.events.append)
     yield made
@@ -114,14 +114,14 @@ async def test_a_drive_without_an_address_is_the_bus(session):
         await session.run("@door:x MR 100")
 
 
-async def test_an_unplugged_line_is_told_once_and_fails_what_follows(session):
+async def test_an_unplugged_line_is_told_once_and_fails_what_follows(session, tmp_path):
     await session.open("line")
     await session.run("SL 1000")
     await session.run("/sim unplug press")
     with pytest.raises(TransportLost):
         await session.run("/wait stopped")
     failed = [event for event in session.events if isinstance(event, Failed)]
-    assert {event.text for event in failed} == {"sim:cell.toml#press was lost: unplugged"}
+    assert {event.text for event in failed} == {f"sim:{tmp_path}/cell.toml#press was lost: unplugged"}
     warnings = [event.text for event in session.events if isinstance(event, Notified) and event.warning]
     assert all("EM=2 cannot distinguish" in text for text in warnings)  # found at opening
 

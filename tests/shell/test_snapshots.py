@@ -104,7 +104,7 @@ MACHINES = {
 
 async def taken(folder: Path, url: str, name: str) -> tuple[str, list[str]]:
     """The snapshot of a URL, and the narration."""
-    session = Session(Settings({}, folder / "config", folder / "state"))
+    session = Session(Settings({}, folder / "config", folder / "state", data=folder / "data"))
     told: list[str] = []
     session.subscribe(lambda event: told.append(event.text) if isinstance(event, Notified) else None)
     await session.open(url)
@@ -129,7 +129,7 @@ async def test_a_snapshot_opened_and_taken_again_gives_the_same_file(tmp_path, m
 
 async def prompted(url: str, folder: Path, *lines: str) -> list[str]:
     """What a machine prints, prompt for prompt."""
-    session = Session(Settings({}, folder / "config", folder / "state"))
+    session = Session(Settings({}, folder / "config", folder / "state", data=folder / "data"))
     await session.open(url)
     try:
         return [printed for line in lines for printed in await session.drive().send(line)]

@@ -68,7 +68,7 @@ def moves(device: Any, now: float) -> bool:
 async def session_on(folder: Path, cell: str, *, opened: bool = True, agreed: bool = False) -> AsyncIterator[Any]:
     """A session on a cell, opened unless told otherwise; `events` is all that it told."""
     (folder / "cell.toml").write_text(cell)
-    session: Any = Session(Settings({}, folder / "config", folder / "state"))
+    session: Any = Session(Settings({}, folder / "config", folder / "state", data=folder / "data"))
     session.questions.agreed, session.events = agreed, []
     session.subscribe(session.events.append)
     try:
@@ -110,7 +110,7 @@ class CellSession:
             scales = {axis: scale(found, own) for axis, found in units.items()}
             saved, self.url = {"saved": SavedConnection("saved", self.url, {}, scales)}, "saved"
         off = Guarding(off=frozenset(guards))
-        settings = Settings(saved, folder / "config", folder / "state", off, own_units=own)
+        settings = Settings(saved, folder / "config", folder / "state", off, own_units=own, data=folder / "data")
         self.session = Session(settings, reconnect=reconnect)
         self.session.questions.agreed = True
         self._open = ExitStack()

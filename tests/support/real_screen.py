@@ -21,7 +21,7 @@ def real_app(
     folder: Path, url: str = "sim:#press", reconnect: bool = False, driver: type[Driver] | None = None
 ) -> MultidropApp:
     """An app that opens this URL; its settings and state are in the folder. Close its session in the end."""
-    settings = Settings(folder=folder / "config", state=folder / "state")
+    settings = Settings(folder=folder / "config", state=folder / "state", data=folder / "data")
     session = Session(settings, reconnect=reconnect)
     return MultidropApp(session, [url], Assist(session, settings), driver)
 

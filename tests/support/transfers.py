@@ -18,7 +18,7 @@ def shop_with(folder: Path, text: str = FILE, *buses: str, reconnect: bool = Fal
 
 
 def kept(folder: Path) -> list[Path]:
-    return sorted((folder / "state" / "backups").glob("*.*"), key=lambda each: each.stat().st_mtime_ns)
+    return sorted((folder / "data" / "backups").glob("*.*"), key=lambda each: each.stat().st_mtime_ns)
 
 
 async def load(shop: CellSession, folder: Path, *options: str, drive: str = "a") -> list[str]:

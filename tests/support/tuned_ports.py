@@ -61,7 +61,7 @@ class Port:
     """A serial port with simulated drives on it, and a session; `opened` lists each opening: language, baud rate."""
 
     def __init__(self, folder: Path, cell: str, repeats: bool = False) -> None:
-        self.session = Session(Settings({}, folder / "config", folder / "state"))
+        self.session = Session(Settings({}, folder / "config", folder / "state", data=folder / "data"))
         self.events: list[Any] = []
         self.session.subscribe(self.events.append)
         self.floor = RunningFloor(Floor(read(cell, "cell.toml")))

@@ -92,7 +92,7 @@ async def typist(folder: Path, output: Terminal | None = None) -> AsyncIterator[
     """Run a prompt whose settings and state are in this folder. `output`: its terminal; a wide one by default."""
     if sys.platform == "win32":  # prompt_toolkit waits for keys in a thread there, for which virtual time does not wait
         left_out("fork")
-    session = Session(Settings(folder=folder / "config", state=folder / "state"))
+    session = Session(Settings(folder=folder / "config", state=folder / "state", data=folder / "data"))
     with create_pipe_input() as keys, create_app_session(input=keys, output=output or Wide()) as terminal:
         made = Typist(session, keys, terminal)
         try:

@@ -346,4 +346,4 @@ async def test_a_program_is_mended_downloaded_traced_and_stopped(folder: Path) -
         await until(pilot, lambda: "velocity 0" in page.query_one(".banner").plain)  # type: ignore[attr-defined]
         await until(pilot, lambda: "▶" not in page.editor.render_line(3).text)
         assert app.screen is page and page.editor.text == LONG
-        assert next(iter((folder / "state" / "backups").iterdir())).suffix == ".mxt"
+        assert next(iter((folder / "data" / "backups").iterdir())).suffix == ".mxt"

@@ -162,7 +162,7 @@ async def test_raw_mode_shows_the_bytes_and_names_the_bus(tmp_path: Path) -> Non
 async def test_what_no_frame_showed_before_a_bus_was_there_is_on_its_page(
     tmp_path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    settings = Settings(folder=tmp_path / "config", state=tmp_path / "state")
+    settings = Settings(folder=tmp_path / "config", state=tmp_path / "state", data=tmp_path / "data")
     session = Session(settings)
     app = MultidropApp(session, [], Assist(session, settings))
     async with app.run_test(size=(80, 24)) as pilot:

@@ -40,7 +40,7 @@ async def test_open_see_why_not_search_and_talk_are_three_keys(tmp_path: Path, m
 
     monkeypatch.setattr(opening, "_transport", transport)
     monkeypatch.setattr(scanning, "WINDOW", 0.002)
-    settings = Settings(folder=tmp_path / "config", state=tmp_path / "state")
+    settings = Settings(folder=tmp_path / "config", state=tmp_path / "state", data=tmp_path / "data")
     session = Session(settings, reconnect=True)
     app: Any = MultidropApp(session, [], Assist(session, settings))
     try:

@@ -39,7 +39,7 @@ BORDERS = "│├┤┼─┬┴ "
 async def the_demo(size: tuple[int, int]) -> AsyncIterator[tuple[Pilot[int], MultidropApp]]:
     """The app on the demo cell, two seconds after its lines are open."""
     with tempfile.TemporaryDirectory() as folder:
-        settings = Settings({}, Path(folder) / "config", Path(folder) / "state")
+        settings = Settings({}, Path(folder) / "config", Path(folder) / "state", data=Path(folder) / "data")
         session = Session(settings)
         app = MultidropApp(session, ["sim:"], Assist(session, settings))
         try:

@@ -89,7 +89,7 @@ class Shop:
 
     def __init__(self, folder: Path, kind: type[FakeSsh]) -> None:
         self.kind, self.said = kind, list[str]()
-        self.session = Session(Settings({}, folder / "config", folder / "state"), self.opener)
+        self.session = Session(Settings({}, folder / "config", folder / "state", data=folder / "data"), self.opener)
         self.session.questions.agreed = True
         self.session.subscribe(lambda event: self.said.append(event.text) if isinstance(event, Notified) else None)
 

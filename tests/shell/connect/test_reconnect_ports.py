@@ -65,7 +65,9 @@ class ServedCell:
 
 @asynccontextmanager
 async def session(folder: Path, **more: Any) -> AsyncIterator[tuple[Session, list[str]]]:
-    made = Session(Settings({}, folder / "config", folder / "state"), **{"reconnect": True, **more})
+    made = Session(
+        Settings({}, folder / "config", folder / "state", data=folder / "data"), **{"reconnect": True, **more}
+    )
     said: list[str] = []
     made.subscribe(lambda event: said.append(event.text) if isinstance(event, Notified | Printed) else None)
     try:

@@ -32,7 +32,9 @@ class Desk:
         self.floors = {name: RunningFloor(Floor(read(cell, "cell.toml"))) for name, cell in cells.items()}
         self.absent: set[str] = set()
         self.pipes: list[Any] = []
-        self.session: Any = Session(Settings({}, folder / "config", folder / "state"), reconnect=True)
+        self.session: Any = Session(
+            Settings({}, folder / "config", folder / "state", data=folder / "data"), reconnect=True
+        )
         self.asked: list[str] = []
         self.agrees = True
         self.session.front = Front(self.ask, screen=self.screen)
@@ -144,7 +146,9 @@ async def test_a_search_that_a_stop_ends_as_it_begins_gives_the_line_back(tmp_pa
 
 async def test_a_simulated_line_is_searched_and_comes_back_as_it_was(tmp_path):
     (tmp_path / "cell.toml").write_text(bus("b", party("a")))
-    session: Any = Session(Settings({}, tmp_path / "config", tmp_path / "state"), reconnect=True)
+    session: Any = Session(
+        Settings({}, tmp_path / "config", tmp_path / "state", data=tmp_path / "data"), reconnect=True
+    )
 
     async def agree(question: str) -> bool:
         return True

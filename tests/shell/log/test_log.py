@@ -24,7 +24,9 @@ class FakeSession:
     def __init__(self, folder, **limits):
         self.callbacks, self.told, self.log = [], [], None
         self.stops, self.stopped_at, self.buses, self.raw = 0, 1.0, {}, {}
-        self.settings = Settings({}, folder / "config", folder / "state", log=LogSettings(**limits))
+        self.settings = Settings(
+            {}, folder / "config", folder / "state", data=folder / "data", log=LogSettings(**limits)
+        )
 
     def subscribe(self, callback):
         self.callbacks.append(callback)

@@ -52,7 +52,7 @@ personality = "MDIX"
 
 async def opened(tmp_path, text):
     (tmp_path / "cell.toml").write_text(text)
-    made = Session(Settings({}, tmp_path / "config", tmp_path / "state"))
+    made = Session(Settings({}, tmp_path / "config", tmp_path / "state", data=tmp_path / "data"))
     made.questions.agreed, made.events = True, []
     made.subscribe(made.events.append)
     await made.open(f"sim:{tmp_path / 'cell.toml'}")

@@ -315,7 +315,7 @@ async def test_no_program_of_the_replacement_stays_beside_that_of_the_file(tmp_p
     async with CellSession(tmp_path, unit(OWN)) as cell:
         await applied(cell, tmp_path)
         assert next(each.device for each in cell.floor.floor.drives).execute("L", 1e3).lines[-1] == "20  E"
-        assert "ZZ = 500" in next((tmp_path / "state" / "backups").glob("*.mxt")).read_text()
+        assert "ZZ = 500" in next((tmp_path / "data" / "backups").glob("*.mxt")).read_text()
 
 
 async def test_a_program_of_the_replacement_is_no_part_of_a_machine_without_one(tmp_path):

@@ -24,7 +24,7 @@ WRONG = "PG 1\nLB G1\nmr 5\nMR 6\nQ9=1\nE\nPG\n"
 @pytest.fixture
 async def session(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> AsyncIterator[Session]:
     monkeypatch.chdir(tmp_path)
-    made = Session(Settings({}, tmp_path / "config", tmp_path / "state"))
+    made = Session(Settings({}, tmp_path / "config", tmp_path / "state", data=tmp_path / "data"))
     yield made
     await made.close()
 

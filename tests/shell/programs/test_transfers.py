@@ -19,7 +19,7 @@ async def test_a_download_says_what_it_has_done(tmp_path: Path, shop: CellSessio
     told = await load(shop, tmp_path)
     (path,) = kept(tmp_path)
     assert told == [
-        f"backup: state/backups/{path.name}",
+        f"backup: data/backups/{path.name}",
         "a: p.mxt downloaded, 7 lines",
         "a: not saved: what is not saved is lost at power-off; --save sends S",
         "a: verified, 4 lines",

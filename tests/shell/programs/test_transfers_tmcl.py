@@ -34,7 +34,7 @@ async def test_a_download_says_what_it_has_done_and_its_backup_brings_back_what_
         told = await load(shop, tmp_path)
         (path,) = kept(tmp_path)
         assert told == [
-            f"backup: state/backups/{path.name}",
+            f"backup: data/backups/{path.name}",
             "1: p.tmc downloaded, 5 lines",
             "1: verified, 5 lines",
         ]

@@ -250,7 +250,7 @@ async def test_nothing_is_polled_after_the_end(tmp_path: Path) -> None:
 async def session(tmp_path: Path):
     (tmp_path / "here.toml").write_text(bus("press", party("a"), baud=0))
     (tmp_path / "silent.toml").write_text(bus("far", party("b"), baud=0))
-    made = Session(Settings({}, tmp_path / "config", tmp_path / "state"), reconnect=True)
+    made = Session(Settings({}, tmp_path / "config", tmp_path / "state", data=tmp_path / "data"), reconnect=True)
     yield made
     await made.close()
 
