@@ -26,7 +26,7 @@ class Copy(NamedTuple):
 
     @classmethod
     def parse(cls, found: Any) -> Copy:
-        return cls(*(str(found[key]) for key in ("file", "text", "at")), str(found.get("base", "")))
+        return cls(str(found["file"]), str(found["text"]), str(found["at"]), str(found.get("base", "")))
 
 
 class Drafts:

@@ -13,6 +13,7 @@ import pytest
 from textual import events
 from textual.pilot import Pilot
 
+from multidrop.dialects import Diagnostic
 from multidrop.shell.events import Phase, ProgramRead, ProgramSeen
 from multidrop.shell.programs.edited_file import EditedFile, Outside
 from multidrop.shell.state.backups import Copy, Drafts
@@ -21,7 +22,7 @@ from multidrop.tui.screens import program_file
 from multidrop.tui.screens.dialogs import Confirm, Search
 from multidrop.tui.screens.macros import MacrosPage
 from multidrop.tui.screens.program import ProgramPage
-from tests.support.fake_session import FakeAssist, FakeSession, demo_session, settle
+from tests.support.fake_session import FakeAssist, FakeSession, demo_session, on_screen, settle
 from tests.support.real_screen import real_screen, until
 from tests.support.until import PATIENCE
 
@@ -99,8 +100,14 @@ def told(pilot: Pilot[int], words: str) -> int:
 
 
 async def question(pilot: Pilot[int], title: str) -> Confirm:
-    await until(pilot, lambda: isinstance(pilot.app.screen, Confirm) and pilot.app.screen.focused is not None)
-    assert isinstance(pilot.app.screen, Confirm) and title in pilot.app.screen.heading
+    """Wait for a question that has the focus: it takes no key before."""
+
+    def asked() -> bool:
+        box = pilot.app.screen
+        return isinstance(box, Confirm) and title in box.heading and box.focused is not None
+
+    await until(pilot, asked)
+    assert isinstance(pilot.app.screen, Confirm)
     return pilot.app.screen
 
 
@@ -408,7 +415,7 @@ async def test_the_drive_holds_the_program_that_was_on_the_screen(folder: Path) 
         await until(pilot, lambda: told(pilot, "verified, 3 lines"))
         held = app.model.bus("eth").readout(app.session.selected.address).program.lines  # type: ignore[union-attr]
         assert [text.strip() for _, text in held] == ["LB G1", "MR 51200", "E"]
-        assert len(shown(pilot).findings.addresses) == 3
+        await until(pilot, lambda: len(shown(pilot).findings.addresses) == 3)
 
 
 # Macros
@@ -470,27 +477,41 @@ async def test_a_key_that_another_program_gave_to_another_macro_plays_it_at_its_
 
 async def test_the_page_of_macros_plays_the_lines_that_it_shows(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     pause(monkeypatch)
-    path = macro(folder, "PR 1")
+    macro(folder, "PR 1")
     async with with_macros(folder) as (pilot, app):
         await app.run_action("act.page('macros')")
         await until(pilot, lambda: isinstance(app.screen, MacrosPage) and "PR 1" in app.screen.lines("steps").plain)
         macro(folder, "PR 2")
         typed(pilot, "enter")
         await until(pilot, lambda: told(pilot, "has changed on the disk since it was shown here; nothing was sent"))
-        assert not told(pilot, "played")
+        assert not told(pilot, "round played")
         await until(pilot, lambda: "PR 2" in app.screen.lines("steps").plain)  # type: ignore[attr-defined]
         await settle(pilot)
         typed(pilot, "enter")
         await until(pilot, lambda: told(pilot, "macro m: 1 round played"))
-        path.write_text("wrong")
-        app.model.changed = True
+
+
+async def test_a_macro_whose_lines_could_not_be_shown_is_not_played() -> None:
+    session = demo_session()
+    load = session.macros.load
+
+    def broken(name: str) -> object:
+        raise Diagnostic("not TOML", f"{name}.toml:1", "correct the line")
+
+    session.macros.load = broken  # type: ignore[assignment,method-assign]
+    async with on_screen(session) as (pilot, app, _):
+        await app.run_action("act.page('macros')")
         await until(pilot, lambda: "✗" in app.screen.lines("macros").plain)  # type: ignore[attr-defined]
-        macro(folder, "PR 3")
+        session.macros.load = load  # type: ignore[method-assign]
+        session.time += 1
+        await pilot.press("enter")
+        await until(pilot, lambda: told(pilot, "not TOML") == 1)
+        assert session.lines == [] and told(pilot, "nothing was played") == 1
+        await until(pilot, lambda: "✗" not in app.screen.lines("macros").plain)  # type: ignore[attr-defined]
+        session.time += 1
         await settle(pilot)
-        typed(pilot, "enter")  # its lines were not shown
-        await until(pilot, lambda: told(pilot, "nothing was played") == 1)
-        await until(pilot, lambda: "PR 3" in app.screen.lines("steps").plain)  # type: ignore[attr-defined]
-        assert told(pilot, "round played") == 1
+        await pilot.press("enter")
+        await until(pilot, lambda: [line for line, _ in session.lines] == ["/play home-all"])
 
 
 async def test_a_macro_that_changed_is_named_when_it_is_read_again(folder: Path) -> None:

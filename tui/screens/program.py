@@ -79,6 +79,8 @@ class ProgramPage(Page):
         self._taking_in = False
         self._compared: tuple[object, str] = ((), "")
         """The lines of the drive to which the text was compared, and the product for which it was checked."""
+        self._checked: str | None = None
+        """The text of which the findings are."""
         self._warned = ""
         self._step: asyncio.Task[bool] | None = None
 
@@ -213,8 +215,13 @@ class ProgramPage(Page):
         found = await asyncio.to_thread(examined, grammar, shown, product, lines)
         self.take_text()
         if self.text is text and text.text == shown:
-            self.findings = found
+            self.findings, self._checked = found, shown
         return found
+
+    async def _look_at_text(self) -> None:
+        """Check the text now if it was edited since the last check: its lines have other addresses, and labels."""
+        if self.editor.text != self._checked:
+            await self._examine()
 
     async def _take_in(self) -> None:
         """Check the text, compare it with the drive's program, and keep a copy of it."""
@@ -332,11 +339,9 @@ class ProgramPage(Page):
             again = seen is Seen.READ
             facts = download_facts(text, findings, self.program, outside, again)
 
-            async def answered(line: str | None) -> None:
-                stops = self.host.session.stops
-                unsaved = text.file.new or shown != text.file.text
-                if line and (not unsaved or await self.file.save(shown)):
-                    self.start(line, real_text(shown), stops)
+            def answered(line: str | None) -> None:
+                if line:
+                    self.run_worker(self._download(line, text, shown, self.host.session.stops))
 
             title = f"Download {text.name} to {target or product}?"
             answers = [(each.line, f"{each.title:<38} {each.line}") for each in download_choices(text, target)]
@@ -344,6 +349,11 @@ class ProgramPage(Page):
             await self.app.push_screen(Confirm(title, facts, answers), answered)
         finally:
             self.host.keyboard.release(self)
+
+    async def _download(self, line: str, text: OpenText, shown: str, stops: int) -> None:
+        """Save the text that was shown, if the file has another one, and send it. `stops`: those before the answer."""
+        if not (text.file.new or shown != text.file.text) or await self.file.save(shown):
+            self.start(line, real_text(shown), stops)
 
     async def action_run(self) -> None:
         await self._choose("", "Run in")
@@ -354,8 +364,7 @@ class ProgramPage(Page):
             self.notify("No drive is selected: ^O chooses one")
             return
         program = self.program
-        if self.findings.pending:
-            await self._examine()
+        await self._look_at_text()
         found = run_choices(self._entries(), target_of(self.host.session), program)
         found = [each for each in found if only in each.line]
         known = "is this text" if self.findings.addresses else "may be another one than this text"
@@ -384,8 +393,7 @@ class ProgramPage(Page):
         row, target, program = self.editor.cursor_location[0], target_of(self.host.session), self.program
         if self.host.session.selected is None:
             return
-        if self.findings.pending:  # the addresses are those of the text before the last edit
-            await self._examine()
+        await self._look_at_text()
         if self._break_line(program) == row:
             self.start(with_target("/break", target, "off"))
             return

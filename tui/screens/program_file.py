@@ -7,6 +7,7 @@ not edited here; else a person is asked. Files are read in threads: a slow disk 
 from __future__ import annotations
 
 import asyncio
+from collections.abc import Coroutine
 from enum import Enum, auto
 from typing import Any, Protocol
 
@@ -59,6 +60,9 @@ class Sheet(Protocol):
 
     def notify(self, message: str, *, timeout: float | None = None) -> None:
         """Show a line for a while."""
+
+    def run_worker(self, work: Coroutine[Any, Any, Any]) -> object:
+        """Run work in the background."""
 
 
 class FileOnScreen:
@@ -231,15 +235,15 @@ class FileOnScreen:
             ("read", "Give up this text, read the file"),
         ]
 
-        async def answered(answer: str | None) -> None:
+        def answered(answer: str | None) -> None:
             text = self._page.text
             if answer == "over":
-                await self.save(over=problem)
+                self._page.run_worker(self.save(over=problem))
             elif answer == "read" and text is not None:
                 name = text.name
                 self._host.texts.close(text)
                 self._page.text = None
-                await self.open(name)
+                self._page.run_worker(self.open(name))
 
         lines = [f"{problem.where} {problem.message}.", "Another program has written it. Nothing was saved or sent."]
         self._page.app.push_screen(Confirm("Save?", lines, answers), answered)
