@@ -6,6 +6,7 @@ that the transcript shows what was sent.
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import Awaitable, Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import ClassVar, NamedTuple
@@ -16,12 +17,13 @@ from textual.screen import Screen
 
 from multidrop.dialects import Diagnostic
 from multidrop.dialects.on_demand import imported
-from multidrop.shell.line_syntax import Place
+from multidrop.macros import Macro
+from multidrop.shell.line_syntax import Place, showing
 from multidrop.shell.session import Session
 from multidrop.tui.frame_scheduler import Frames
 from multidrop.tui.key_table import Keyed
 from multidrop.tui.keymap import FunctionKeys
-from multidrop.tui.outbox import Outbox
+from multidrop.tui.outbox import Outbox, ended
 from multidrop.tui.panels.view import View
 from multidrop.tui.screen_model import Record, ScreenModel
 from multidrop.tui.screens.dialogs import Field
@@ -142,6 +144,17 @@ class Page(Framed):
 
     def action_leave(self) -> None:
         self.dismiss(None)
+
+
+def start(page: Page, line: str, shown: str | Macro | None = None, since: int | None = None) -> asyncio.Task[bool]:
+    """Run a line as if it was typed on a page; a failure is shown in the transcript.
+
+    `shown`: what a person was shown of the file that the line names; it is used instead of the file. `since`: the
+    number of stops when a person agreed to the line.
+    """
+    task = page.host.session.start(line if shown is None else showing(line, shown) or line, since=since)
+    page.run_worker(ended(task))
+    return task
 
 
 class AskingPage(Page):

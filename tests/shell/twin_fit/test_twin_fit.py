@@ -221,8 +221,18 @@ def test_a_drive_in_one_line_gets_its_world_there(tmp_path: Path) -> None:
     path = tmp_path / "cell.toml"
     drive_ = '{ personality = "LMDCM", name = "a", motor = "nema17" }'
     path.write_text(f'bus = [ {{ name = "axis", drive = [ {drive_} ] }} ]  # mine\n')
-    _keep(path, cells.load(path), {("axis", "a", ""): {"load": 0.3}})
+    _keep(path, path.read_text(), cells.load(path), {("axis", "a", ""): {"load": 0.3}})
     assert cells.load(path).buses[0].drives[0].world.load == 0.3 and path.read_text().endswith("# mine\n")
+
+
+def test_a_cell_that_changed_since_it_was_fitted_is_left(tmp_path: Path) -> None:
+    path = tmp_path / "cell.toml"
+    path.write_text('[[bus]]\nname = "axis"\n[[bus.drive]]\npersonality = "LMDCM"\nname = "a"\nmotor = "nema17"\n')
+    before, shop = path.read_text(), cells.load(path)
+    path.write_text(before + "# another's work\n")
+    with pytest.raises(Diagnostic, match="has changed since it was read"):
+        _keep(path, before, shop, {("axis", "a", ""): {"load": 0.3}})
+    assert path.read_text() == before + "# another's work\n"
 
 
 @pytest.mark.virtual
