@@ -13,6 +13,7 @@ from multidrop.dialects.families import FAMILIES
 from multidrop.dialects.text import whole
 from multidrop.macros import Macro
 from multidrop.shell import waits
+from multidrop.shell.line_syntax import ENDS, divided
 from multidrop.shell.operations.table import SCRIPT_WORDS, VERBS
 from multidrop.shell.operations.usage import split
 from multidrop.shell.playing import FOREVER
@@ -36,7 +37,7 @@ def wrong(word: str, message: str = "") -> Diagnostic:
 
 def rest_of(text: str) -> str:
     """The line after its verb."""
-    return text.partition(" ")[2].strip()
+    return divided(text.strip(ENDS))[1]
 
 
 def expression(text: str, names: Collection[str]) -> Expression:
@@ -51,7 +52,7 @@ def check(text: str, names: Collection[str]) -> Comparison:
 
 def setting(text: str, names: Collection[str]) -> tuple[str, Expression]:
     """Parse `/set`: the name, and its expression."""
-    name, _, rest = rest_of(text).partition(" ")
+    name, rest = divided(rest_of(text))
     if not NAME.fullmatch(name):
         raise wrong("/set", f"invalid name {name}" if name else "")
     if _is_word(name):
