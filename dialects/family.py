@@ -11,6 +11,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Generic, NamedTuple, Protocol, TypeVar
 
 from multidrop.dialects.codec import Codec, Priority, Procedure
+from multidrop.dialects.comments import unsent
+from multidrop.dialects.errors import Inexpressible
 from multidrop.dialects.files import SourceLine, lines_of_text
 from multidrop.dialects.on_demand import imported, imported_if
 from multidrop.dialects.state import DriveState, Owed, Remembered
@@ -236,7 +238,7 @@ class Family(Generic[S]):
     perform: Callable[[S, str], Printed]
     """Carry out a typed line, and make sure of the outcome."""
     check: Callable[[S, str], object]
-    """Raise Inexpressible for a line that is wrong in the language; a script is checked by it before its first line."""
+    """Raise Inexpressible for a line that is wrong in the language; `check_line` asks more."""
     motion: Callable[[S, Priority], Procedure[tuple[Motion, ...]]]
     """Position and velocity of every axis, in as few bytes as the language allows.
 
@@ -297,6 +299,12 @@ class Family(Generic[S]):
     """None: its drives have none."""
     prepare: Callable[[], object] | None = None
     """Slow work before the first message, safe in any thread; None: there is none."""
+
+    def check_line(self, state: S, text: str) -> None:
+        """Raise Inexpressible for a typed line that would not be sent whole, or is wrong in the language."""
+        if why := unsent(text):
+            raise Inexpressible(f"'{text}': {why}; nothing was sent")
+        self.check(state, text)
 
     @property
     def programs(self) -> Programs[S] | None:

@@ -14,6 +14,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import IO, TYPE_CHECKING, Any
 
+from multidrop.dialects.comments import behind_number, grouped_at
 from multidrop.dialects.errors import Diagnostic
 
 if TYPE_CHECKING:
@@ -197,7 +198,7 @@ def toml_of(text: str, where: str) -> dict[str, Any]:
     import tomllib  # in 5 ms, which a command without TOML is spared
 
     lines_of(text, where)
-    _check_nesting(text, where)
+    _check_marks(text, where)
     try:
         return tomllib.loads(text.removeprefix("\ufeff"))
     except tomllib.TOMLDecodeError as error:
@@ -239,12 +240,20 @@ def toml_names(dotted: str) -> list[str]:
     return [part.strip().strip("\"'") for part in dotted.split(".")]
 
 
-def _check_nesting(text: str, where: str) -> None:
-    """Raise Diagnostic for brackets and dotted keys deeper than `DEEPEST`, without parsing."""
+def _check_marks(text: str, where: str) -> None:
+    """Raise Diagnostic for brackets and dotted keys deeper than `DEEPEST`, without parsing.
+
+    Also raises it for a comment that divides a number in groups of digits: `position = 51#200`.
+    """
     brackets = dots = 0
     for found in _TOML.finditer(text):
         mark = found["mark"]
         if mark is None:
+            if found[0].startswith("#") and behind_number(text, at := found.start()):
+                before = text[text.rfind("\n", 0, at) + 1 : at]
+                if (divides := grouped_at(before + found[0], len(before))) is not None:
+                    line = _at(where, text.count("\n", 0, at) + 1)
+                    raise Diagnostic(f"not TOML: {divides.why}", line, "put a blank before a comment")
             continue
         if mark == ".":
             dots += 1

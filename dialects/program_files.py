@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any, NamedTuple, Protocol, cast
 
+from multidrop.dialects.comments import ENTER, behind_number, enter_in, grouped_at
 from multidrop.dialects.errors import Diagnostic, Refused
 from multidrop.dialects.files import SourceLine
 
@@ -51,6 +52,28 @@ def refuse(problems: Sequence[Problem], name: str) -> None:
         return
     more = f" ({len(wrong) - 1} more: multidrop program check)" if len(wrong) > 1 else ""
     raise Diagnostic(wrong[0].what + more, wrong[0].where(name), wrong[0].hint)
+
+
+def check_enter(lines: Iterable[str], names: Container[str] = ()) -> Iterator[Problem]:
+    """Report `^M` and `^J` that stand for Enter. `names` are those that a program combines with `^`."""
+    for number, line in enumerate(lines, 1):
+        found = enter_in(line)
+        if found is not None and found[0][1] not in names:
+            yield Problem(number, found.start() + 1, f"{found[0]} {ENTER}")
+
+
+def check_comment(line: str, number: int, mark: int) -> Iterator[Problem]:
+    """Report a comment that begins right behind a digit; it is an error where a number in groups of digits is meant.
+
+    `number`: of the line, from 1. `mark`: the index at which its comment begins.
+    """
+    if not behind_number(line, mark):
+        return
+    if (found := grouped_at(line, mark)) is not None:
+        yield Problem(number, found.start + 1, found.why, "put a blank before a comment")
+    else:
+        what = f"the comment begins right behind a number: {line[mark:].split()[0]} is not sent"
+        yield Problem(number, mark + 1, what, "put a blank before it", warning=True)
 
 
 LOCKED = "its program is locked (LK=1); LK=0 opens a lock that was not saved; CP opens any, and erases the program"

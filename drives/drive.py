@@ -223,6 +223,7 @@ class Drive:
 
         `check`: runs in the same conversation right before the line, which is not sent if that raises.
         """
+        self.check_line(text)
         if not self.starts(text):
             return await self._send(text, check)
         self.check_start(text)
@@ -243,12 +244,17 @@ class Drive:
         finally:
             self.starting -= 1
 
-    async def _send(self, text: str, check: Check | None) -> tuple[str, ...]:
+    def check_line(self, text: str) -> None:
+        """Raise Inexpressible for a line that cannot be sent whole, or that its language lacks."""
         if "{" in text:
             from multidrop.dialects.units import quantities
 
             for match in quantities(text):
                 raise Inexpressible(f"{self.shown}: '{text}': {match[0]} is not converted here; nothing was sent")
+        if self.state.address not in GLOBAL or self.codec.broadcasts:  # else each drive that the line is for checks it
+            self.family.check_line(self.state, text)
+
+    async def _send(self, text: str, check: Check | None) -> tuple[str, ...]:
         to_all = self.state.address in GLOBAL
         if to_all and not self.codec.broadcasts:
             drives = self._neighbours.all_drives

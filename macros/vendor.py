@@ -62,8 +62,8 @@ class _Steps:
             self.stopped = False
             return
         if match["end"] is not None:
-            if self.text.strip():
-                self.add(escape(self.text.strip()))
+            if text := self.text.strip(" \t"):
+                self.add(escape(text))
             elif not self.stopped:
                 raise self.wrong(column, "an empty line cannot be sent")
             self.text, self.stopped = "", False

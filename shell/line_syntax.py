@@ -22,6 +22,8 @@ if TYPE_CHECKING:
 
 EVERYONE = ("*", "^")
 WAITS = ("/wait", "/sleep")
+ENDS = " \t\r\n"
+"""What goes at both ends of a line. Any other character that does not show is the line's, and a drive takes none."""
 
 
 class Place(NamedTuple):
@@ -71,18 +73,16 @@ def showing(line: str, shown: str | Macro) -> TypedLine | None:
 
 def parse(line: str) -> TypedLine | None:
     """Parse a line; None for an empty one. Raises Diagnostic for an address without text."""
-    typed, line = line, line.strip()
+    typed, line = line, line.strip(ENDS)
     if not line:
         return None
     if line.startswith("/"):
-        name, _, rest = line.partition(" ")
-        return VerbLine(name, rest.strip(), typed)
+        return VerbLine(*divided(line), typed)
     if line.startswith("@"):
-        target, _, text = line[1:].partition(" ")
+        target, text = divided(line[1:])
         bus, address = split_target(target)
         if not target:
             raise Diagnostic("no address after the @", line, "valid: @ADDR TEXT or @BUS:ADDR TEXT")
-        text = text.strip()
         if not text:
             raise Diagnostic(f"nothing to send to {target}", f"@{target}", f"/use {target} selects it")
         if text.startswith("/"):
@@ -117,9 +117,10 @@ def targets(lines: Iterable[str]) -> tuple[str, ...]:
     return tuple(dict.fromkeys(f"{each.bus}:{each.address}" if each.bus else str(each.address) for each in parsed))
 
 
-def uncommented(line: str) -> str:
-    """The line without its comment: from a `#` at its head or after a space to its end."""
-    return re.sub(r"(^|\s)#.*", "", line).strip()
+def divided(line: str) -> tuple[str, str]:
+    """Divide a line at its first blanks: its first word, and all that follows it."""
+    word, *rest = re.split(r"[ \t]+", line, maxsplit=1)
+    return word, "".join(rest).strip(ENDS)
 
 
 def split_target(target: str) -> tuple[str, str]:

@@ -285,7 +285,9 @@ class LinePath:
         if session.scaled or _MAYBE_QUANTITY.search(text):
             line = await session.units.line(drive, text)
             text, check, values = line.text, line.check, line.values
+            drive.check_line(text)
             await imported(TRAVEL)(session.units, drive, text, by)
+        drive.check_line(text)
         await self.guard(drive, text, by)
         if drive.stops != stops:
             raise Stopped(f"a stop came before '{text.strip()}' was sent")

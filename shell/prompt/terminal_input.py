@@ -13,10 +13,10 @@ from collections.abc import AsyncIterator, Awaitable, Callable, Iterable, Sequen
 from functools import partial
 
 from multidrop.dialects import Diagnostic
+from multidrop.dialects.comments import uncommented
 from multidrop.dialects.files import LARGEST, check_line, split_lines
 from multidrop.dialects.text import visible
 from multidrop.shell.channel import Ask, Field
-from multidrop.shell.line_syntax import uncommented
 from multidrop.shell.prompt.keyboard import Keyboard, on_stop_key
 from multidrop.shell.session import Session
 from multidrop.shell.streams.stdout import write

@@ -134,7 +134,7 @@ class _Planning:
             text = with_numbers(text)
         if value_names(line.text) <= dict.keys(values):
             try:
-                drive.family.check(drive.state, text)
+                drive.family.check_line(drive.state, text)
             except Inexpressible as problem:
                 raise Diagnostic(str(problem), line.where) from None
         return drive if drive.starts(text) else None

@@ -14,11 +14,12 @@ from functools import partial
 from typing import NamedTuple, TypeVar
 
 from multidrop.dialects import Diagnostic
+from multidrop.dialects.comments import uncommented
 from multidrop.dialects.files import bounded, bytes_of, lines_of, utf8, why
 from multidrop.macros import Macro, MacroStore, check_name, checked_values, fill, parse_macro, value_names
 from multidrop.macros.model import Parameter, plain, written
 from multidrop.macros.toml_format import in_text
-from multidrop.shell.line_syntax import VerbLine, parse, uncommented
+from multidrop.shell.line_syntax import ENDS, VerbLine, parse
 from multidrop.shell.operations.table import find
 from multidrop.shell.scripts import words
 from multidrop.shell.scripts.expression import evaluate, unknowns
@@ -34,10 +35,12 @@ def steps_of(macro: Macro, macros: MacroStore | None) -> tuple[list[ScriptLine],
     """The lines of a macro and of its end. Without a file of this macro their places are its steps alone."""
     at = _places(macro, macros)
     steps = [
-        ScriptLine(*at("line", number), plain(step.line).strip(), macro.name, number, step.after)
+        ScriptLine(*at("line", number), plain(step.line).strip(ENDS), macro.name, number, step.after)
         for number, step in enumerate(macro.steps, 1)
     ]
-    on_early_end = [ScriptLine(*at("on_early_end", 0), plain(line).strip(), macro.name) for line in macro.on_early_end]
+    on_early_end = [
+        ScriptLine(*at("on_early_end", 0), plain(line).strip(ENDS), macro.name) for line in macro.on_early_end
+    ]
     return steps, on_early_end
 
 

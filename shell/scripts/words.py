@@ -13,6 +13,7 @@ from multidrop.dialects.families import FAMILIES
 from multidrop.dialects.text import whole
 from multidrop.macros import Macro
 from multidrop.shell import waits
+from multidrop.shell.line_syntax import ENDS, divided
 from multidrop.shell.operations.table import SCRIPT_WORDS, VERBS
 from multidrop.shell.operations.usage import split
 from multidrop.shell.playing import FOREVER
@@ -36,7 +37,7 @@ def wrong(word: str, message: str = "") -> Diagnostic:
 
 def rest_of(text: str) -> str:
     """The line after its verb."""
-    return text.partition(" ")[2].strip()
+    return divided(text.strip(ENDS))[1]
 
 
 def expression(text: str, names: Collection[str]) -> Expression:
@@ -51,7 +52,7 @@ def check(text: str, names: Collection[str]) -> Comparison:
 
 def setting(text: str, names: Collection[str]) -> tuple[str, Expression]:
     """Parse `/set`: the name, and its expression."""
-    name, _, rest = rest_of(text).partition(" ")
+    name, rest = divided(rest_of(text))
     if not NAME.fullmatch(name):
         raise wrong("/set", f"invalid name {name}" if name else "")
     if _is_word(name):
@@ -77,6 +78,8 @@ def call(text: str) -> tuple[str, dict[str, str]]:
         name, sign, value = pair.partition("=")
         if not (name and sign):
             raise wrong("/call", f"no value {pair}; valid: NAME=VALUE")
+        if name in values:
+            raise wrong("/call", f"{name} is given twice")
         values[name] = value
     return target, values
 
@@ -117,6 +120,9 @@ def play_call(words: Sequence[str], wrong: Callable[[str], Diagnostic]) -> PlayC
     given: dict[str, str] = {}
     times: int | None = 1
     fast = False
+    for option in ("--times", "--fast"):
+        if rest.count(option) > 1:
+            raise wrong(f"{option} is given twice")
     while rest:
         word = rest.pop(0)
         if word == "--fast":
@@ -127,6 +133,8 @@ def play_call(words: Sequence[str], wrong: Callable[[str], Diagnostic]) -> PlayC
             name_of, sign, value = word.partition("=")
             if not (name_of and sign):
                 raise wrong(f"no value {word}; valid: NAME=VALUE")
+            if name_of in given:
+                raise wrong(f"{name_of} is given twice")
             given[name_of] = value
     return PlayCall(name, given, times, fast)
 

@@ -248,7 +248,7 @@ class Entry(Input):
         event.stop()
         event.prevent_default()
         try:
-            lines = [line.rstrip() for line in lines_of(event.text) if line.strip()]
+            lines = [line.rstrip(" \t") for line in lines_of(event.text) if line.strip()]
         except Diagnostic as problem:
             self.notify(f"{problem}; nothing was pasted")
             return

@@ -15,7 +15,7 @@ from multidrop.dialects.codec import Codec, Decoded, End, Kind, Reply, Request, 
 from multidrop.dialects.errors import Inexpressible
 from multidrop.dialects.mcode.host import classify, framing
 from multidrop.dialects.mcode.host.reply_parser import ENDLESS, ReplyLines, ReplyParser, divided
-from multidrop.dialects.mcode.manual.program_file import LONGEST, bare, unsendable
+from multidrop.dialects.mcode.manual.program_file import LONGEST, commented, spaced, unsendable
 from multidrop.dialects.mcode.manual.statements import UNNAMED
 
 _PROMPTS = (">", "?")
@@ -180,7 +180,9 @@ class MCode(Codec):
 
     def request(self, address: str, text: str, kind: Kind | None = None) -> Request:
         """Build the request for a line of MCode. Raises Inexpressible where no drive can take it."""
-        text = bare(text)
+        text = spaced(text)
+        if why := commented(text):
+            raise Inexpressible(f"'{text}': {why}")
         if (at := unsendable(text)) is not None:
             raise Inexpressible(f"{text[at]!r} cannot be sent to a drive: printable ASCII only")
         if self.party and not (len(address) == 1 and "!" <= address <= "~"):

@@ -22,6 +22,7 @@ from multidrop.dialects.mcode.manual import grammar
 from multidrop.dialects.mcode.manual.grammar import Number, Unary, parsed
 from multidrop.dialects.mcode.manual.mnemonic import EXPANDED
 from multidrop.dialects.mcode.manual.points import EXPANDED_INPUTS, INPUTS, STATUS, in_words
+from multidrop.dialects.mcode.manual.program_file import commented
 from multidrop.dialects.mcode.manual.table import lookup
 from multidrop.dialects.state import Owed
 
@@ -299,11 +300,13 @@ def perform(state: MCodeState, text: str) -> Procedure[tuple[str, ...]]:
 
 
 def check(state: MCodeState, text: str) -> None:
-    """Raise Inexpressible for a line with a number in groups of digits."""
+    """Raise Inexpressible for a line with a number in groups of digits, or with a comment."""
     try:
         grammar.check_groups(text)
     except grammar.LineError as error:
         raise Inexpressible(f"'{text}': {error.why}; nothing was sent") from None
+    if why := commented(text):
+        raise Inexpressible(f"'{text}': {why}")
 
 
 def immediate(state: MCodeState, request: Request) -> Procedure[tuple[str, ...]]:

@@ -20,6 +20,7 @@ from functools import lru_cache
 from math import inf
 from typing import NamedTuple
 
+from multidrop.dialects.comments import grouped_at
 from multidrop.dialects.mcode.manual.errors import ErrorNumber
 from multidrop.dialects.mcode.manual.table import MDRIVE, MNEMONICS, lookup
 
@@ -54,8 +55,7 @@ NAME_FORM = "a name is a letter, alone or with a letter, a digit or two digits"
 _NAME = re.compile(r"[A-Z](?:[A-Z0-9]|[0-9]{2})?\Z")
 _SWAPPED = {"=<": "<=", "=>": ">="}
 _GROUP = re.compile(r"\d{3}(?:\.\d*)?", re.ASCII)
-_REMARKED = re.compile(r"(?:['`]\d{3})+\s*(?:['`].*)?", re.ASCII)
-_GROUPED = re.compile(r"\d+(?:(?:\s*,\s*|\s+|['`])[0-9]{3}(?![0-9]))+(?:\.[0-9]*)?")
+_GROUPED = re.compile(r"\d+(?:(?:\s*,\s*|\s+)[0-9]{3}(?![0-9]))+(?:\.[0-9]*)?")
 _BINARY_FIELDS = frozenset({"<0/1>", "0", "1"})
 """What the syntax of a word calls a field that takes only 0 or 1."""
 
@@ -227,18 +227,17 @@ def check_groups(line: str, names: Container[str] = ()) -> None:
     """Raise LineError for a number in groups of three digits (`MA 200,000`), of which a drive reads the first.
 
     Three digits after a number and a comma or a space are such a group where the word has no further field, or a field
-    that takes only 0 or 1. `PR` has as many fields as a line holds. An apostrophe begins a remark: `MA 200'000`.
+    that takes only 0 or 1. `PR` has as many fields as a line holds. A mark of a remark may divide groups: `MA 200'000`.
     """
     found = divided(tokens(line), names)
     word = found[0].text.upper() if found and found[0].kind == "word" else ""
     number, field, place = None, 0, 0
     for token in found if word != "PR" else ():
-        if token.kind == "remark" and number is not None and number.stop == token.start:
-            grouped = _REMARKED.fullmatch(token.text) is not None
-        else:
-            group = token.kind == "number" and _GROUP.fullmatch(token.text)
-            grouped = bool(group) and number is not None and _fields(word, place + 1) <= _BINARY_FIELDS
-        if number is not None and grouped:
+        marked = token.kind in ("remark", "bad") and number is not None and number.stop == token.start
+        if marked and (divides := grouped_at(line, token.start)) is not None:
+            raise LineError(ErrorNumber.ILLEGAL_DATA, divides.start, divides.why)
+        group = token.kind == "number" and _GROUP.fullmatch(token.text)
+        if number is not None and group and _fields(word, place + 1) <= _BINARY_FIELDS:
             whole = _GROUPED.match(line, number.start)
             shown = whole[0].rstrip() if whole else line[number.start : token.stop]
             why = f"{shown} would be read as {number.text}; write {re.sub(r'[^0-9.]', '', shown)}"

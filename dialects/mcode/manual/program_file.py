@@ -1,11 +1,11 @@
 """Program files, read for sending (MCode reference 3.3, section 9).
 
 A file holds declarations, which are sent unchanged, a program between `PG <address>` and `PG`, and further lines, often
-`S`. A remark begins with an apostrophe or a back-quote, or with the backslash that replaces one in some copies. It runs
-to the end of its line; quotation marks contain no remark. Inside them a TAB is an ordinary character (programs for
-units have some); outside it is a blank. This module does not check the language. It reports what cannot be sent, and
-what would be executed or stored unintentionally. So a file without a program may hold only settings: the drive would
-execute a program whose PG was forgotten.
+`S`. A remark begins with an apostrophe (manual 3.3) or a back-quote, or with the backslash that replaces one in some
+copies, where that begins the line or follows a blank. It runs to the end of its line; quotation marks contain none.
+Inside them a TAB is an ordinary character (programs for units have some); outside it is a blank. This module does not
+check the language. It reports what cannot be sent, and what would be executed or stored unintentionally. So a file
+without a program may hold only settings: the drive would execute a program whose PG was forgotten.
 """
 
 from __future__ import annotations
@@ -15,16 +15,19 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from math import inf
 
+from multidrop.dialects.comments import outside
 from multidrop.dialects.files import SourceLine, split_lines, wrong_characters
 from multidrop.dialects.mcode.manual.grammar import LineError, Token, check_groups, parse, tokens
 from multidrop.dialects.mcode.manual.statements import canonical
 from multidrop.dialects.mcode.manual.table import lookup
-from multidrop.dialects.program_files import Entry, Part, Problem, refuse, respelled
+from multidrop.dialects.program_files import Entry, Part, Problem, check_comment, check_enter, refuse, respelled
 
 LONGEST = 64
 """Characters that a drive's receive buffer holds (5.1.102)."""
 
-_REMARKS = "'`\\"
+MARKS = re.compile(r"['`\\]")
+"""Every character that can begin a remark. No statement has one outside quotation marks."""
+_REMARK = re.compile(r"['`]|(?:(?<=[ \t])|^)\\")
 _PROGRAM = re.compile(r"PG\s*=?\s*(\w*)\Z", re.IGNORECASE | re.ASCII)
 _DECLARES = re.compile(r"(LB|VA)\s*=?\s*([A-Z]\w{0,2})", re.IGNORECASE | re.ASCII)
 
@@ -73,8 +76,11 @@ def scan(text: str) -> tuple[list[ProgramLine], list[Problem]]:
         return [], [Problem(1, 1, "nothing to send: no line but remarks and blanks")]
     names = frozenset(line.declares for line in lines if line.declares)
     problems = [Problem(*place, "lines end at LF or CR LF") for place in wrong_characters(raw)]
+    problems += check_enter([line[: remark_at(line)] for line in raw], names)
     wrong = {each.line for each in problems}
-    problems += [problem for line in lines if line.number not in wrong for problem in _unsendable(line, names)]
+    for line in lines:
+        if line.number not in wrong:
+            problems += _unsendable(line, raw[line.number - 1], names)
     sections, unpaired = _sections(lines)
     problems += unpaired
     if "program" not in sections:
@@ -84,21 +90,28 @@ def scan(text: str) -> tuple[list[ProgramLine], list[Problem]]:
 
 
 def bare(line: str) -> str:
-    """Return a line without its remark, indent and trailing blanks; tabs between words become blanks."""
-    parts = line[: remark_at(line)].split('"')
+    """Return a line of a file as it is sent: without its remark, and `spaced`."""
+    return spaced(line[: remark_at(line)])
+
+
+def spaced(line: str) -> str:
+    """Return a line without indent and trailing blanks; tabs between words become blanks."""
+    parts = line.split('"')
     found = '"'.join(part if at % 2 else part.replace("\t", " ") for at, part in enumerate(parts)).strip(" ")
     return line if found == line else found
 
 
 def remark_at(line: str) -> int:
     """Find where the remark of a line begins: after its last character if it has none."""
-    quoted = False
-    for at, character in enumerate(line):
-        if character == '"':
-            quoted = not quoted
-        elif not quoted and character in _REMARKS:
-            return at
-    return len(line)
+    found = next(outside(line, _REMARK), None)
+    return found.start() if found else len(line)
+
+
+def commented(text: str) -> str:
+    """Return why a line with a mark of a remark outside quotation marks is not sent; empty for any other line."""
+    found = next(outside(text, MARKS), None)
+    hint = 'leave it out (a text is in ")'
+    return f"{found[0]} begins a comment, which only program files have; {hint}; nothing was sent" if found else ""
 
 
 def formatted(text: str) -> str:
@@ -120,8 +133,13 @@ def unsendable(text: str) -> int | None:
     return next((at for at, each in enumerate(text) if each != "\t" and not " " <= each <= "~"), None)
 
 
-def _unsendable(line: ProgramLine, names: frozenset[str]) -> Iterator[Problem]:
-    """Report a character that cannot be sent, a line longer than a drive accepts, and a number in groups of digits."""
+def _unsendable(line: ProgramLine, raw: str, names: frozenset[str]) -> Iterator[Problem]:
+    """Report what cannot be sent as it was meant. `raw`: the line with its remark.
+
+    That is a character that no drive takes, a line that is too long, a number in groups of digits, and a mark of a
+    remark in the wrong place.
+    """
+    yield from check_comment(raw, line.number, remark_at(raw))
     at = unsendable(line.text)
     if at is not None:
         yield Problem(line.number, line.column + at, f"{line.text[at]!r} cannot be sent", "MCode is plain ASCII")
@@ -132,6 +150,10 @@ def _unsendable(line: ProgramLine, names: frozenset[str]) -> Iterator[Problem]:
         check_groups(line.text, names)
     except LineError as wrong:
         yield Problem(line.number, line.column + wrong.column, wrong.why)
+        return
+    if (mark := next(outside(line.text, MARKS), None)) is not None:
+        what = "a backslash begins a comment only at the start of a line or after a blank"
+        yield Problem(line.number, line.column + mark.start(), what, "put a blank before it, or delete it")
 
 
 def _sections(lines: list[ProgramLine]) -> tuple[list[str], list[Problem]]:

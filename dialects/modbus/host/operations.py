@@ -16,6 +16,7 @@ from multidrop.dialects.family import Hints, Motion
 from multidrop.dialects.mcode.host.state import described, report_error, who
 from multidrop.dialects.mcode.manual import grammar
 from multidrop.dialects.mcode.manual.points import STATUS, in_words
+from multidrop.dialects.mcode.manual.program_file import commented, spaced
 from multidrop.dialects.modbus.host import framing, mapping
 from multidrop.dialects.modbus.host.codec import Modbus, ModbusState, pdu_codec
 from multidrop.dialects.modbus.host.mapping import Reading
@@ -145,7 +146,7 @@ _ESCAPES = {"b": "\b", "c": "\x03", "e": "\x1b", "g": "\a", "n": "\n", "r": "\r"
 
 def perform(state: ModbusState, text: str) -> Procedure[tuple[str, ...]]:
     """Carry out a line of MCode; return the printed lines. Raises Refused, NoAnswer, Stopped or Inexpressible."""
-    text = grammar.strip(text)
+    text = spaced(text)
     statement = parsed(state, text)
     if statement is None:
         return ()
@@ -158,9 +159,11 @@ def perform(state: ModbusState, text: str) -> Procedure[tuple[str, ...]]:
 
 
 def parsed(state: ModbusState, text: str) -> grammar.Statement | None:
-    """Parse a line of MCode. Raises Inexpressible for one that is wrong in the language."""
+    """Parse a line of MCode. Raises Inexpressible for one that is wrong in the language, or has a comment."""
     try:
         grammar.check_groups(text, USER)
+        if why := commented(text):
+            raise Inexpressible(f"'{text}': {why}")
         return grammar.parse(text, USER)
     except grammar.LineError as error:
         raise Inexpressible(f"'{text}': {error.why}; nothing was sent") from None
@@ -195,8 +198,9 @@ def _items(statement: grammar.Statement) -> Iterator[str | tuple[str, Reading]]:
             yield str(item.value)
         elif isinstance(item, grammar.Name):
             yield item.word, mapping.reading(item.word)
-            if item.word == "IT" and rest and isinstance(rest[0], grammar.Number):
-                rest.pop(0)  # a sensor's number; the register has one sensor
+            sensor = item.word == "IT" and rest and isinstance(rest[0], grammar.Number)
+            if sensor and rest.pop(0) != grammar.Number(1):
+                raise Inexpressible(f"a register has one sensor of IT, the first; {mapping.ALTERNATIVE} has others")
         else:
             raise Inexpressible(f"expressions are not evaluated over Modbus; {mapping.ALTERNATIVE} prints them")
 

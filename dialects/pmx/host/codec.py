@@ -50,7 +50,7 @@ class Pmx(Codec):
 
     def request(self, address: str, text: str) -> Request:
         """Build the request for a command, as typed: case matters. Raises Inexpressible where it cannot be sent."""
-        text = text.strip()
+        text = text.strip(" \t")
         if wrong := [c for c in text if not " " <= c <= "~"]:
             raise Inexpressible(f"{wrong[0]!r} cannot be sent to a controller: printable ASCII only")
         if not text:

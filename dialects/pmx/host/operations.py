@@ -105,8 +105,11 @@ def perform(known: PmxState, text: str) -> Procedure[tuple[str, ...]]:
 
 
 def check(known: PmxState, text: str) -> None:
-    """Raise Inexpressible for a command with a number in groups of digits."""
-    if wrong := table.grouped(text):
+    """Raise Inexpressible for a command with a number in groups of digits, or with a comment."""
+    wrong = table.grouped(text)
+    if not wrong and ";" in text:
+        wrong = "; begins a comment, which only program files have; leave it out"
+    if wrong:
         raise Inexpressible(f"'{text}': {wrong}; nothing was sent")
 
 

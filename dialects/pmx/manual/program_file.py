@@ -13,7 +13,17 @@ from multidrop.dialects.files import SourceLine, split_lines, wrong_characters
 from multidrop.dialects.pmx.manual import script_checker, script_compiler, script_parser
 from multidrop.dialects.pmx.manual.script_compiler import EMPTY, ERASED, LINES
 from multidrop.dialects.pmx.manual.script_parser import AXES, WORDS, parse
-from multidrop.dialects.program_files import Problem, errors, in_order, numbered, refuse, respelled
+from multidrop.dialects.program_files import (
+    BLANKS,
+    Problem,
+    check_comment,
+    check_enter,
+    errors,
+    in_order,
+    numbered,
+    refuse,
+    respelled,
+)
 
 _OPERATIONS = {code: op for op, code in script_compiler.OPERATION.items()}
 _COMPARISONS = {code: op for op, code in script_compiler.COMPARISON.items()}
@@ -229,9 +239,13 @@ def formatted(text: str) -> str:
 
 def check(text: str, product: str = "") -> list[Problem]:
     """Report every error of a program, by line; there is one product."""
-    unreadable = [Problem(*place, "lines end at LF or CR LF") for place in wrong_characters(split_lines(text))]
+    whole = split_lines(text)
+    unreadable = [Problem(*place, "lines end at LF or CR LF") for place in wrong_characters(whole)]
+    unreadable += check_enter(line.partition(";")[0] for line in whole)
     lines = _lines(text)
     problems = _check_raw(lines) if is_raw(lines) else script_checker.check(text)
+    for number, line in enumerate(whole, 1):
+        problems += check_comment(line, number, len(line.partition(";")[0]))
     wrong = {each.line for each in unreadable}
     return in_order([*unreadable, *(each for each in problems if each.line not in wrong)])
 
@@ -276,7 +290,7 @@ def _held(stored: Mapping[int, str]) -> list[str]:
 
 
 def _lines(text: str) -> list[SourceLine]:
-    return numbered([line.partition(";")[0].strip() for line in split_lines(text)])
+    return numbered([line.partition(";")[0].strip(BLANKS) for line in split_lines(text)])
 
 
 def _stored(lines: Sequence[SourceLine]) -> list[tuple[int, int, str]]:

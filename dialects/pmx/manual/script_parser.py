@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 
 from multidrop.dialects.files import rows, split_lines
 from multidrop.dialects.pmx.manual.table import grouped, lookup
-from multidrop.dialects.program_files import Entry, Part, Problem, Word
+from multidrop.dialects.program_files import BLANKS, Entry, Part, Problem, Word
 
 # The words (manual 10.1; the joystick's are in 7.15): access, ASCII command, help, their places in a line.
 #
@@ -239,8 +239,8 @@ def parse(text: str) -> tuple[list[Statement], list[Problem]]:
     statements: list[Statement] = []
     problems: list[Problem] = []
     for number, line in enumerate(split_lines(text), 1):
-        bare = line.partition(";")[0].rstrip()
-        if not bare.strip():
+        bare = line.partition(";")[0].rstrip(BLANKS)
+        if not bare.strip(BLANKS):
             continue
         try:
             statements.append(_statement(bare, number))

@@ -72,7 +72,7 @@ ELSEWHERE: Mapping[str, str] = {
 _HEAD = re.compile(r"[A-Za-z]+")
 _PLACE = re.compile(r"(X-?\d+(Y-?\d+)?|Y-?\d+|I-?\d+:-?\d+|T[XY]-?\d+)", re.ASCII)
 
-_GROUPED = re.compile(r"[0-9]+(?:(?:\s*,\s*|\s+|')[0-9]{3}(?![0-9]))+")
+_GROUPED = re.compile(r"[0-9]+(?:(?:\s*,\s*|\s+|['`\\;#])[0-9]{3}(?![0-9]))+")
 
 
 def grouped(text: str) -> str:

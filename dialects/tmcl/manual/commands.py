@@ -85,6 +85,7 @@ class Version(IntEnum):
 FACTORY_CODE = 1234
 """The value that command 137 needs."""
 TYPE, MOTOR, BANK, VALUE = "type", "motor", "bank", "value"
+BLANKS = " \t"
 INT32 = range(-(2**31), 2**31)
 MOTORS = range(256)
 
@@ -235,8 +236,8 @@ def _read(text: str) -> Call | LineError:
 
 
 def _parsed(text: str) -> Call:
-    word, _, rest = text.strip().partition(" ")
-    fields = [field.strip() for field in rest.split(",")] if rest.strip() else []
+    word, *given = re.split(r"[ \t]+", text.strip(BLANKS), maxsplit=1)
+    fields = [field.strip(BLANKS) for field in "".join(given).split(",")] if given else []
     if word.isascii() and word.isdigit():
         if int(word) not in BYTE:
             raise LineError(f"no command {word}; valid: 0 to 255")

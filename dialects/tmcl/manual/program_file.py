@@ -21,10 +21,22 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 from multidrop.dialects.files import SourceLine, split_lines, wrong_characters
-from multidrop.dialects.program_files import Entry, Part, Problem, in_order, numbered, refuse, respelled, walk
+from multidrop.dialects.program_files import (
+    Entry,
+    Part,
+    Problem,
+    check_comment,
+    check_enter,
+    errors,
+    in_order,
+    numbered,
+    refuse,
+    respelled,
+    walk,
+)
 from multidrop.dialects.text import counted
 from multidrop.dialects.tmcl.manual import instructions
-from multidrop.dialects.tmcl.manual.commands import Call, Command
+from multidrop.dialects.tmcl.manual.commands import BLANKS, Call, Command
 from multidrop.dialects.tmcl.manual.instructions import (
     CONTROL,
     EMPTY,
@@ -110,7 +122,7 @@ def divided(line: str, number: int = 1) -> Divided | None:
 
     fields, at = [], found.start("fields") + 1
     for each in found["fields"].split(",") if found["fields"] else ():
-        fields.append(Piece(each.strip(), at + len(each) - len(each.lstrip())))
+        fields.append(Piece(each.strip(BLANKS), at + len(each) - len(each.lstrip())))
         at += len(each) + 1
     return Divided(number, piece("label"), piece("name"), piece("value"), piece("word"), tuple(fields))
 
@@ -221,7 +233,7 @@ def read(text: str, name: str) -> list[SourceLine]:
 
 
 def _lines(text: str) -> list[SourceLine]:
-    return numbered([line[: remark_at(line)].strip() for line in split_lines(text)])
+    return numbered([line[: remark_at(line)].strip(BLANKS) for line in split_lines(text)])
 
 
 def compiled(lines: Sequence[SourceLine]) -> list[Placed]:
@@ -235,9 +247,12 @@ def check(text: str, product: str = "") -> list[Problem]:
     """Report every error of a program, and warn of what runs otherwise than it reads."""
     lines = split_lines(text)
     unreadable = [Problem(*place, "lines end at LF or CR LF") for place in wrong_characters(lines)]
+    unreadable += check_enter(line[: remark_at(line)] for line in lines)
     made = assembled(numbered(lines))
-    problems = [*unreadable, *(each for each in made.problems if each.line not in {each.line for each in unreadable})]
-    return in_order([*problems, *_warnings(made, {each.line for each in problems})])
+    marks = [each for n, line in enumerate(lines, 1) for each in check_comment(line, n, remark_at(line))]
+    wrong = {each.line for each in unreadable}
+    problems = [*unreadable, *(each for each in (*made.problems, *marks) if each.line not in wrong)]
+    return in_order([*problems, *_warnings(made, {each.line for each in errors(problems)})])
 
 
 def _warnings(made: Assembled, wrong: Container[int]) -> Iterator[Problem]:

@@ -176,7 +176,7 @@ def test_idle_lines_lose_prompts_and_checksums_and_keep_unfinished_ones():
         (1, 0, 1, "MR 51200", b"MR 51200\xc9\r"),
         (1, 0, 2, "MR 1", b"MR 1\x90\r"),
         (1, 0, 1, "CK=0", b"CK=0\x85\r"),
-        (1, 1, 1, "PR P  'comment", b"aPR P" + bytes([checksum(b"aPR P")]) + b"\n"),
+        (1, 1, 1, "PR P  ", b"aPR P" + bytes([checksum(b"aPR P")]) + b"\n"),
         (1, 1, 0, "", b"a\n"),
     ],
 )

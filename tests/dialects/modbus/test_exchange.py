@@ -132,7 +132,7 @@ def test_prints(text, sent, printed):
         ("P=-1", (0x10, "0057000204ffffffff")),
         ("MR -51200", (0x10, "00460002043800ffff")),
         ("MA51200", (0x10, "0043000204c8000000")),
-        ("SL 0 ' a remark", (0x10, "007800020400000000")),
+        ("SL 0", (0x10, "007800020400000000")),
         ("HM 1", (0x10, "002b0001020001")),
         ("HI=4", (0x10, "002a0001020004")),
         ("S", (0x10, "00760001020001")),
@@ -163,8 +163,11 @@ def test_commands_print_nothing_and_are_followed_by_a_look_at_the_error_flag(tex
     assert far.sent == [sent, LOOK]
 
 
-def test_a_blank_line_and_a_remark_send_nothing(far):
-    assert type_("  ", far) == type_("' only a remark", far) == ()
+def test_a_blank_line_sends_nothing_and_a_comment_is_refused(far):
+    assert type_("  ", far) == ()
+    for text in ("' only a comment", "VM=2 'x", "MA 51`200", "MA 51\\200", "PR P \\"):
+        with pytest.raises(Inexpressible, match="nothing was sent"):
+            type_(text, far)
     assert far.sent == []
 
 
