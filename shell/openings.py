@@ -332,6 +332,8 @@ class _Opening:
                     continue
                 workspace.reconnections.add(each.bus, each.hints, each.reopen, port)
             for bus, halt in late:  # again by name, as some drives need it, and confirmed; but none started since
+                if bus.roster.strange:
+                    continue
                 standing = [drive for drive in bus.all_drives if not halt.started_since(drive)]
                 bus.halted(bus.halt(None if len(standing) == len(bus.all_drives) else standing))
             failing.pop_all()
