@@ -115,7 +115,7 @@ class Calls:
         return self._moves.setdefault(drive, asyncio.Lock())
 
     def telemetry(self, drives: Sequence[Drive], rate: float) -> AsyncTelemetry:
-        """Begin to read drives until the session is closed. Raises Diagnostic, or Inexpressible for an unknown device."""
+        """Begin to read drives until the session is closed. Raises Diagnostic; Inexpressible for a stranger."""
         if not rate > 0:
             raise Diagnostic(f"no rate {rate:g}", "telemetry", "valid: above 0, samples a second; math.inf")
         for drive in drives:

@@ -32,7 +32,7 @@ class Device(socketserver.ThreadingTCPServer):
 
     @property
     def url(self) -> str:
-        return "modbus://127.0.0.1:{}".format(self.server_address[1])
+        return f"modbus://127.0.0.1:{self.server_address[1]}"
 
     @property
     def received(self) -> list[str]:

@@ -126,7 +126,7 @@ def _foreign(buffer: bytes) -> str:
 
 @dataclass(eq=False)
 class ModbusState(DriveState):
-    """One Ethernet drive over Modbus, or another device at this address: a stranger until its identification is read."""
+    """One Ethernet drive over Modbus, or another device: a stranger until its identification is read."""
 
     codec: Modbus
     stranger: str = UNKNOWN
