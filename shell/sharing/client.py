@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections import deque
 from dataclasses import dataclass
 
-from multidrop.shell.sharing.half_line import Parts, Rest
+from multidrop.drives.half_line import Parts, Rest
 from multidrop.transports import telnet
 from multidrop.transports.telnet import OPTION, PURGE_BOTH, REPLY, Setting, message, parsed
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 from multidrop.dialects import Diagnostic, StopPiece
 from multidrop.dialects.families import DEFAULT, FAMILIES, TABLE
-from multidrop.shell.sharing.half_line import CR, LF, LONGEST
+from multidrop.drives.half_line import CR, LF, LONGEST
 
 ENDS = b"\r\n"
 KEYS = rb"[\x03\x1b]"

@@ -14,8 +14,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from multidrop.dialects.text import counted, visible
+from multidrop.drives.half_line import HalfLine
 from multidrop.shell.sharing.client import Client, Input, Request
-from multidrop.shell.sharing.half_line import HalfLine
 from multidrop.shell.sharing.stop_bytes import ENDS, NOTICED, OwedStop, StopBytes
 from multidrop.transports.telnet import FLOW, FLOW_IN, GROUPS, NEEDED, PURGE_RECEIVED, Control, Setting, group_of
 
