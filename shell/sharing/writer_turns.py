@@ -16,6 +16,7 @@ from dataclasses import dataclass
 from multidrop.dialects.text import counted, visible
 from multidrop.drives.half_line import HalfLine
 from multidrop.shell.sharing.client import Client, Input, Request
+from multidrop.shell.sharing.settling import Settling
 from multidrop.shell.sharing.stop_bytes import ENDS, NOTICED, OwedStop, StopBytes
 from multidrop.transports.telnet import FLOW, FLOW_IN, GROUPS, NEEDED, PURGE_RECEIVED, Control, Setting, group_of
 
@@ -112,6 +113,7 @@ class Exchange:
         self._setter: int | None = None
         """The client that has set the baud rate while there was no writer."""
         self._line = HalfLine(stops.ends)
+        self.settling = Settling()
         self._before: int | None = None
         """The last writer."""
         self._answered = True
@@ -125,7 +127,7 @@ class Exchange:
     def deadline(self) -> float | None:
         """The time of the next `advance`: 0.0 while clients wait for a turn, else when the writer has been silent."""
         if any(each.waiting and not each.setting for each in self.clients.values()):
-            return 0.0
+            return self.settling.until
         return None if self.writer is None else self._last + SILENT
 
     # Clients
@@ -140,7 +142,7 @@ class Exchange:
             if self.writer in (None, client):
                 for each in self.clients[client].waiting:
                     if isinstance(each, bytes):
-                        self._write(client, each, self._last)
+                        self._write(client, each, self._last, gone=True)
             self._unsent(
                 client, self.clients[client].parts.forgotten(), "the beginning of a message", "its client left"
             )
@@ -209,7 +211,12 @@ class Exchange:
             self.owed.received(now)
             self._answered = True
             self._line.replied(data)
+        settles = bool(self.settling.until)
+        if settles:
+            self.settling.took(data, now)
         for number, client in self.clients.items():
+            if settles and number == self.writer:
+                continue
             if not client.refused and (sent := client.data(data)):
                 self._actions.append(Send(number, sent))
             elif client.overflowed:
@@ -316,22 +323,26 @@ class Exchange:
             each, left = known.waiting.popleft(), left - 1
             if isinstance(each, Request):
                 self._request(client, each)
-            else:
-                self._write(client, each, now)
+            elif not self._write(client, each, now):
+                known.waiting.appendleft(each)
+                break
         if not known.refused and (replies := known.taken()):
             self._actions.append(Send(client, replies))
 
-    def _write(self, client: int, data: bytes, now: float) -> None:
+    def _write(self, client: int, data: bytes, now: float, gone: bool = False) -> bool:
+        """Write bytes; return False where they must wait for the drives. `gone`: the client hears no reply."""
         known = self.clients[client]
         if known.refused:
-            return
+            return True
         if self.writer is None:
             self._begin(client, now)
         elif client != self.writer:
             name = self.clients[self.writer].name
             self._close(client, "refused", f"{name} writes, until it leaves or is silent for {SILENT:g} s")
-            return
+            return True
         self._last = now
+        if not (gone or self._settled(client, now)):
+            return False
         left = known.rest.left(data)
         self._unsent(client, data[: len(data) - len(left)], "the rest of a line", "its beginning was made harmless")
         if left := known.parts.whole(left):
@@ -339,6 +350,15 @@ class Exchange:
                 self.owed.started()
             self._actions.append(Write(client, left))
             self._answered = False
+        return True
+
+    def _settled(self, client: int, now: float) -> bool:
+        """Whether the drives have replied to what made a line harmless; the writer was not sent that, so it is said."""
+        over = self.settling.over(now)
+        if over and self.settling.heard:
+            self._say(client, "unfinished", f"the drives' reply was not passed on: '{_text(self.settling.heard)}'")
+            self.settling.heard = b""
+        return over
 
     def _begin(self, client: int, now: float) -> None:
         """Make a client the writer. What another one has begun, and this one's first end of a line would execute, ends
@@ -346,17 +366,19 @@ class Exchange:
         """
         if client != self._before:
             if self._line.begun:
-                self._end_harmlessly(client)
+                self._end_harmlessly(client, now)
             if (before := self.clients.get(self._before or 0)) is not None:
                 self._unsent(self._before or 0, before.parts.forgotten(), "the beginning of a message", "others write")
         self.writer, self._before = client, client
         self._say(client, "writes")
 
-    def _end_harmlessly(self, client: int) -> None:
+    def _end_harmlessly(self, client: int, now: float) -> None:
         text = _text(self._line.text) or "a line that no drive has replied to"
         stops = "; it may hold commands that only a stop drops, so the drives were stopped" * self._line.waits
         self._say(client, "unfinished", f"'{text}' of the writer before is made harmless{stops}")
-        self._actions.append(Write(client, self._stops.harmless(self._line.waits)))
+        harmless = self._stops.harmless(self._line.waits)
+        self._actions.append(Write(client, harmless))
+        self.settling.begin(now, len(harmless), self.values["baud"])
         if self._line.text:
             self._drop_rest()
         self._line.cleared()

@@ -20,6 +20,8 @@ class Port:
     def __init__(self, family: str = "", slow: bool = False, party: bool | None = None) -> None:
         self.exchange = Exchange(stop_bytes(family, (), party), 9600)
         self.slow = slow
+        self.settles = True
+        """Time passes until what follows a line that was made harmless is written."""
         self.written = b""
         self.waiting = b""
         self.sent: dict[int, bytes] = {ADA: b"", BOB: b"", EVE: b""}
@@ -37,6 +39,8 @@ class Port:
 
     def send(self, client: int, data: bytes, now: float = 0.0) -> None:
         self.do(self.exchange.receive(client, data, now))
+        while self.settles and (until := self.exchange.settling.until):
+            self.do(self.exchange.advance(until))
 
     def reply(self, data: bytes = b"0\r\n", now: float = 0.0) -> None:
         """Have the drives send something."""

@@ -362,6 +362,48 @@ def test_a_loss_after_the_reply_cuts_nothing() -> None:
     assert port.written == b"@00PX\r@00PX\r"
 
 
+def test_the_next_writer_is_not_sent_the_reply_to_what_made_a_line_harmless(port: Port) -> None:
+    port.settles = False
+    port.send(ADA, b"FD", 0.0)
+    port.do(port.exchange.leave(ADA))
+    port.send(BOB, b"PR P\r", 1.0)
+    assert port.written == b"FD" + OVERFLOW
+    until = port.exchange.deadline
+    assert until is not None and 1.1 < until < 1.3
+    port.reply(b"\r\n?", 1.1)
+    port.do(port.exchange.advance(until))
+    assert port.written == b"FD" + OVERFLOW
+    port.do(port.exchange.advance(1.3))
+    assert port.written == b"FD" + OVERFLOW + b"PR P\r"
+    port.reply(b"0\r\n", 1.4)
+    assert (port.sent[BOB], port.sent[EVE]) == (b"0\r\n", b"\r\n?0\r\n")
+    assert r"bob unfinished the drives' reply was not passed on: '\x0d\x0a?'" in port.said
+
+
+def test_drives_that_never_fall_silent_hold_the_next_writer_up_for_a_second_at_most(port: Port) -> None:
+    port.settles = False
+    port.send(ADA, b"FD", 0.0)
+    port.do(port.exchange.leave(ADA))
+    port.send(BOB, b"PR P\r", 1.0)
+    for tenth in range(10, 22):
+        port.reply(b"x", tenth / 10)
+        port.do(port.exchange.advance(tenth / 10 + 0.01))
+    assert port.written.endswith(b"PR P\r")
+
+
+def test_a_client_that_has_left_meanwhile_is_written_and_a_stop_waits_for_nothing(port: Port) -> None:
+    port.settles = False
+    port.send(ADA, b"FD", 0.0)
+    port.do(port.exchange.leave(ADA))
+    port.send(BOB, b"PR P\r", 1.0)
+    port.send(EVE, b"\x1b", 1.01)
+    assert port.written == b"FD" + OVERFLOW + b"\x1b"
+    assert "bob unsent 5 bytes that came before a stop were dropped" in port.said
+    port.send(BOB, b"PR V\r", 1.02)
+    port.do(port.exchange.leave(BOB))
+    assert port.written.endswith(b"PR V\r")
+
+
 def test_what_was_begun_is_made_harmless_as_sharing_ends(port: Port) -> None:
     port.send(ADA, b"aFD")
     port.do(port.exchange.close(ADA, "closed", "over"))
@@ -416,6 +458,9 @@ def test_only_the_writer_writes_and_every_stop_passes(steps: list[tuple[int, byt
         now += pause
         begun = exchange.clients[client].begun
         actions = exchange.receive(client, data, now)
+        while until := exchange.settling.until:
+            now = max(now, until)
+            actions += exchange.advance(now)
         for each in actions:
             match each:
                 case Write(by, written):
