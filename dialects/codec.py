@@ -175,6 +175,8 @@ class Codec(ABC):
     """Replies carry their request's number, so a late reply is never taken for another request's."""
     broadcasts: ClassVar[bool] = False
     """One command reaches every drive of the line; otherwise the host sends it to each drive in turn."""
+    line_ends: ClassVar[bytes] = b"\r"
+    """The bytes that may end a line of it, as its drives may be set."""
     stop_replies: ClassVar[bool] = False
     """Drives reply to a stop, so two stops that are written at once have replies that collide."""
     stop_debris: ClassVar[re.Pattern[str] | None] = None

@@ -91,6 +91,8 @@ class DriveState:
     """Side effects of a line that a person typed, oldest first."""
     label: str = ""
     """The name that a person gave it, which is shown in place of its address."""
+    stranger: str = ""
+    """Why this device may be no drive of its family: multidrop sends it only what a person types. Empty: it is one."""
 
     # Messages for a person
 
@@ -109,6 +111,10 @@ class DriveState:
 
     def identified(self, product: str, version: str, part: str = "") -> None:
         self.product, self.version, self.part = product, version, part or self.part
+
+    def recognised(self, stranger: str = "") -> None:
+        """Record that the device said what it is. `stranger`: why it may be no drive of the family."""
+        self.stranger = stranger
 
     def named(self, name: str) -> None:
         self.name = name

@@ -70,9 +70,14 @@ class Conversations:
         on_over: OnOver[T],
         on_ended: OnEnded | None = None,
         searching: bool = False,
+        typed: bool = False,
     ) -> Conversation[T]:
-        """Begin a conversation with one drive, at once or after those that wait for it."""
-        conversation = Conversation(self, procedure, state, on_over, on_ended, searching)
+        """Begin a conversation with one drive, at once or after those that wait for it.
+
+        A stranger gets only what a person named (`typed`), and the search for what is there; any other conversation
+        with it ends at once with Inexpressible, and sends nothing.
+        """
+        conversation = Conversation(self, procedure, state, on_over, on_ended, searching, typed or searching)
         turns = self._turns.setdefault(state, deque())
         turns.append(conversation)
         if turns[0] is conversation:
@@ -138,6 +143,7 @@ class Conversation(Generic[T]):
         on_over: OnOver[T],
         on_ended: OnEnded | None,
         searching: bool,
+        wanted: bool,
     ) -> None:
         self.begun = False
         self._all = conversations
@@ -147,6 +153,8 @@ class Conversation(Generic[T]):
         self._on_over = on_over
         self._on_ended = on_ended
         self._searching = searching
+        self._wanted = wanted
+        """It is for whatever device is there, a stranger, too."""
         self._stops = conversations.stops(state)
         self._unproven: Request | None = None
         """The last command, until a reply shows that it was executed; from the first failure on it stays."""
@@ -172,6 +180,8 @@ class Conversation(Generic[T]):
             self._procedure.close()
             return self._end(error=Stopped(f"{self._name}: stopped before it was sent"))
         try:
+            if not self._wanted:
+                refuse_stranger(self._state, self._name)
             self._request = next(self._procedure)
         except StopIteration as done:
             return self._end((done.value,))
@@ -334,6 +344,12 @@ class Conversation(Generic[T]):
     @property
     def _name(self) -> str:
         return self._state.label or self._state.address or self._link.name
+
+
+def refuse_stranger(state: DriveState, name: str) -> None:
+    """Raise Inexpressible for a device that did not identify itself."""
+    if state.stranger:
+        raise Inexpressible(f"{name}: {state.stranger}; only what you type is sent to it")
 
 
 def _acts(request: Request) -> bool:

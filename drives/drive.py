@@ -15,7 +15,7 @@ from multidrop.dialects.files import SourceLine
 from multidrop.dialects.program_files import Held, ProgramFiles
 from multidrop.dialects.state import DriveState
 from multidrop.dialects.values import Value
-from multidrop.drives.conversations import ASKING, Conversation, Conversations, OnOver, awaited
+from multidrop.drives.conversations import ASKING, Conversation, Conversations, OnOver, awaited, refuse_stranger
 from multidrop.drives.events import Changed, Outcome, Transaction
 from multidrop.drives.link import Link
 from multidrop.drives.port_journal import GLOBAL
@@ -262,14 +262,14 @@ class Drive:
             return await _to_each(drives, text, check)
         procedure = self.family.perform(self.state, text)
         if check is not None:
-            procedure = _checked(check(self), procedure)
+            procedure = _checked(check(self), procedure, self)
         if to_all:
             return await self.run(self._to_all(procedure, text))
         stored, before = self.stores, self._sent
         known = protection(self.link, self.family) if not self.state.address else None
         refused = False
         try:
-            printed = await self.run(procedure)
+            printed = await self.run(procedure, typed=True)
         except NoAnswer as error:
             if self.state.address:
                 raise
@@ -424,10 +424,10 @@ class Drive:
         self.running = Running(at, runs)
         return runs
 
-    async def run(self, procedure: Procedure[T]) -> T:
-        return await awaited(lambda over: self.start(procedure, over))
+    async def run(self, procedure: Procedure[T], typed: bool = False) -> T:
+        return await awaited(lambda over: self.start(procedure, over, typed))
 
-    def start(self, procedure: Procedure[T], on_over: OnOver[T]) -> Conversation[T]:
+    def start(self, procedure: Procedure[T], on_over: OnOver[T], typed: bool = False) -> Conversation[T]:
         state = self.state
         address, *_ = before = (state.address, state.programming, state.codec)
         commanded = self._neighbours.conversation_begins(self)
@@ -449,7 +449,7 @@ class Drive:
                 link.publish(Changed(link.now(), state.address))
             on_over(outcome)
 
-        return self._conversations.start(procedure, state, over, watch)
+        return self._conversations.start(procedure, state, over, watch, typed=typed)
 
 
 def _refuse_while_stored(drives: Sequence[Drive], remedy: str) -> None:
@@ -457,7 +457,8 @@ def _refuse_while_stored(drives: Sequence[Drive], remedy: str) -> None:
         raise Refused(f"{', '.join(names)}: in program mode a command to all would be stored; {remedy}")
 
 
-def _checked(check: Procedure[None], procedure: Procedure[T]) -> Procedure[T]:
+def _checked(check: Procedure[None], procedure: Procedure[T], drive: Drive) -> Procedure[T]:
+    refuse_stranger(drive.state, drive.shown)
     yield from check
     return (yield from procedure)
 

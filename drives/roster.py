@@ -168,6 +168,12 @@ class Roster:
     def all_drives(self) -> list[Drive]:
         return list({**self.unlisted, **self.drives}.values())
 
+    @property
+    def strange(self) -> bool:
+        """No drive is known here, only a device that did not identify itself, or has not been asked yet."""
+        states = [drive.state for drive in self.all_drives] or [self.family.new_state(self.family.codec, "")]
+        return all(state.stranger for state in states)
+
     def probes(self, address: str) -> None:
         """Have a stop reach a drive that replied and is not listed."""
         self.probing = tuple(dict.fromkeys((*self.probing, address)))
@@ -207,6 +213,8 @@ class Roster:
             return listed
         like = next((drive.codec for drive in self.drives.values()), self.family.codec)
         state = family_of(like).new_state(like, address)
+        if not self.strange:
+            state.recognised()
         if address not in GLOBAL:
             state.settings_may_have_changed()
         return Drive(self.conversations, self, state)

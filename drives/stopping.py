@@ -319,7 +319,8 @@ class Stopping:
         open_, self._unconfirmed = self._unconfirmed, []
         drives = {drive: None for halt in open_ for drive in halt.not_started}
         whole = any(halt.whole and len(halt.not_started) == len(halt.affected) for halt in open_)
-        whole = whole or bool(self._link.cut) or self._missed
+        cut = bool(self._link.cut) and not self._roster.strange  # only a person's stop is for a stranger
+        whole = whole or cut or self._missed
         if not (drives or whole):
             return None
         self._roster.settings_may_have_changed(self._roster.all_drives if whole else drives)

@@ -280,6 +280,9 @@ class _MotionPoller(_Poller[str]):
     def _drive(self, thing: str) -> Drive:
         return self._roster.at(thing)
 
+    def _readable(self, drive: Drive) -> bool:
+        return super()._readable(drive) and not drive.state.stranger
+
     def _begin(self, thing: str, due: _Due, drive: Drive) -> None:
         self._converse(thing, due, partial(drive.start_motion, Priority.POLL), self._took)
 
@@ -302,7 +305,7 @@ class _MotionPoller(_Poller[str]):
 
 
 class _ValuePoller(_Poller[Value]):
-    """Polls values by their words."""
+    """Polls values by their words, which a person named."""
 
     shortest = 0.002
     retry = 0.05
@@ -316,7 +319,7 @@ class _ValuePoller(_Poller[Value]):
 
     def _begin(self, thing: Value, due: _Due, drive: Drive) -> None:
         procedure = drive.family.values.again(drive.state, thing.word, Priority.POLL)
-        self._converse(thing, due, partial(drive.start, procedure), self._took)
+        self._converse(thing, due, partial(drive.start, procedure, typed=True), self._took)
 
     def _took(self, value: Value, at: float, read: float) -> None:
         self._set_timer(self._link.now())

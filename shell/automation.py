@@ -196,9 +196,15 @@ class Automations:
             self.interrupted += [halt for halt in automation.halts if halt not in self.interrupted]
 
     def _stop(self, automation: Automation) -> None:
-        """Write the stops onto every wire first, each wire by itself; once for each automation."""
+        """Write the stops onto every wire first, each wire by itself; once for each automation.
+
+        A device that did not identify itself gets no stop that nobody asked for, and is named.
+        """
         if automation.halts or automation.stops != self._workspace.stops:
             return  # a stop of everything came meanwhile
+        strangers = [drive for drive in automation.started if drive.state.stranger]
+        for drive in strangers:
+            del automation.started[drive]
         for link, only in _by_link(automation.started).items():
             with isolated(f"the stop of {link.name}"):
                 automation.halts.append(self._halt(link, only))
@@ -206,6 +212,9 @@ class Automations:
             with isolated(f"the stop of {halt.link.name}"):
                 if bus := self._open_bus(halt.link):
                     bus.halted(halt)
+        for drive in strangers:
+            name = self._workspace.display_name(drive)
+            self._workspace.notify(f"{name}: no stop was sent, as {drive.state.stranger}", warning=True)
 
     def _halt(self, link: Link, only: list[Drive]) -> Halt:
         bus = self._open_bus(link)

@@ -20,6 +20,7 @@ from multidrop.dialects.certifying import BYTES, FITS, MOVES, Occupied, Question
 from multidrop.dialects.files import escaped_toml, text_of, toml_of
 from multidrop.dialects.on_demand import imported
 from multidrop.dialects.text import counted
+from multidrop.drives.conversations import refuse_stranger
 from multidrop.drives.drive import Drive
 from multidrop.drives.events import Concluded, Transaction
 from multidrop.shell import new_file
@@ -148,6 +149,7 @@ class Asking:
             raise Diagnostic(f"no questions are known for drives of {drive.family.name}", self._who)
         self._table, state = found, drive.state
         if not state.product:  # what is owed to a drive is kept by what the drive is
+            refuse_stranger(self._drive.state, self._who)
             raise NoAnswer(f"{self._who} was not found on this line; check its name, or give drives=NAMES in the URL")
         known = {"family": drive.family.name, "product": state.product, "version": state.version, "part": state.part}
         known["traits"] = " ".join(sorted(found.traits(state)))

@@ -137,8 +137,14 @@ class Openings:
         begin_raw(self._workspace, bus)
 
     async def raw_off(self, bus: Bus) -> None:
-        """Find the drives of a bus in raw mode. Raises NoAnswer where none replies, and it stays raw."""
+        """Find the drives of a bus in raw mode. Raises NoAnswer where none replies, and it stays raw.
+
+        It asks before that where drives in party mode would execute at the first line feed what a person has sent.
+        """
         record = self._workspace.of(bus)
+        if record.raw is not None and record.raw.half.waits:
+            what = f"no drive has replied to '{record.raw.waiting}': in party mode a drive executes it now"
+            await self._workspace.questions.confirm(what, bus.name, "nothing was sent, and Ctrl+X makes drives drop it")
         raw, record.raw = record.raw, None
         assert raw is not None and record.connection is not None, bus.name
         raw.close()
@@ -331,6 +337,8 @@ class _Opening:
                     continue
                 workspace.reconnections.add(each.bus, each.hints, each.reopen, port)
             for bus, halt in late:  # again by name, as some drives need it, and confirmed; but none started since
+                if bus.roster.strange:
+                    continue
                 standing = [drive for drive in bus.all_drives if not halt.started_since(drive)]
                 bus.halted(bus.halt(None if len(standing) == len(bus.all_drives) else standing))
             failing.pop_all()

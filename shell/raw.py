@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 
 from multidrop.dialects import Diagnostic, Priority, Stopped
 from multidrop.drives.events import Ended, Sent, Traffic
+from multidrop.drives.half_line import HalfLine
 from multidrop.shell.events import Bytes
 
 if TYPE_CHECKING:
@@ -165,6 +166,18 @@ class RawLine(ByteView):
         """Everything on the line: what automation has sent to."""
         self.end = TERMINATORS["cr"]
         """The bytes after a typed text."""
+        codec = bus.roster.family.codec
+        self.half = HalfLine(b"" if codec.framed else codec.line_ends)
+        """What the drives may hold of a person's line."""
+        self.waiting = ""
+        """The text that was sent last."""
+
+    def _take(self, event: BusEvent) -> None:
+        super()._take(event)
+        if isinstance(event, Traffic) and not event.outgoing:
+            self.half.replied(event.data)
+        elif isinstance(event, Traffic) and event.stop:
+            self.half.cleared()
 
     # Sending
 
@@ -172,6 +185,8 @@ class RawLine(ByteView):
         """Write bytes, once. Raises Stopped where a stop went first, TransportLost where the port is lost."""
         if not self.bus.link.write_raw(data):
             raise Stopped(f"{self.bus.name}: a stop went first; '{text_of(data)}' was not sent")
+        self.waiting = text_of(data)
+        self.half.written(data, self.bus.now())
 
     def encoded(self, text: str) -> bytes:
         """The bytes of a typed text, with the terminator. Raises Diagnostic for a character of several bytes."""

@@ -38,7 +38,7 @@ from multidrop.shell.openings import Failed as OpeningFailed
 from multidrop.shell.openings import Openings
 from multidrop.shell.operations.table import find
 from multidrop.shell.playing import played_by
-from multidrop.shell.raw import RawLine
+from multidrop.shell.raw import RawLine, text_of
 from multidrop.shell.twins.twins import Twins
 from multidrop.shell.waits import in_motion
 from multidrop.shell.workspace import LATCHED, Workspace
@@ -349,6 +349,7 @@ class LinePath:
         if raw is None:
             raise Diagnostic(f"{bus.name} is not in raw mode; nothing was sent", "", "/raw on begins it")
         self._allow(by)
+        await self.agreed_to_write(bus.at(""), text_of(data), by)
         if starts:
             self._session.automations.starts(raw.everyone)
         raw.send(data)
@@ -357,9 +358,21 @@ class LinePath:
         """Ask before a guarded line. Raises Diagnostic where it is not agreed to, and by a script or a macro."""
         if drive.stores:
             return
+        if drive.starts(text):
+            await self.agreed_to_write(drive, text.strip(), by)
         what = self._session.settings.guards.what(drive.family, drive.state, text)
         if what:
             await self._session.questions.confirm(what, self._session.display_name(drive), by=by)
+
+    async def agreed_to_write(self, drive: Drive, what: str, by: By) -> None:
+        """Let only a person, or who agreed beforehand, write to a device that did not identify itself.
+
+        Raises Diagnostic for a script, a macro, and lines of a front end that cannot ask.
+        """
+        if drive.state.stranger and not (by is By.OPERATOR and self._session.front.ask is not None):
+            name = self._session.display_name(drive)
+            writes = f"'{what}' writes" if what else "it writes"
+            await self._session.questions.confirm(f"{writes}, and {drive.state.stranger}", name, by=by)
 
     async def _undoubted(self, buses: Sequence[Bus], by: By) -> None:
         """Ask once for each line that lacks names, units or guards. Raises Diagnostic where that is not agreed to.

@@ -332,5 +332,6 @@ def _described(drive: Drive, begun: float, now: float) -> str:
             return f"moves at {drive.seen.velocity} a second"
         running = _program(drive, begun)
         return "runs a program, which may move it" if running is not None and running.runs else ""
-    known = bool(drive.product) or drive.seen is not None or drive.commands
+    named = drive.product and not drive.state.stranger
+    known = named or drive.seen is not None or drive.commands
     return f"is not known: {last_seen(drive, now)}" if known else ""

@@ -60,6 +60,7 @@ class SharedDrive(NamedTuple):
     version: str
     programming: bool
     unreferenced: tuple[str, ...]
+    stranger: str = ""
 
 
 class SharedBus(NamedTuple):
@@ -127,6 +128,7 @@ def shared(app: MultidropApp) -> Shared:
                 each.version,
                 each.programming,
                 tuple(sorted(each.state.unreferenced)),
+                each.state.stranger,
             )
             for each in bus.drives.values()
         )

@@ -384,6 +384,7 @@ def _add(bus: Bus, drive: SharedDrive) -> None:
     state = family.new_state(family.codec, drive.address)
     state.identified(drive.product, drive.version)
     state.reference_lost(drive.unreferenced)
+    state.recognised(drive.stranger)
     if drive.programming:
         state.found_storing()
     bus.roster.found(state)

@@ -18,6 +18,7 @@ from multidrop.api.returns import Returns
 from multidrop.api.streams import AsyncStream
 from multidrop.api.telemetry import AsyncTelemetry
 from multidrop.dialects import Diagnostic, Stopped
+from multidrop.drives.conversations import refuse_stranger
 from multidrop.drives.drive import Drive
 from multidrop.shell import stop_report
 from multidrop.shell.automation import ENDING, outcome, settled
@@ -114,9 +115,11 @@ class Calls:
         return self._moves.setdefault(drive, asyncio.Lock())
 
     def telemetry(self, drives: Sequence[Drive], rate: float) -> AsyncTelemetry:
-        """Begin to read drives until the session is closed. Raises Diagnostic."""
+        """Begin to read drives until the session is closed. Raises Diagnostic; Inexpressible for a stranger."""
         if not rate > 0:
             raise Diagnostic(f"no rate {rate:g}", "telemetry", "valid: above 0, samples a second; math.inf")
+        for drive in drives:
+            refuse_stranger(drive.state, self.shell.display_name(drive))
         return self.kept(AsyncTelemetry(self.shell, drives, rate))
 
     def kept(self, stream: S) -> S:

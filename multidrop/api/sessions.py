@@ -19,6 +19,7 @@ from multidrop.api.returns import Returns
 from multidrop.api.telemetry import RATE, AsyncTelemetry
 from multidrop.dialects import Diagnostic, DriveError
 from multidrop.dialects.errors import Timeout
+from multidrop.drives.events import isolated
 from multidrop.drives.telemetry import PERIOD
 from multidrop.shell import stop_report, waits
 from multidrop.shell.automation import settled
@@ -107,7 +108,10 @@ class AsyncSession:
     def _end_early(self) -> None:
         """Write the stop of every line: the process ends, and the event loop does no more."""
         if self._calls.opened:
-            self._shell.stop_ahead()
+            for name, bus in list(self._shell.buses.items()):
+                with isolated(f"the stop of {name}"):
+                    if not bus.roster.strange:  # nobody asks for this stop: only a known drive gets it
+                        bus.stop_ahead()
             self._notice("a session was not closed; the stop of its lines was sent, and no drive was asked", True)
 
     async def _open(self) -> None:

@@ -17,6 +17,7 @@ from urllib.parse import urlsplit
 
 from multidrop.dialects import Diagnostic
 from multidrop.dialects.text import real
+from multidrop.drives.conversations import refuse_stranger
 from multidrop.drives.drive import Drive
 from multidrop.drives.telemetry import FASTEST, MODEST
 from multidrop.shell.connect.urls import listening
@@ -179,11 +180,16 @@ def _value(workspace: Session, bus: str, address: str, word: str, text: str) -> 
 
 
 async def read_first(workspace: Session, series: Sequence[Series]) -> None:
-    """Read each value once, as a person would, before it is polled. Raises the refusal of a drive that lacks it."""
+    """Read each value once, as a person would, before it is polled. Raises the refusal of a drive that lacks it.
+
+    Of a device that did not identify itself only values that a person named are read: Inexpressible for its motion.
+    """
     for bus, address, word in series:
         drive = workspace.buses[bus].drives[address]
-        if word != DIFFERENCE and word:
-            await drive.run(drive.family.values.first(drive.state, word))
+        if not word:
+            refuse_stranger(drive.state, workspace.display_name(drive))
+        elif word != DIFFERENCE:
+            await drive.run(drive.family.values.first(drive.state, word), typed=True)
 
 
 MAX = "max"

@@ -91,7 +91,8 @@ async def _publish(registry: Registry, urls: Sequence[str], reconnect: bool) -> 
         absent = await open_lines(session, urls, reconnect)
         for outlet in outlets:
             await outlet.begin()
-        drives, lines = sum(len(bus.drives) for bus in session.buses.values()), len(session.buses)
+        every = [drive for bus in session.buses.values() for drive in bus.drives.values()]
+        drives, lines = sum(not drive.state.stranger for drive in every), len(session.buses)
         what = f"{counted(drives, 'drive')} on {counted(lines, 'line')}"
         where = " and ".join(outlet.text for outlet in outlets)
         write(sys.stderr, f"publishing {what} to {where}; Ctrl+C ends it")

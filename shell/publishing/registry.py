@@ -17,6 +17,7 @@ from multidrop.dialects.text import real
 from multidrop.dialects.units import Takes
 from multidrop.dialects.values import UNREAD, Conditions
 from multidrop.drives.bus import Bus
+from multidrop.drives.drive import Drive
 from multidrop.drives.events import Changed, Conditioned, Lost, Sample, Silent
 from multidrop.shell.events import OnBus, SessionEvent
 from multidrop.shell.session import Session
@@ -264,6 +265,8 @@ class _Line:
         self._registry, self._bus = registry, bus
         self._drives: dict[str, DriveValues] = {}
         self._ends: list[Callable[[], None]] = []
+        self._strangers: set[Drive] = set()
+        """The devices that did not identify themselves, and that were named."""
         self._look()
 
     def take(self, event: object) -> None:
@@ -284,7 +287,12 @@ class _Line:
         word = ONLINE if self._bus.lost is None else LOST
         if word != self._registry.words.get(self._bus.name):
             self._registry.line(self._bus.name, word)
-        addresses = list(self._bus.drives)
+        addresses = [address for address, drive in self._bus.drives.items() if not drive.state.stranger]
+        for drive in self._bus.drives.values():
+            if drive.state.stranger and drive not in self._strangers:
+                self._strangers.add(drive)
+                name = self._registry.session.display_name(drive)
+                self._registry.warn(f"{name}: nothing is published, as {drive.state.stranger}")
         if addresses == list(self._drives):
             return
         self.close()

@@ -17,7 +17,7 @@ from multidrop.dialects.text import counted
 from multidrop.drives.drive import Drive
 from multidrop.drives.events import Lost
 from multidrop.macros import Macro
-from multidrop.shell.automation import outcome, settled
+from multidrop.shell.automation import Claim, outcome, settled
 from multidrop.shell.events import FAILURES, By, OnBus, SessionEvent
 from multidrop.shell.playing import NO_ROLES, cast
 from multidrop.shell.scripts.captured_prints import hearing
@@ -79,6 +79,7 @@ async def ended_by_loss(execution: Execution, buses: Collection[str]) -> AsyncIt
 async def run_script(session: Session, script: Script, executed: Executed = lambda result: None) -> None:
     """Execute a script. `executed` gets the result of each line. Raises the first failure."""
     own = script_claims(session, script)
+    await _agreed(session, own, By.SCRIPT)
     with hearing(session) as heard:
         execution = Execution(session, heard, executed)
         async with (
@@ -88,6 +89,12 @@ async def run_script(session: Session, script: Script, executed: Executed = lamb
         ):
             await execution.block(script.body, Frame(dict(script.values), By.SCRIPT))
     execution.check_verified()
+
+
+async def _agreed(session: Session, own: Collection[Claim], by: By) -> None:
+    """Refuse a script that writes to a device that did not identify itself before its first line. Raises Diagnostic."""
+    for link, address in sorted(own, key=lambda claim: (claim[0].name, claim[1])):
+        await session.path.agreed_to_write(session.bus(link.name).at(address), "", by)
 
 
 async def run_typed(session: Session, lines: Sequence[str], executed: Executed) -> None:
@@ -126,6 +133,7 @@ async def play(
     roles = bind(session, macro, roles)
     name, begun = macro.name, session.now()
     own = macro_claims(session, played, roles)
+    await _agreed(session, own, By.MACRO)
     claimed = sorted({link.name for link, _ in own})  # a set of links has another order in each run
     state, ports = session.settings.state, {bus: session.of(session.buses[bus]).port for bus in claimed}
     with hearing(session) as heard, crash_marks.playing(state, ports.values(), name, session.wall(begun)):

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections import deque
 from dataclasses import dataclass
 
+from multidrop.drives.half_line import Parts, Rest
 from multidrop.transports import telnet
 from multidrop.transports.telnet import OPTION, PURGE_BOTH, REPLY, Setting, message, parsed
 
@@ -41,8 +42,8 @@ Input = bytes | Request
 class Client:
     """Divides the bytes of one client into data and requests, and encodes the bytes for it."""
 
-    def __init__(self, name: str, text: bool) -> None:
-        """`text`: the line's language is text."""
+    def __init__(self, name: str, text: bool, size: int = 0) -> None:
+        """`text`: the line's language is text; else `size` is that of its messages, bytes."""
         self.name = name
         self.com_port = False
         """It has agreed on RFC 2217."""
@@ -54,6 +55,8 @@ class Client:
         """What has been received from it and is not worked off."""
         self.begun = b""
         """The beginning of a line or message that came while another client wrote."""
+        self.rest = Rest()
+        self.parts = Parts(size)
         self.setting = False
         """A setting of its is being changed: what follows waits for that."""
         self._text = text

@@ -99,6 +99,7 @@ class SharedPort:
             self._do(self._exchange.close(number, "closed", "the port is shared no longer"))
         for connection in tuple(self._connections.values()):
             connection.end()
+        self._do(self._exchange.over())
         with contextlib.suppress(TimeoutError):
             await asyncio.wait_for(self._left.wait(), FLUSH)
         for connection in tuple(self._connections.values()):
@@ -179,8 +180,9 @@ class SharedPort:
             elif isinstance(action, Close):
                 self._connections[action.client].say_goodbye(action.farewell)
             elif isinstance(action, Write):
-                if self._transport.pending > AHEAD:
+                if self._transport.pending > AHEAD and action.client in self._exchange.clients:
                     lost = counted(len(action.data), "byte")
+                    self._exchange.unwritten(self._loop.time())
                     ahead = f"it wrote {AHEAD} bytes more than the line has taken; {lost} dropped"
                     self._do(self._exchange.close(action.client, "dropped", ahead))
                     continue
@@ -194,7 +196,7 @@ class SharedPort:
             elif isinstance(action, Purge):
                 dropped = self._transport.discard(whole=self._exchange.framed)
                 self._purged += dropped
-                self._do(self._exchange.dropped(dropped))
+                self._do(self._exchange.dropped(dropped, True, self._loop.time()))
             else:
                 self._begin(self._apply(action))
 
@@ -346,7 +348,8 @@ async def _share(url: str, address: str, as_json: bool, over: asyncio.Event) -> 
         stop_bytes(connection.hints.family)
     narrator = Narrator(as_json)
     opened = await open_port(connection)
-    shared = SharedPort(opened, stop_bytes(opened.family, connection.hints.drives), narrator.say)
+    hints = connection.hints
+    shared = SharedPort(opened, stop_bytes(opened.family, hints.drives, hints.party), narrator.say)
     try:
         try:
             endpoint = await shared.open(host, port)

@@ -1,4 +1,4 @@
-"""The stops in the bytes of a client, for the languages that may be on a line; and the line that a stop cuts off.
+"""The stops in the bytes of a client, for the languages that may be on a line; and what makes a begun line harmless.
 
 A line whose URL names no language may have any language that is text. Their stops differ, and none is a command of
 another one. Where messages carry their length, a single byte has no meaning: only a whole message can be a stop.
@@ -12,58 +12,9 @@ from dataclasses import dataclass
 
 from multidrop.dialects import Diagnostic, StopPiece
 from multidrop.dialects.families import DEFAULT, FAMILIES, TABLE
+from multidrop.drives.half_line import CR, LF, LONGEST
 
 ENDS = b"\r\n"
-LONGEST = 80
-"""Bytes of an unfinished line that are kept."""
-_LINES = re.compile(b"[\r\n]")
-
-
-class HalfLine:
-    """The bytes of the present line. `framed`: messages carry their length, so no line is ever begun."""
-
-    def __init__(self, framed: bool) -> None:
-        self.text = b""
-        self._framed = framed
-        self._cut = False
-        """The last stop came from another client within this line."""
-        self._skipping = False
-        """The rest of that line is dropped."""
-
-    def written(self, data: bytes) -> list[bytes]:
-        """Take bytes that were written; return the lines that they end, or the messages."""
-        if self._framed:
-            return [data]
-        *ended, begun = _LINES.split(self.text + data)
-        self.text = begun[-LONGEST:]
-        return ended
-
-    def stopped(self, others: bool) -> bytes:
-        """Note a stop; return the beginning of the line that it cut off, which only the stop of `others` does."""
-        begun, self.text = self.text, b""
-        self._cut = others and bool(begun)
-        return begun if self._cut else b""
-
-    def dropped(self) -> None:
-        """Note that the beginning of the line was dropped: its rest is dropped, too, if another client cut it."""
-        self._skipping, self._cut = self._skipping or self._cut, False
-
-    def ended(self) -> None:
-        self.text = b""
-
-    def begin_writer(self) -> None:
-        """Drop no rest: the next bytes are another line's."""
-        self._skipping = False
-
-    def rest(self, data: bytes) -> bytes:
-        """Return bytes without the rest of a line whose beginning a stop has dropped."""
-        if not self._skipping:
-            return data
-        end = next((at for at, byte in enumerate(data) if byte in ENDS), None)
-        self._skipping = end is None
-        return b"" if end is None else data[end + 1 :]
-
-
 KEYS = rb"[\x03\x1b]"
 """Ctrl+C and ESC, which stop on every line of text."""
 CERTAIN = 1.0
@@ -85,8 +36,12 @@ class StopBytes:
     pattern: re.Pattern[bytes]
     framed: bool
     invalidate: bytes = b""
+    ends: bytes = b""
+    """The bytes that may end a line; empty where messages carry their length."""
     moves: Callable[[bytes], bool] = lambda line: False
     """Whether a line, or the beginning of one once something ends it, may start a motion or a program."""
+    half_sent: bytes = b""
+    """The stop of this side without a byte that ends a line."""
     own: tuple[StopPiece, ...] = ()
     """The stop of this side, piece by piece: in the language of the family, or the default one, in every form."""
 
@@ -111,6 +66,22 @@ class StopBytes:
         size = len(self.own[0].data)
         at = len(data) // size * size if self.framed else max(data.rfind(b"\r"), data.rfind(b"\n")) + 1
         return (data, b"") if len(data) - at > LONGEST else (data[:at], data[at:])
+
+    @property
+    def size(self) -> int:
+        """The bytes of a message that carries its length; 0: lines of text."""
+        return len(self.own[0].data) if self.framed else 0
+
+    def harmless(self, waits: bool) -> bytes:
+        """What makes the drives drop a begun line. `waits`: commands may wait in it, so the drives are stopped, too."""
+        if LF not in self.ends:
+            return self.invalidate
+        dropped = self.invalidate.rstrip(ENDS) + ENDS
+        return self.half_sent + dropped + self.own[0].data if waits else dropped
+
+    def ends_line(self, stop: bytes) -> bool:
+        """Whether the text of a begun line is gone after this stop. A key alone may be another one than ES selects."""
+        return self.invalidate[:-1] in stop or (self.ends == b"\r" and stop.endswith(b"\r"))
 
     def binary(self, data: bytes) -> bool:
         """Whether a read holds a byte that no language of text has: then no byte of the writer's is a stop."""
@@ -175,8 +146,11 @@ class OwedStop:
             self._senders.clear()
 
 
-def stop_bytes(family: str, drives: Sequence[str] = ()) -> StopBytes:
-    """The stops of a family's lines; empty: of any language that is text. `drives`: those known. Raises Diagnostic."""
+def stop_bytes(family: str, drives: Sequence[str] = (), party: bool | None = None) -> StopBytes:
+    """The stops of a family's lines; empty: of any language that is text. `drives`: those known. Raises Diagnostic.
+
+    `party`: whether the drives use names (MCode); None: not known, unless several drives are.
+    """
     names = [family] if family else [name for name, row in TABLE.items() if not row.scheme]
     shared = [each for name in names if (each := FAMILIES[name]).stop_bytes is not None]
     if not shared:
@@ -187,7 +161,8 @@ def stop_bytes(family: str, drives: Sequence[str] = ()) -> StopBytes:
     codec, language = FAMILIES[family or DEFAULT].codec, FAMILIES[family or DEFAULT].language
     own = (StopPiece(codec.stop(drives, False), 0.0), *codec.stop_again(drives, False))
     if framed:
-        return StopBytes(re.compile(b"(?:" + found[0] + b")+", re.DOTALL), True, b"", shared[0].message_moves, own)
+        pattern = re.compile(b"(?:" + found[0] + b")+", re.DOTALL)
+        return StopBytes(pattern, True, moves=shared[0].message_moves, own=own)
     pattern = re.compile(b"|".join([*found, KEYS]))
 
     def moves(line: bytes) -> bool:
@@ -198,4 +173,6 @@ def stop_bytes(family: str, drives: Sequence[str] = ()) -> StopBytes:
         known = any(map(language.knows, re.findall("[A-Z]+", text.upper())))
         return known and codec.starts_motion(text)
 
-    return StopBytes(pattern, False, codec.invalidate(), moves, own)
+    party = True if party is None and len(drives) > 1 else party
+    ends = codec.line_ends if party is None or len(codec.line_ends) == 1 else bytes([LF if party else CR])
+    return StopBytes(pattern, False, codec.invalidate(), ends, moves, codec.stop(drives, False, half_sent=True), own)

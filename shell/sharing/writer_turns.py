@@ -2,7 +2,8 @@
 
 The first client to write is the writer, until it leaves or is silent for ten seconds. Bytes of another one are refused,
 and its connection is closed. A stop passes from any client, before what waits: those bytes are dropped. Every client is
-sent what the drives send.
+sent what the drives send. No drive executes a line of which two clients have written a part: what one has begun is made
+harmless before the next one writes, and the rest of it is dropped.
 
 A stop that the drives may not have received, because the port is lost, is owed: it is the first thing written once the
 port is back.
@@ -13,8 +14,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from multidrop.dialects.text import counted, visible
+from multidrop.drives.half_line import HalfLine
 from multidrop.shell.sharing.client import Client, Input, Request
-from multidrop.shell.sharing.stop_bytes import ENDS, HalfLine, OwedStop, StopBytes
+from multidrop.shell.sharing.settling import Settling
+from multidrop.shell.sharing.stop_bytes import ENDS, NOTICED, OwedStop, StopBytes
 from multidrop.transports.telnet import FLOW, FLOW_IN, GROUPS, NEEDED, PURGE_RECEIVED, Control, Setting, group_of
 
 
@@ -109,9 +112,12 @@ class Exchange:
         """The time at which the writer wrote last."""
         self._setter: int | None = None
         """The client that has set the baud rate while there was no writer."""
-        self._line = HalfLine(stops.framed)
+        self._line = HalfLine(stops.ends)
+        self.settling = Settling()
         self._before: int | None = None
         """The last writer."""
+        self._answered = True
+        """The drives have sent something since the last bytes were written."""
         self._away = ""
         """The reason why the port is lost; empty: it is open."""
         self.owed = OwedStop(stops.own)
@@ -121,13 +127,13 @@ class Exchange:
     def deadline(self) -> float | None:
         """The time of the next `advance`: 0.0 while clients wait for a turn, else when the writer has been silent."""
         if any(each.waiting and not each.setting for each in self.clients.values()):
-            return 0.0
+            return self.settling.until
         return None if self.writer is None else self._last + SILENT
 
     # Clients
 
     def connect(self, client: int, name: str) -> list[Action]:
-        self.clients[client] = Client(name, not self.framed)
+        self.clients[client] = Client(name, not self.framed, self._stops.size)
         self._say(client, "connected")
         return self._done()
 
@@ -136,7 +142,10 @@ class Exchange:
             if self.writer in (None, client):
                 for each in self.clients[client].waiting:
                     if isinstance(each, bytes):
-                        self._write(client, each, self._last)
+                        self._write(client, each, self._last, gone=True)
+            self._unsent(
+                client, self.clients[client].parts.forgotten(), "the beginning of a message", "its client left"
+            )
             self._say(client, "left")
             self._free(client)
             del self.clients[client]
@@ -177,9 +186,11 @@ class Exchange:
     def lose(self, reason: str, now: float, returns: bool = True) -> list[Action]:
         """Close all connections: the port is lost. Until `back`, a client is closed as soon as it sends anything.
 
-        `returns`: the port has a stable name.
+        `returns`: the port has a stable name. What was written shortly before may have left in part.
         """
         self._away = reason
+        if not self._answered and now < self._last + NOTICED:
+            self._line.doubted(now)
         self.owed.lost(now)
         outcome = OWED if returns else NEVER
         for name in self.owed.names:
@@ -198,7 +209,14 @@ class Exchange:
         """Send bytes of the drives to every client."""
         if not self._away:
             self.owed.received(now)
+            self._answered = True
+            self._line.replied(data)
+        settles = bool(self.settling.until)
+        if settles:
+            self.settling.took(data, now)
         for number, client in self.clients.items():
+            if settles and number == self.writer:
+                continue
             if not client.refused and (sent := client.data(data)):
                 self._actions.append(Send(number, sent))
             elif client.overflowed:
@@ -239,7 +257,8 @@ class Exchange:
         if self._away:
             self._say(client, NOT_REACHED, f"the port is lost; {OWED}")
             return []
-        self._stop(stop, others)
+        self._unsent(client, known.parts.forgotten(), "the beginning of a message", "a stop came")
+        self._stop(stop, others or client != self._before, now)
         self._say(client, "stop", _text(stop))
         if others:
             before, rest = before.strip(ENDS), rest.strip(ENDS)
@@ -262,26 +281,40 @@ class Exchange:
         if self._away:
             self._actions.append(Say(who, NOT_REACHED, f"the port is lost; {OWED}"))
         else:
-            self._stop(self._stops.mended(stop) if owed else stop, True)
+            self._stop(self._stops.mended(stop) if owed else stop, True, now)
             self._actions.append(Say(who, "stop", _text(stop) + ", owed since the loss of the port" * owed))
         return self._done()
 
-    def _stop(self, stop: bytes, others: bool) -> None:
-        """Stop, and drop the bytes that wait for their client's turn.
+    def _stop(self, stop: bytes, others: bool, now: float) -> None:
+        """Stop, and drop the bytes that wait for their client's turn. `others`: not by who has begun the line.
 
         Within a line of another client it first makes that line harmless: a PMX would take both for one command.
         """
         waited = {number: each.overtaken() for number, each in self.clients.items()}
-        overtaken = waited[self.writer] if others and self.writer is not None else b""
-        self._line.written(overtaken)
-        cut, mended = self._line.stopped(others), self._stops.mended(stop)
-        self._actions.append(Stop(mended if cut and not self._stops.binary(cut) else stop, mended))
-        if overtaken:
-            self._line.dropped()
+        if others and self.writer is not None:
+            waiting = dict(self._line.open)  # the bytes that a stop overtakes are not written
+            self._line.written(waited[self.writer], now)
+            self._line.open = waiting
+        cut, mended = self._line.text if others else b"", self._stops.mended(stop)
+        mends = bool(cut) and not self._stops.binary(cut[:-1])  # its last byte may be a check byte
+        self._actions.append(Stop(mended if mends else stop, mended))
+        if cut:
+            self._drop_rest()
+        if mends or self._stops.ends_line(stop):
+            self._line.overflowed()
         for number, data in waited.items():
             if data:
                 unsent = counted(len(data), "byte that came before a stop was", "bytes that came before a stop were")
                 self._say(number, "unsent", f"{unsent} dropped")
+
+    def _drop_rest(self) -> None:
+        """Drop the rest of the line that the last writer has begun, should it still come."""
+        if self._before in self.clients:
+            self.clients[self._before].rest.dropping = True
+
+    def _unsent(self, client: int, data: bytes, what: str, why: str) -> None:
+        if data:
+            self._say(client, "unsent", f"{what} ({_text(data)}) was dropped, as {why}")
 
     def _work(self, client: int, now: float) -> None:
         """Work off a few requests and writes of a client: the others are read after that."""
@@ -290,43 +323,82 @@ class Exchange:
             each, left = known.waiting.popleft(), left - 1
             if isinstance(each, Request):
                 self._request(client, each)
-            else:
-                self._write(client, each, now)
+            elif not self._write(client, each, now):
+                known.waiting.appendleft(each)
+                break
         if not known.refused and (replies := known.taken()):
             self._actions.append(Send(client, replies))
 
-    def _write(self, client: int, data: bytes, now: float) -> None:
+    def _write(self, client: int, data: bytes, now: float, gone: bool = False) -> bool:
+        """Write bytes; return False where they must wait for the drives. `gone`: the client hears no reply."""
         known = self.clients[client]
         if known.refused:
-            return
+            return True
         if self.writer is None:
-            self._begin(client)
+            self._begin(client, now)
         elif client != self.writer:
             name = self.clients[self.writer].name
             self._close(client, "refused", f"{name} writes, until it leaves or is silent for {SILENT:g} s")
-            return
+            return True
         self._last = now
-        if data := self._line.rest(data):
-            if any(map(self._stops.moves, self._line.written(data))):
+        if not (gone or self._settled(client, now)):
+            return False
+        left = known.rest.left(data)
+        self._unsent(client, data[: len(data) - len(left)], "the rest of a line", "its beginning was made harmless")
+        if left := known.parts.whole(left):
+            if any(map(self._stops.moves, self._line.written(left, now))):
                 self.owed.started()
-            self._actions.append(Write(client, data))
+            self._actions.append(Write(client, left))
+            self._answered = False
+        return True
 
-    def _begin(self, client: int) -> None:
+    def _settled(self, client: int, now: float) -> bool:
+        """Whether the drives have replied to what made a line harmless; the writer was not sent that, so it is said."""
+        over = self.settling.over(now)
+        if over and self.settling.heard:
+            self._say(client, "unfinished", f"the drives' reply was not passed on: '{_text(self.settling.heard)}'")
+            self.settling.heard = b""
+        return over
+
+    def _begin(self, client: int, now: float) -> None:
         """Make a client the writer. What another one has begun, and this one's first end of a line would execute, ends
         harmlessly.
         """
         if client != self._before:
-            if self._stops.moves(self._line.text):
-                self._say(client, "unfinished", f"'{_text(self._line.text)}' of the writer before is made harmless")
-                self._actions.append(Write(client, self._stops.invalidate))
-            self._line.ended()
-        self._line.begin_writer()
+            if self._line.begun:
+                self._end_harmlessly(client, now)
+            if (before := self.clients.get(self._before or 0)) is not None:
+                self._unsent(self._before or 0, before.parts.forgotten(), "the beginning of a message", "others write")
         self.writer, self._before = client, client
         self._say(client, "writes")
 
-    def dropped(self, count: int) -> list[Action]:
+    def _end_harmlessly(self, client: int, now: float) -> None:
+        text = _text(self._line.text) or "a line that no drive has replied to"
+        stops = "; it may hold commands that only a stop drops, so the drives were stopped" * self._line.waits
+        self._say(client, "unfinished", f"'{text}' of the writer before is made harmless{stops}")
+        harmless = self._stops.harmless(self._line.waits)
+        self._actions.append(Write(client, harmless))
+        self.settling.begin(now, len(harmless), self.values["baud"])
+        if self._line.text:
+            self._drop_rest()
+        self._line.cleared()
+
+    def over(self) -> list[Action]:
+        """Make harmless what was begun: sharing ends, and others use the port then."""
+        if self._line.begun and not self._away:
+            self._actions.append(Write(self._before or 0, self._stops.harmless(self._line.waits)))
+            self._line.cleared()
+        return self._done()
+
+    def unwritten(self, now: float) -> None:
+        """Note that bytes of the last `Write` were not written."""
+        self._line.doubted(now)
+
+    def dropped(self, count: int, purged: bool = False, now: float = 0.0) -> list[Action]:
+        """Note that the port has dropped so many bytes; `purged`: nothing that makes a line harmless follows."""
         if count:
-            self._line.dropped()
+            if purged:
+                self._line.doubted(now)
             who = self.clients[self.writer].name if self.writer is not None else ""
             self._actions.append(
                 Say(

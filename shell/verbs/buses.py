@@ -70,6 +70,7 @@ async def drives(call: Call) -> None:
             mark = "*" if drive is workspace.selected else " "
             mode = " (in program mode)" if drive.programming else ""
             mode += " (position not referenced)" if drive.state.unreferenced else ""
+            mode += " (not identified)" if drive.state.stranger else ""
             words = (mark, workspace.display_name(drive), drive.label, model(drive))
             workspace.output(" ".join(word for word in words if word) + mode)
 

@@ -160,8 +160,9 @@ def _registered(call: Call) -> tuple[Drive, Registers[Any]]:
 
 async def _show(call: Call, drive: Drive, talk: Procedure[tuple[str, ...]], *, writes: bool = False) -> None:
     if writes:
+        await call.session.path.agreed_to_write(drive, f"{call.verb.name} {call.rest.strip()}", call.by)
         call.session.path.starting(drive)
-    for line in await drive.run(talk):
+    for line in await drive.run(talk, typed=True):
         call.session.output(line)
 
 

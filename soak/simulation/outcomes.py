@@ -236,6 +236,8 @@ def _half(world: World) -> Iterator[str | Granted]:
     typed |= {(line, text) for line, _, text in told.repeated} | {(each.line, each.text) for each in told.stored}
     typed |= {(line, text) for run in told.runs.values() for line, _, text in (*run.texts, *run.on_early_end)}
     for each in history.executed:
+        if (each.line, each.text) in told.half:
+            yield f"{each.line}:{each.drive} executed {each.text!r} at {each.at:.3f}, which a client has only begun"
         if not NUMBERED.fullmatch(each.text) or (each.line, each.text) in typed:
             continue
         whole = [text for line, text in typed if line == each.line and text.startswith(each.text)]

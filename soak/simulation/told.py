@@ -92,6 +92,8 @@ class Told:
     """When everything was stopped."""
     stored: list[Put] = field(default_factory=list)
     """Lines for a drive in program mode."""
+    half: set[tuple[str, str]] = field(default_factory=set)
+    """Lines that a client of a shared port has begun, and never ended."""
     raw: list[Put] = field(default_factory=list)
     """Texts for a line in raw mode."""
     raw_written: dict[str, bytearray] = field(default_factory=dict)

@@ -160,8 +160,10 @@ async def test_a_write_is_in_doubt_until_the_error_is_read_although_the_server_h
     bus = Bus("eth", await open_tcp(*server.sockets[0].getsockname()), family="modbus")
     bus.start()
     try:
+        drive = bus.at("")
+        drive.state.recognised()
         with pytest.raises(TransportLost, match="; it is not known whether 'MA 700' was executed") as lost:
-            await bus.at("").send("MA 700")
+            await drive.send("MA 700")
         assert (lost.value.unproven, lost.value.executed) == ("MA 700", "")
     finally:
         await bus.close()
@@ -182,7 +184,9 @@ async def test_answers_that_come_byte_by_byte():
     bus = Bus("eth", await open_tcp(*server.sockets[0].getsockname()), family="modbus")
     bus.start()
     try:
-        (motion,) = await bus.at("").motion(Priority.POLL)
+        drive = bus.at("")
+        drive.state.recognised()
+        (motion,) = await drive.motion(Priority.POLL)
         assert (motion.position, motion.velocity) == (0x1234, 0x1234)
     finally:
         await bus.close()

@@ -307,3 +307,33 @@ def test_rows_hold_every_byte_and_no_control_character(data):
         assert all(row.isprintable() and row.isascii() for row in shown)
     assert bytes.fromhex("".join(Form.HEX.rows(data))) == data
     assert parse_bytes(hex_of(data)) == data and text_of(data) == "".join(Form.TEXT.rows(data))
+
+
+@pytest.mark.parametrize("answer", [True, False])
+async def test_a_line_that_waits_in_a_party_is_executed_by_the_search_for_drives_after_a_yes_only(tmp_path, answer):
+    asked = []
+
+    async def ask(question):
+        asked.append(question)
+        return answer
+
+    async with opened(tmp_path, party("a", CK=0), query="?drives=a") as shop:
+        await say(shop, "/bytes LF LF", "aVM=77777")
+        shop.session.front.ask = ask
+        if answer:
+            await shop.session.run("/raw off")
+        else:
+            with pytest.raises(Diagnostic, match="the answer was no"):
+                await shop.session.run("/raw off")
+            assert "line" in shop.session.raw
+            shop.session.stop()
+            await shop.session.run("/raw off")
+        assert asked == [r"line: no drive has replied to 'aVM=77777\r': in party mode a drive executes it now"]
+        await say(shop, "PR VM")
+        assert (shop.device("line:a").memory.values["VM"] == 77777) is answer
+
+
+async def test_a_line_that_a_drive_has_replied_to_asks_nothing(shop):
+    await say(shop, "PR P")
+    await shop.session.run("/raw off")
+    assert "line" not in shop.session.raw

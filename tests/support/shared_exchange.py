@@ -7,7 +7,7 @@ from multidrop.shell.sharing.writer_turns import Action, Close, Exchange, Purge,
 from multidrop.transports import telnet
 from multidrop.transports.telnet import OPTION
 
-ADA, BOB, EVE = 1, 2, 3
+ADA, BOB, EVE, DAN = 1, 2, 3, 4
 HELLO = telnet.option(telnet.WILL, OPTION)
 """The first bytes of a client that speaks RFC 2217."""
 MST = bytes([1, 3, 0, 0, 0, 0, 0, 0, 4])
@@ -17,9 +17,11 @@ ROR = bytes([1, 1, 0, 0, 0, 0, 0, 100, 102])
 class Port:
     """An exchange whose port takes all bytes at once, unless it is `slow`: then they wait until they are dropped."""
 
-    def __init__(self, family: str = "", slow: bool = False) -> None:
-        self.exchange = Exchange(stop_bytes(family), 9600)
+    def __init__(self, family: str = "", slow: bool = False, party: bool | None = None) -> None:
+        self.exchange = Exchange(stop_bytes(family, (), party), 9600)
         self.slow = slow
+        self.settles = True
+        """Time passes until what follows a line that was made harmless is written."""
         self.written = b""
         self.waiting = b""
         self.sent: dict[int, bytes] = {ADA: b"", BOB: b"", EVE: b""}
@@ -30,8 +32,19 @@ class Port:
             self.do(self.exchange.connect(client, name))
         self.said.clear()
 
+    def join(self, client: int) -> None:
+        """Connect one more client."""
+        self.sent[client] = b""
+        self.do(self.exchange.connect(client, f"client {client}"))
+
     def send(self, client: int, data: bytes, now: float = 0.0) -> None:
         self.do(self.exchange.receive(client, data, now))
+        while self.settles and (until := self.exchange.settling.until):
+            self.do(self.exchange.advance(until))
+
+    def reply(self, data: bytes = b"0\r\n", now: float = 0.0) -> None:
+        """Have the drives send something."""
+        self.do(self.exchange.printed(data, now))
 
     def do(self, actions: list[Action]) -> None:
         for each in actions:

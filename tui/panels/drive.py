@@ -307,6 +307,8 @@ def poll_words(glance: Glance, now: float, polling: bool) -> str:
     """The rate of polling on the wire: `polls 41 Hz`."""
     if glance.lost:
         return "not polled"
+    if glance.stranger:
+        return "not identified, not polled"
     if not polling:
         return "polling off"
     rate = glance.readout.rate(now)

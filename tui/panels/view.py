@@ -40,6 +40,8 @@ class Glance:
     unit: str = "steps"
     unreferenced: frozenset[str] = frozenset()
     """The axes whose position does not count since a restart."""
+    stranger: str = ""
+    """Why it may be no drive; empty: it is one."""
 
     def counts(self, axis: Readout) -> bool:
         """True if the position of an axis is not known to have lost its reference."""
@@ -96,6 +98,7 @@ def glances_of(session: Session, model: ScreenModel, bus: Bus) -> list[Glance]:
             storing=drive.programming,
             lost=bus.lost is not None,
             unreferenced=drive.state.unreferenced,
+            stranger=drive.state.stranger,
         )
         for address, drive in bus.drives.items()
     ]

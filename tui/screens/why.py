@@ -154,6 +154,8 @@ def facts(view: View, glance: Glance, drive: Drive) -> Iterator[tuple[str, str, 
         yield "lost", str(bus.lost), "error"
     elif readout.silent_since is not None:
         yield "silent", SILENT.format(f"{wall(readout.silent_since):%H:%M:%S}"), "error"
+    if glance.stranger:
+        yield "unknown", f"{glance.stranger}; only what you type is sent to it", "error"
     lines, actions = error_lines(drive, readout.axes), drive.family.values.actions
     if lines and actions.error:
         yield "EF=1", "an error is set; its number is not read, as that clears it", "strong"

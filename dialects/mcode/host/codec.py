@@ -171,6 +171,7 @@ class MCode(Codec):
     escape: int | None = None
     family: ClassVar[str] = "mcode"
     broadcasts: ClassVar[bool] = True
+    line_ends: ClassVar[bytes] = b"\r\n"
     stop_debris: ClassVar[re.Pattern[str]] = re.compile(r".*#")
 
     @property

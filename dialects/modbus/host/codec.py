@@ -24,6 +24,9 @@ END_NUMBER, SLEW_NUMBER = 0xFFFE, 0xFFFF
 WRITES = (framing.WRITE_COIL, framing.WRITE_REGISTERS, framing.WRITE_SPECIFIC)
 """Their replies do not confirm the execution: the drive's error flag shows that it refused one."""
 
+UNKNOWN = "this device did not identify itself as a Lexium drive"
+"""What is said of a device whose identification (43/14) does not name a Lexium drive, or was not read."""
+
 
 @cache
 def pdu_codec() -> PduCodec:
@@ -123,6 +126,7 @@ def _foreign(buffer: bytes) -> str:
 
 @dataclass(eq=False)
 class ModbusState(DriveState):
-    """One Ethernet drive over Modbus."""
+    """One Ethernet drive over Modbus, or another device: a stranger until its identification is read."""
 
     codec: Modbus
+    stranger: str = UNKNOWN

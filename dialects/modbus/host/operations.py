@@ -1,12 +1,13 @@
 """Conversations with an Ethernet drive over Modbus: identification, typed lines, motion, registers and outputs.
 
-Identification only reads: nothing moves, no error is cleared.
+Identification only reads: nothing moves, no error is cleared. A device that does not identify itself as a Lexium drive
+is a stranger (`DriveState.stranger`): it is sent the request of a typed line, and no request more.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 from multidrop.dialects.certifying import Certifying
 from multidrop.dialects.codec import End, Kind, Priority, Procedure, Reply, Request
@@ -18,7 +19,7 @@ from multidrop.dialects.mcode.manual import grammar
 from multidrop.dialects.mcode.manual.points import STATUS, in_words
 from multidrop.dialects.mcode.manual.program_file import commented, spaced
 from multidrop.dialects.modbus.host import framing, mapping
-from multidrop.dialects.modbus.host.codec import Modbus, ModbusState, pdu_codec
+from multidrop.dialects.modbus.host.codec import UNKNOWN, Modbus, ModbusState, pdu_codec
 from multidrop.dialects.modbus.host.mapping import Reading
 from multidrop.dialects.modbus.manual.registers import AT, REGISTERS, ROWS, Register
 
@@ -47,7 +48,7 @@ def answered(state: ModbusState, asked: Request) -> Procedure[bytes]:
     reply = yield asked
     if reply.end is End.REFUSED:
         code = None
-        if reply.body[1] in (ILLEGAL_VALUE, FAILURE):
+        if reply.body[1] in (ILLEGAL_VALUE, FAILURE) and not state.stranger:
             code = yield from error_number(state)
         raise refusal(state, asked, reply, code)
     return sure(state, asked, reply)
@@ -116,8 +117,11 @@ def _quietly(state: ModbusState, name: str) -> Procedure[int | None]:
 def carried_out(state: ModbusState, text: str, pdu: bytes) -> Procedure[bytes]:
     """Send a command and verify that the drive executed it. Raises Refused or NoAnswer.
 
-    An earlier error is read and reported first, so that the command is not blamed for it.
+    An earlier error is read and reported first, so that the command is not blamed for it. Of a stranger no error is
+    read: its reply is all that is known.
     """
+    if state.stranger:
+        return (yield from answered(state, request(state, text, pdu)))
     if state.error and (code := (yield from error_number(state))):
         state.note(f"{who(state)}: an old error, now cleared: {described(code, state)}")
     clear = not state.error
@@ -181,6 +185,8 @@ def _printed(state: ModbusState, statement: grammar.Statement) -> Procedure[tupl
         word, reading = item
         answer = yield from answered(state, request(state, f"PR {word}", reading.pdu))
         pieces.append(shown(state, word, reading, answer))
+        if state.stranger:
+            continue
         if word == "ER":
             report_error(state, int(pieces[-1]))
         elif word == "EF":
@@ -212,6 +218,8 @@ def every_register(state: ModbusState) -> Procedure[tuple[str, ...]]:
     is 1. It omits V1 to V8 always: reading one is an error unless a program has declared it (over MCode UV prints
     them).
     """
+    if state.stranger:
+        raise Inexpressible(f"'PR AL' was not sent, as {state.stranger}. Read one register: PR P, or /register 0x57")
     if (yield from flagged(state)):
         state.note(f"{who(state)}: ER is left out, as reading it clears it; its error flag is set (EF=1)")
     plain = state.product.startswith("LMDO")
@@ -321,7 +329,14 @@ def identification(state: ModbusState, code: int = mapping.EVERY_OBJECT) -> Proc
 
 
 def device(state: ModbusState) -> Procedure[tuple[str, ...]]:
+    """Print the identification. What it says decides from now on whether the device is a stranger."""
     found = yield from identification(state)
+    before = state.stranger
+    recognise(state, found)
+    if before and not state.stranger:
+        state.note(f"this device identified itself as {state.product} now, so it is used as a Lexium drive")
+    elif state.stranger and not before:
+        state.note(WARNING)
     names = dict(enumerate(mapping.OBJECTS))
     return tuple(f"{names.get(number, f'object {number}')}: {text}" for number, text in sorted(found.items()))
 
@@ -330,26 +345,46 @@ BASIC = 1
 """The first three objects of the identification, which are mandatory."""
 PRODUCT = re.compile(r"LMD[A-Z]E")
 PART, VERSION = 1, 6
+WARNING = (
+    f"{UNKNOWN}, so its registers may mean other things. Only what you type is sent to it. Ctrl+X sends it the stop of "
+    f"a Lexium drive: function 65 (E), then 0 to registers 0x{REGISTERS['SL'].address:04X} and "
+    f"0x{REGISTERS['SL'].address + 1:04X}. /device asks it again what it is"
+)
+"""What a person must know of a stranger."""
 
 
 def identify(hints: Hints) -> Procedure[list[ModbusState]]:
     state = ModbusState(Modbus())
-    found: dict[int, str] = {}
-    for code in (mapping.EVERY_OBJECT, BASIC):  # as far as the drive supports it
-        try:
-            found = yield from identification(state, code)
-            break
-        except Refused:
-            continue
-    text = " ".join(found.get(number, "") for number in (VERSION, PART))
-    product = PRODUCT.search(text)
-    part = found.get(PART, "")
-    state.identified(product.group() if product else part, found.get(VERSION, ""), part)
-    if not product:
-        state.note(f"{who(state)} does not say that it is an LMDOE or LMDCE: its registers may mean other things")
-    if (yield from flagged(state)):
+    recognise(state, (yield from _announced(state)))
+    if state.stranger:
+        state.note(WARNING)
+    elif (yield from flagged(state)):
         state.note(f"{who(state)}: its error flag is set (EF=1); PR ER shows and clears the error")
     return [state]
+
+
+def recognise(state: ModbusState, found: Mapping[int, str]) -> None:
+    """Record what a device says of itself; without the name of a Lexium drive it is a stranger."""
+    text = " ".join(found.get(number, "") for number in (VERSION, PART))
+    product, part = PRODUCT.search(text), found.get(PART, "")
+    state.identified(product.group() if product else part, found.get(VERSION, ""), part)
+    state.recognised("" if product else UNKNOWN)
+
+
+def _announced(state: ModbusState) -> Procedure[dict[int, str]]:
+    """Read the identification, as far as the device supports it: empty where it does not.
+
+    A reply that does not come is asked for once more: without it a drive would be a stranger, or not open.
+    """
+    for code in (mapping.EVERY_OBJECT, BASIC):
+        try:
+            try:
+                return (yield from identification(state, code))
+            except NoAnswer:
+                return (yield from identification(state, code))
+        except Refused:
+            continue
+    return {}
 
 
 CERTIFYING = Certifying[ModbusState](

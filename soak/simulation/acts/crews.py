@@ -18,6 +18,7 @@ from multidrop.shell.events import FAILURES
 from soak.simulation.act import Act
 from soak.simulation.acts.automation import Lines, later, motion, pause, refused, tell
 from soak.simulation.acts.files import download
+from soak.simulation.acts.guests import half_line
 from soak.simulation.acts.phrases import PHRASES, STOP, number, target
 from soak.simulation.acts_connections import another
 from soak.simulation.cut_ins import OWN_WORK, WRITING, Aim, points
@@ -386,5 +387,6 @@ AFTER_CREWS = (
         "same question", 1, same_question, fault=True, where=lambda world: any(each.names[1:] for each in world.places)
     ),
     Act("marks in lines", 1, marks_in_lines),
+    Act("half line at a share", 1, half_line, where=lambda world: bool(world.shares)),
 )
 """The last of all, each once."""

@@ -82,7 +82,7 @@ def say(talk, far):
 
 
 def state(**more):
-    return ModbusState(Modbus(), product="LMDCE", **more)
+    return ModbusState(Modbus(), product="LMDCE", stranger="", **more)
 
 
 def type_(text, far, drive=None):
@@ -364,7 +364,7 @@ def test_a_device_that_does_not_identify_itself_is_opened_and_said_so():
         return Reply(end=End.REFUSED, body=bytes((code, 1)))
 
     (drive,) = say(identify(Hints()), far)
-    assert drive.product == "" and "does not say" in drive.notes[0] and not drive.error
+    assert drive.product == "" and "did not identify itself as a Lexium drive" in drive.notes[0] and not drive.error
 
 
 def test_an_identification_in_two_parts_is_put_together():
