@@ -35,16 +35,19 @@ ENDLESS = Activity(1 << 40)
 """Of a drive that another stop kept from being read: faster than any."""
 
 
-async def read_activity(drive: Drive) -> tuple[Activity, str]:
-    """Read and publish what a drive does; NOTHING with the reason where that cannot be read."""
+async def read_activity(drive: Drive, axes: frozenset[str] | None) -> tuple[Activity, str]:
+    """Read and publish what a drive does; NOTHING with the reason where that cannot be read. `axes`: those that count.
+
+    None: all axes.
+    """
     if drive.programming and not drive.engaged:
         return NOTHING, "its velocity cannot be read in program mode"
     try:
-        axes = await drive.motion()
+        found = await drive.motion()
         assert drive.seen is not None
         at = drive.seen.transmitted_at
-        runs, why = axes[0].program, ""
-        if runs is None and not any(axis.velocity for axis in axes):  # a drive that moves is stopped again
+        runs, why = found[0].program, ""
+        if runs is None and not any(axis.velocity for axis in found):  # a drive that moves is stopped again
             try:
                 runs = await drive.busy()
             except Stopped:
@@ -55,7 +58,9 @@ async def read_activity(drive: Drive) -> tuple[Activity, str]:
         return ENDLESS, ""
     except (TimeoutError, DriveError, TransportLost) as error:
         return NOTHING, f"its velocity could not be read: {error}"
-    for each in axes:
+    for each in found:
         drive.link.publish(Sample(at, drive.address, each.position, each.velocity, each.axis, each.trouble, runs))
-    speed = abs(drive.seen.velocity) if drive.seen is not None and not why else 0
-    return Activity(speed, bool(runs) and not why, "" if why else ", ".join(str(each.position) for each in axes)), why
+    speeds = zip(found, drive.seen.velocities, strict=True) if drive.seen is not None and not why else ()
+    speed = max((abs(each) for axis, each in speeds if axes is None or axis.axis in axes), default=0)
+    places = "" if why else ", ".join(str(each.position) for each in found)
+    return Activity(speed, bool(runs) and not why, places), why

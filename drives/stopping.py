@@ -78,6 +78,8 @@ class Halt:
     """What it stops, by drive; empty: everything."""
     single: bool = False
     """Its bytes stop what was `started`, and nothing else of the link."""
+    rests: dict[Drive, int] = field(default_factory=dict)
+    """How often in a row the axes that were started were read at rest, where other axes may go on."""
     programs: dict[Drive, bool | None] = field(default_factory=dict)
     """The drives whose programs it ends, and whether one ran; None: not known."""
     vain: bool = False
@@ -115,9 +117,10 @@ class Halt:
         if self.started_since(drive):
             return Fate.STARTED
         since = max(self.at, drive.started_at)  # a refused line may have run an error routine in the drive
+        if self.spares_programs(drive) and drive in self.rests:
+            return (Fate.MOVING, Fate.SENT, Fate.STANDING)[min(self.rests[drive], 2)]
         seen = drive.seen if drive.seen is not None and drive.seen.at > since else None
         runs = drive.running.runs if drive.running is not None and drive.running.at > since else None
-        runs = False if self.spares_programs(drive) else runs
         if seen is not None and seen.at_rest(since) and runs is False:
             return Fate.STANDING
         if not self.data or drive in self.missed or isinstance(self.link.lost, Undelivered):
@@ -466,13 +469,17 @@ class Stopping:
 
     async def _read(self, drive: Drive, halt: Halt) -> Activity:
         """Read what a drive does; where that cannot be read, it is a doubt of the stop."""
-        found, why = await read_activity(drive)
+        spares = halt.spares_programs(drive)
+        found, why = await read_activity(drive, halt.started[drive].axes if spares else None)
         if why:
             halt.doubts[drive] = why
             drive.link.notify(f"{drive.shown}: stop sent, but {why}", warning=True)
         elif found is not ENDLESS:
             halt.doubts.pop(drive, None)
-        return found._replace(runs=False) if halt.spares_programs(drive) else found
+        if spares and halt.single and not why and found is not ENDLESS:
+            halt.rests[drive] = 0 if found.speed else halt.rests.get(drive, 0) + 1
+            return found._replace(runs=False)
+        return found
 
     def _once_more(self, halt: Halt, active: Mapping[Drive, Activity], tries: int) -> None:
         """Stop again what goes on, or give up and say so."""

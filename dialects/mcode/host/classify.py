@@ -168,6 +168,17 @@ def vouched(text: str, product: str) -> bool:
     )
 
 
+@lru_cache(maxsize=256)
+def refused_by_tables(text: str, product: str) -> bool:
+    """Whether a drive refuses a line for sure: its word is unknown, or a number is out of range."""
+    statement = parsed(text)
+    row = lookup(statement.word, product) if statement is not None else None
+    if statement is None or row is None:
+        return True
+    numbers = [each.value for each in statement.arguments[:1] if isinstance(each, Number)]
+    return any(not (row.accepts(each) or row.accepts(each, encoder=True)) for each in numbers)
+
+
 def may_displace(text: str) -> bool:
     """Whether a line may change where the drive goes, or what its positions count."""
     return starts_motion(text) or written_word(text) in SCALE

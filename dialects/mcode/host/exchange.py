@@ -242,7 +242,7 @@ def refused(state: MCodeState, request: Request, acknowledged: bool = False) -> 
         )
     caveat = "; a program runs, whose error it may be" if (yield from _runs(state)) else ""
     refusal = f"{who(state)} refused '{request.text}': {described(code, state)}{caveat}"
-    raise Refused(refusal, code, certain=not caveat)
+    raise Refused(refusal, code, certain=not caveat or classify.refused_by_tables(request.text, state.product))
 
 
 def _came_by_itself(request: Request, code: int) -> bool:
