@@ -37,7 +37,8 @@ POLL = 0.02
 TRIAL = 10.0
 """The time for the trial of the stop key, s."""
 AGREED = "/resume agrees to that (send, run: --yes)"
-UNKNOWN = "any other drive on this line"
+UNKNOWN = " and any other drive on this line"
+"""What the stop of a line without an address stops as well."""
 Claim = tuple["Link", str]
 """A link and an address on it; a global address is all of the link."""
 _current: ContextVar[Automation | None] = ContextVar("automation", default=None)
@@ -320,12 +321,11 @@ def outcome(workspace: Workspace, halts: list[Halt]) -> list[str]:
     lines = []
     if sent:
         tally = stop_report.of_halts(sent, workspace.wall(sent[0].at), len(workspace.buses) > 1)
-        names = [_names(workspace, halt.drives) or halt.link.name for halt in sent]
-        lines.append(f"{'stopped' if tally.stand else 'stop sent to'} {', '.join(names)}: {stop_report.words(tally)}")
-    for halt in sent:
-        others = [*filter(None, [_names(workspace, halt.others)]), *[UNKNOWN] * halt.reaches_unknown]
-        if others:
-            lines.append(f"{halt.link.name} has only one stop, so these stopped too: {', and '.join(others)}")
+        names = ", ".join(_names(workspace, halt.drives) or halt.link.name for halt in sent)
+        every = UNKNOWN if any(halt.reaches_unknown for halt in sent) else ""
+        lines.append(f"{'stopped' if tally.stand else 'stop sent to'} {names}{every}: {stop_report.words(tally)}")
+    if others := _names(workspace, [drive for halt in sent for drive in halt.others]):
+        lines.append(f"their line has only one stop, so these stopped too: {others}")
     programs = {drive: ran for halt in sent for drive, ran in halt.programs.items()}
     for ran, said in ((True, "program ended"), (None, "program ended, if one was running")):
         if ended := _names(workspace, [drive for drive, each in programs.items() if each is ran]):

@@ -131,9 +131,8 @@ async def test_a_drive_that_does_not_obey_its_own_stop_gets_that_of_the_line(tmp
         finally:
             type(drive.codec).stop_started = kept
         assert shop.moving() == set()
-        assert "press has only one stop, so these stopped too: b, c, and any other drive on this line" in (
-            shop.warned()
-        )
+        assert "their line has only one stop, so these stopped too: b, c" in shop.warned()
+        assert [text for text in shop.warned() if text.startswith("stop sent to a and any other drive on this line: ")]
 
 
 async def test_a_silent_drive_has_an_unknown_fate_and_is_stopped(tmp_path):
