@@ -122,9 +122,8 @@ async def test_a_line_to_all_is_all(shop):
     with pytest.raises(DriveError):
         await script(shop.session, "@press:* SL 50000", "@stages:* JX+", "/sleep 1", "/wait stopped 1")
     assert shop.moving() == set()
-    assert shop.warned()[-2] == (
-        "stopped press:a, press:b, stages:00, stages:01 and any other drive on this line: velocity 0 was read from all 4"
-    )
+    every = "press:a, press:b, stages:00, stages:01 and any other drive on this line"
+    assert shop.warned()[-2] == f"stopped {every}: velocity 0 was read from all 4"
 
 
 async def test_a_program_counts_when_it_is_executed_and_not_when_it_is_stored(tmp_path, shop):
