@@ -163,8 +163,12 @@ def vouched(text: str, product: str) -> bool:
         names = [each for each in statement.arguments if not isinstance(each, (Text, Number))]
         rows = [lookup(each.word, product) if isinstance(each, Name) else None for each in names]
         return all(each is not None and each.access != "-" for each in rows)
-    return row is not None and all(
-        isinstance(each, Number) and row.accepts(each.value) and row.access != "RO" for each in statement.arguments
+    return (
+        row is not None
+        and len(statement.arguments) <= 1
+        and all(
+            isinstance(each, Number) and row.accepts(each.value) and row.access != "RO" for each in statement.arguments
+        )
     )
 
 

@@ -159,7 +159,7 @@ def examine(world: World, run: Run) -> None:
             continue  # a person's motion of a drive that the run had moved ends with it
         elif not moves and before.at < run.ended and _only_ended_by(world, run, before):
             words = f"{text}: {before.text!r} was not of it, and was stopped"
-            if not run.moves:
+            if not run.moves and "refused '" in run.failure:
                 told.unspared.append(words)
             elif not _stopped_as_well(world, before):
                 told.stopped_too.append(words)

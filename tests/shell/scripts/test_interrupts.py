@@ -15,10 +15,7 @@ from tests.support.until import PATIENCE
 pytestmark = pytest.mark.process
 
 CELL = bus("press", party("a"), party("b"), baud=0, serve=[*TCP, "pty:press.tty"])
-STOPPED = (
-    "interrupted; stopped a, b and any other drive on this line: velocity 0 was read from both\n"
-    "program ended, if one was running: a, b\n"
-)
+STOPPED = "interrupted; stopped a, b: velocity 0 was read from both\nprogram ended, if one was running: a, b\n"
 
 
 KNOWN = "party=1&checksum=1&em=1"
