@@ -41,7 +41,7 @@ async def sending(
     Raises what the body raises, Diagnostic where the line must not start the drive, Stopped.
     """
     automation = automations.current
-    if automation is not None and text and _has_routine(drive) and drive not in automation.started:
+    if automation is not None and not parts and _has_routine(drive) and drive not in automation.started:
         await at_rest.look_before(drive, text)
     what = drive.codec.started(text) if text else Started()
     stored, at = drive.stores, drive.link.stamp()
