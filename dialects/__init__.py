@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from multidrop.dialects.codec import Procedure as Procedure
     from multidrop.dialects.codec import Reply as Reply
     from multidrop.dialects.codec import Request as Request
+    from multidrop.dialects.codec import Started as Started
     from multidrop.dialects.codec import StopPiece as StopPiece
     from multidrop.dialects.errors import Diagnostic as Diagnostic
     from multidrop.dialects.errors import DriveError as DriveError
@@ -34,7 +35,7 @@ if TYPE_CHECKING:
     from multidrop.dialects.state import Owed as Owed
 
 _MODULES = {
-    "codec": ("Codec", "Decoded", "End", "Kind", "Priority", "Procedure", "Reply", "Request", "StopPiece"),
+    "codec": ("Codec", "Decoded", "End", "Kind", "Priority", "Procedure", "Reply", "Request", "Started", "StopPiece"),
     "errors": ("Diagnostic", "DriveError", "Inexpressible", "NoAnswer", "Refused", "Stopped"),
     "family": ("Family", "Hints", "Motion", "Progress"),
     "files": ("SourceLine",),

@@ -164,6 +164,22 @@ class StopPiece(NamedTuple):
     quiet: float = 0.1
 
 
+@dataclass(frozen=True)
+class Started:
+    """What lines can start in a drive; without values: anything."""
+
+    axes: frozenset[str] | None = None
+    """The axes, named as in `Motion.axis`; None: any."""
+    program: bool = True
+    """A program."""
+    lasts: bool = True
+    """It can move the drive again after the drive was at rest: an input or a joystick does, or a correction."""
+
+    def __or__(self, other: Started) -> Started:
+        axes = None if self.axes is None or other.axes is None else self.axes | other.axes
+        return Started(axes, self.program or other.program, self.lasts or other.lasts)
+
+
 class Codec(ABC):
     """One drive's language as that drive is set: bytes out, replies in, and the stop."""
 
@@ -181,6 +197,10 @@ class Codec(ABC):
     """Drives reply to a stop, so two stops that are written at once have replies that collide."""
     stop_debris: ClassVar[re.Pattern[str] | None] = None
     """Unsolicited lines that a stop leaves and no program prints: replies to it, damaged ones; None: none."""
+    spares: ClassVar[bool] = False
+    """`stop_started` ends no program that was not started, and stops no other axis."""
+    error_routine: ClassVar[bool] = False
+    """An error can start a routine in the drive, which may move it."""
 
     @abstractmethod
     def encode(self, request: Request) -> bytes:
@@ -221,9 +241,24 @@ class Codec(ABC):
     def hears_stop(self, data: bytes, address: str, sure: bool = True) -> bool:
         """Whether the bytes of other drives' stop also stop the drive at this address. `sure`: as for `stop`."""
 
+    def stops_unknown(self, data: bytes) -> bool:
+        """Whether the bytes of a stop also stop drives of the line that nobody knows."""
+        return False
+
     @abstractmethod
     def starts_motion(self, text: str) -> bool:
         """Whether a typed line can start motion or a program; an unknown command can."""
+
+    def started(self, text: str) -> Started:
+        """Return what a line that `starts_motion` can start."""
+        return Started()
+
+    def stop_started(self, address: str, started: Started) -> Sequence[StopPiece]:
+        """The stop of what was started in one drive, where it reaches less than `stop`; empty: there is none.
+
+        Unlike `stop` it needs a line that works and a drive that reads lines.
+        """
+        return ()
 
     def damaged(self, line: str) -> bool:
         """Whether a checksum shows that an unsolicited line was damaged on the wire."""

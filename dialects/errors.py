@@ -8,11 +8,15 @@ class DriveError(Exception):
 
 
 class Refused(DriveError):
-    """The drive refused. `code` is its own error number (MCode: section 10), None where it gives none."""
+    """The drive refused. `code` is its own error number (MCode: section 10), None where it gives none.
 
-    def __init__(self, message: str, code: int | None = None) -> None:
+    Not `certain`: the error may be another's, and the line may have been executed.
+    """
+
+    def __init__(self, message: str, code: int | None = None, *, certain: bool = True) -> None:
         super().__init__(message)
         self.code = code
+        self.certain = certain
 
 
 class NoAnswer(DriveError):

@@ -295,6 +295,8 @@ class Family(Generic[S]):
     """Whether messages that carry their length can start a motion or a program."""
     in_frames: Callable[[bytes], Sequence[str]] = lambda data: ()
     """The addresses of its drives whose replies, with their checksums, are in what an unknown line sent."""
+    vouched: Callable[[str, str], bool] = lambda text, product: False
+    """Whether the tables show nothing for which a drive of a product would refuse a line."""
     protection: Protection | None = None
     """None: its drives have none."""
     prepare: Callable[[], object] | None = None

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any, Protocol, TypeVar
 
 from multidrop.dialects.codec import Codec, Priority, Procedure
@@ -20,13 +19,12 @@ from multidrop.drives.events import Changed, Outcome, Transaction
 from multidrop.drives.link import Link
 from multidrop.drives.port_journal import GLOBAL
 from multidrop.drives.protected_units import Values, protection, silent
+from multidrop.drives.readings import REST as REST
+from multidrop.drives.readings import Judged, Seen
+from multidrop.drives.readings import Running as Running
 from multidrop.transports import TransportLost
 
 T = TypeVar("T")
-REST = 0.05
-"""The least time between two readings that show a drive at rest, s."""
-RECENT = 1.0
-"""The longest time between two readings that are compared where nothing else is known of the time between, s."""
 
 
 class Neighbours(Protocol):
@@ -47,63 +45,6 @@ class Neighbours(Protocol):
 
     def conversation_ended(self, drive: Drive, before: str, commanded: bool) -> None:
         """Update the list. `before`: the address at the start; `commanded`: more was sent than questions."""
-
-
-@dataclass(frozen=True)
-class Seen:
-    """The last reading of a drive's motion."""
-
-    at: float
-    """When it was requested, s of the link's clock."""
-    velocity: int
-    """Velocity of the fastest axis, signed, per second; where it reads 0 on the way, as the positions show it."""
-    velocities: tuple[int, ...] = ()
-    """That of each axis."""
-    transmitted_at: float = float("-inf")
-    """When its last request had left."""
-    confirms: float = float("-inf")
-    """When the latest reading was requested that shows the same rest, and at least REST earlier; -inf: none does."""
-
-    def at_rest(self, since: float | None = None) -> bool:
-        """Whether two readings after `since`, REST apart, show it at rest; by default two recent ones."""
-        return self.confirms > (self.at - RECENT if since is None else since)
-
-
-class Judged:
-    """The readings of a drive's motion, each judged by those before it."""
-
-    def __init__(self) -> None:
-        self.still: list[float] = []
-        """When the last readings in a row were requested that show it at rest in one place."""
-        self._last = (float("-inf"), tuple[int, ...]())
-
-    def reading(self, at: float, transmitted_at: float, axes: Sequence[Motion], in_place: bool) -> Seen:
-        """Judge a reading. `in_place`: at rest the position must stay, too."""
-        (before, places), here = self._last, tuple(axis.position for axis in axes)
-        self._last = at, here
-        velocities = [axis.velocity for axis in axes]
-        displaced = in_place and here != places
-        if displaced and len(here) == len(places) and 0 < at - before < RECENT:
-            for number, way in enumerate(after - earlier for earlier, after in zip(places, here, strict=True)):
-                if way and not velocities[number]:
-                    velocities[number] = round(way / (at - before)) or (1 if way > 0 else -1)
-        velocity = max(velocities, key=abs)
-        if velocity or displaced:
-            self.still.clear()
-        earlier = [each for each in self.still if each <= at - REST]
-        if not velocity:
-            self.still = [*earlier[-1:], *self.still[len(earlier) :], at]
-        return Seen(at, velocity, tuple(velocities), transmitted_at, earlier[-1] if earlier else float("-inf"))
-
-
-@dataclass(frozen=True)
-class Running:
-    """The last reading of a drive's programs."""
-
-    at: float
-    """When it was requested, s of the link's clock."""
-    runs: bool
-    """Whether one runs, which can move the drive again."""
 
 
 Check = Callable[["Drive"], Procedure[None]]
@@ -137,6 +78,12 @@ class Drive:
         """Number of lines under way that can start it, and that it may still refuse."""
         self.commands = 0
         """Number of requests sent to it that may do more than ask."""
+        self.requests = 0
+        """Number of requests sent to it."""
+        self.rested_at = float("-inf")
+        """When a wait last asked whether it moves, and it did not."""
+        self.noted: tuple[float, bool] | None = None
+        """When it was last asked both whether it moves and whether a program runs, and whether it did either."""
         self.homings: dict[str, tuple[int, float, int]] = {}
         """What had been sent, and the stops, as the last homing of each axis had begun."""
         self.homed: dict[str, bool] = {}
@@ -224,9 +171,10 @@ class Drive:
         `check`: runs in the same conversation right before the line, which is not sent if that raises.
         """
         self.check_line(text)
-        if not self.starts(text):
+        if starts := self.starts(text):
+            self.check_start(text)
+        if not starts or self.one_by_one:
             return await self._send(text, check)
-        self.check_start(text)
         before = {each: each.commanded_at for each in self._meant}
         self.starts_now()
         noted = self.commanded_at
@@ -256,10 +204,9 @@ class Drive:
 
     async def _send(self, text: str, check: Check | None) -> tuple[str, ...]:
         to_all = self.state.address in GLOBAL
-        if to_all and not self.codec.broadcasts:
-            drives = self._neighbours.all_drives
-            _refuse_while_stored(drives, "end that mode first")
-            return await _to_each(drives, text, check)
+        if self.one_by_one:
+            _refuse_while_stored(self.recipients, "end that mode first")
+            return await _to_each(self.recipients, text, check)
         procedure = self.family.perform(self.state, text)
         if check is not None:
             procedure = _checked(check(self), procedure, self)
@@ -352,6 +299,16 @@ class Drive:
                 each._judged.still.clear()
 
     @property
+    def one_by_one(self) -> bool:
+        """Whether it stands for all drives of a line whose language has no command to all: each gets its own."""
+        return self.state.address in GLOBAL and not self.codec.broadcasts
+
+    @property
+    def recipients(self) -> list[Drive]:
+        """The drives that get a line for it."""
+        return self._neighbours.all_drives if self.one_by_one else [self]
+
+    @property
     def _meant(self) -> list[Drive]:
         return [self, *self._neighbours.all_drives] if self.state.address in GLOBAL else [self]
 
@@ -411,8 +368,10 @@ class Drive:
 
     async def rest(self) -> tuple[int, ...] | None:
         """Read whether it rests: None while it moves; else what a reading REST later must show again, too."""
+        at = self.link.now()
         if await self.run(self.family.moving(self.state)):
             return None
+        self.rested_at = at
         if not self.family.rests_in_place:
             return ()
         axes = await self.motion()
@@ -434,6 +393,7 @@ class Drive:
 
         def watch(transaction: Transaction) -> None:
             nonlocal commanded
+            self.requests += transaction.sent
             if transaction.request.kind not in ASKING:
                 commanded, self.commands = True, self.commands + transaction.sent
 

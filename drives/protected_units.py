@@ -45,4 +45,8 @@ class Values:
             return error
         self._refused.add(word)
         text = known.text(product) if len(self._refused) >= ENOUGH else ""
-        return Refused(f"{error}; every value so far was refused: {text}", error.code) if text else error
+        return (
+            Refused(f"{error}; every value so far was refused: {text}", error.code, certain=error.certain)
+            if text
+            else error
+        )

@@ -14,17 +14,17 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
-from enum import Enum
+from dataclasses import dataclass
 from typing import NamedTuple
 
-from multidrop.dialects import Codec, DriveError, DriveState, Stopped, StopPiece
+from multidrop.dialects import Codec, DriveState, Started, StopPiece
 from multidrop.drives.drive import Drive
-from multidrop.drives.events import Sample, Traffic, isolated
-from multidrop.drives.link import Link
+from multidrop.drives.events import Traffic, isolated
+from multidrop.drives.halts import Fate as Fate
+from multidrop.drives.halts import Halt as Halt
 from multidrop.drives.port_journal import GLOBAL
 from multidrop.drives.roster import Roster
-from multidrop.transports import TransportLost, Undelivered
+from multidrop.drives.stop_readings import ENDLESS, Activity, read_activity
 
 TRIES = 3
 BETWEEN = 0.1
@@ -33,81 +33,6 @@ RAMP = 30.0
 """How long a drive is read that slows down, or was stopped in vain, s."""
 AGAIN = 3
 """How often a stop is written again for a drive that stored it."""
-
-
-class Fate(Enum):
-    """What is known of a drive since a stop."""
-
-    SENT = "sent, not read yet, or at velocity 0 once"
-    STANDING = "read at rest since, and no program runs"
-    MOVING = "velocity read as not 0 since"
-    RUNNING = "a program runs, read since"
-    NOT_KNOWN = "sent, and the velocity, or whether a program runs, cannot be read"
-    NOT_REACHED = "not sent: the line is lost, or writing failed"
-    STARTED = "started again since, by a command"
-
-
-@dataclass(eq=False)
-class Halt:
-    """A stop of one link. What is known of a drive follows from the stop, and from what was read and sent since.
-
-    `drives` are those that it is for, `others` those that its bytes stop as well.
-    """
-
-    link: Link
-    at: float
-    """When it was written, s of the link's clock."""
-    number: int
-    """Later stops of the same link have higher numbers."""
-    whole: bool
-    """It is for everything on the link, known or not."""
-    drives: tuple[Drive, ...]
-    others: tuple[Drive, ...] = ()
-    data: bytes = b""
-    """The bytes written; empty if none were."""
-    missed: set[Drive] = field(default_factory=set)
-    """Drives whose part of the stop could not be made."""
-    trouble: list[str] = field(default_factory=list)
-    """Why it was not written, or not for all."""
-    doubts: dict[Drive, str] = field(default_factory=dict)
-    """Why a drive could not be read."""
-    stored: list[Drive] = field(default_factory=list)
-    """The drives that had stored it, once for each time that it was written again for them."""
-    vain: bool = False
-    """A drive moves on, or its program runs on, after the last attempt to stop it."""
-
-    @property
-    def delivered(self) -> bool:
-        """Whether its bytes have left, with a part for every drive."""
-        return bool(self.data) and not self.missed and not isinstance(self.link.lost, Undelivered)
-
-    @property
-    def affected(self) -> tuple[Drive, ...]:
-        return self.drives + self.others
-
-    @property
-    def not_started(self) -> tuple[Drive, ...]:
-        """The drives that it stops and that no command has started since."""
-        return tuple(drive for drive in self.affected if not self.started_since(drive))
-
-    def started_since(self, drive: Drive) -> bool:
-        """Whether a command that can start the drive was sent after the stop and not refused."""
-        return drive.commanded_at > self.at
-
-    def fate(self, drive: Drive) -> Fate:
-        """What is known of one of its drives now."""
-        if self.started_since(drive):
-            return Fate.STARTED
-        since = max(self.at, drive.started_at)  # a refused line may have run an error routine in the drive
-        seen = drive.seen if drive.seen is not None and drive.seen.at > since else None
-        runs = drive.running.runs if drive.running is not None and drive.running.at > since else None
-        if seen is not None and seen.at_rest(since) and runs is False:
-            return Fate.STANDING
-        if not self.data or drive in self.missed or isinstance(self.link.lost, Undelivered):
-            return Fate.NOT_REACHED
-        if (seen is not None and seen.velocity) or runs:
-            return Fate.MOVING if seen is not None and seen.velocity else Fate.RUNNING
-        return Fate.NOT_KNOWN if self.link.lost or drive in self.doubts else Fate.SENT
 
 
 @dataclass(frozen=True)
@@ -173,6 +98,24 @@ def stop_forms(roster: Roster, only: Iterable[Drive] | None = None) -> StopForms
     return StopForms(joined(immediate), joined(unterminated), tuple(repeats), joined(invalidate), framed, tuple(missed))
 
 
+def single_forms(started: Mapping[Drive, Started]) -> StopForms | None:
+    """Make the bytes that stop what was started in these drives, and nothing else; None where a drive has no such stop.
+
+    That needs a drive that is known to read lines, and whose settings are known.
+    """
+    pieces: list[StopPiece] = []
+    framed = False
+    for drive, what in started.items():
+        unsure = drive.state.settings_unknown or drive.programming or drive.missing
+        own = () if unsure else drive.codec.stop_started(drive.address, what)
+        if not own:
+            return None
+        pieces += own
+        framed = framed or drive.codec.framed
+    first, *rest = pieces
+    return StopForms(first.data, first.data, (*rest, *pieces), b"", framed)
+
+
 class Written(NamedTuple):
     """A stop that was written."""
 
@@ -232,10 +175,12 @@ class Stopping:
     def halt(self, only: Iterable[Drive] | None = None, follows: bool = True) -> Halt:
         """Write a stop of all drives or some, and nothing else: no watcher hears of it before `halted`.
 
+        `only` as a mapping: what was started in each of them; only that is stopped, where the line allows it.
         `follows`: it may be the one that follows a call of `ahead`. Failures go to `Halt.trouble`.
         """
         drives = tuple(self._roster.all_drives if only is None else only)
         halt = Halt(self._link, self._link.stamp(), self._link.stops, only is None, drives)
+        halt.started = only if isinstance(only, Mapping) else {}
         if halt.whole:
             self.last = halt
             self._missed = self._missed and not follows
@@ -265,15 +210,17 @@ class Stopping:
             repliers = [drive for drive in self._roster.all_drives if drive.state.codec.stop_replies]
             only = None
             if not halt.whole:  # the bytes may stop other drives as well
-                others = [drive for drive in self._roster.all_drives if drive not in halt.drives]
-                halt.others = tuple(drive for drive in others if _hears(drive.state, halt.data))
+                halt.others = () if halt.single else self._reached(halt.drives, halt.data)
                 only = {*GLOBAL, *(drive.address for drive in (*halt.affected, *repliers))}
             link.line.stop(at, *written.forms.repeats, only=only)
             link.line.wrote(halt.data, at, whole=written.invalidates)
-            link.debris.stop_written(halt.data, link.line.transmitted)
+            replied = (each.data for each in written.forms.repeats if halt.single)
+            link.debris.stop_written(b"".join((halt.data, *replied)), link.line.transmitted)
             for drive in halt.affected:
+                if not halt.spares_programs(drive):
+                    halt.programs.setdefault(drive, _ran(drive, halt))
                 drive.state.stopped()
-            for drive in repliers:
+            for drive in (*repliers, *(halt.drives if halt.single else ())):
                 drive.state.reply_outstanding()
             # Every drive on the line has refused the rest of a line, or may have.
             if written.invalidates or written.before or link.transport.may_invalidate:
@@ -282,10 +229,32 @@ class Stopping:
         if not halt.whole:
             conversations.stop(drive.state for drive in halt.affected)
 
+    def _reached(self, drives: Iterable[Drive], data: bytes) -> tuple[Drive, ...]:
+        """The other drives of the link that the bytes of a stop stop as well."""
+        others = [drive for drive in self._roster.all_drives if drive not in drives]
+        return tuple(drive for drive in others if _hears(drive.state, data))
+
+    def _write_single(self, halt: Halt, usual: StopForms) -> Written | None:
+        """Write a stop of what was started, behind what leaves; None where the usual one stops no more, or must.
+
+        Nothing that is on its way is dropped: a line that is cut off needs the usual stop.
+        """
+        data = usual.immediate
+        reaches_more = self._reached(halt.drives, data) or any(each.codec.stops_unknown(data) for each in halt.drives)
+        if not (reaches_more or any(map(halt.spares_programs, halt.drives))):
+            return None
+        forms, link = single_forms(halt.started), self._link
+        if forms is None or link.away or link.transport.pending or not link.transport.write(forms.immediate):
+            return None
+        return Written(forms, forms.immediate, False)
+
     def _write_now(self, halt: Halt) -> Written:
         """Drop what is unsent and write a stop, whatever fails."""
         link, forms = self._link, stop_forms(self._roster, None if halt.whole else halt.drives)
-        dropped = 1
+        halt.single = bool(halt.started)
+        if halt.single and (single := self._write_single(halt, forms)) is not None:
+            return single
+        halt.single, dropped = False, 1
         with isolated(f"taking back what {link.name} has not sent", halt.trouble):
             dropped = link.transport.discard(whole=forms.framed)
         written = Written(forms, *forms.written(bool(dropped or link.line.half_sent(link.now()))))
@@ -344,6 +313,7 @@ class Stopping:
         self._link.advance()
 
     def _repeat(self, halt: Halt) -> None:
+        halt.started = {}
         self._write(halt)
         self._publish(halt)
 
@@ -379,7 +349,7 @@ class Stopping:
         active: dict[Drive, Activity] = {}
         tries, until = 0, link.now() + RAMP
         while unconfirmed and link.now() < until:
-            found = {drive: await _read(drive, halt) for drive in unconfirmed if not halt.started_since(drive)}
+            found = {drive: await self._read(drive, halt) for drive in unconfirmed if not halt.started_since(drive)}
             if self.last is not None and self.last.number > halt.number:
                 return  # a later stop of the whole link confirms it, by what is read after that
             for drive, each in found.items():  # whether this reading or a poll after it has confirmed that
@@ -388,6 +358,10 @@ class Stopping:
             active = {drive: each for drive, each in found.items() if not each.none and not halt.started_since(drive)}
             slow_down = all(each.lessens(before.get(drive)) for drive, each in active.items())
             before = found
+            if halt.single and any(drive in halt.doubts for drive in found) and not link.lost:
+                self._repeat(halt)  # as the usual stop
+                unconfirmed = list(halt.affected)
+                continue
             if active and not slow_down and tries < TRIES and not link.lost:
                 tries += 1
                 self._once_more(halt, active, tries)
@@ -400,6 +374,20 @@ class Stopping:
         if active and tries < TRIES:
             names = ", ".join(drive.shown for drive in active)
             link.notify(f"{names}: slows down for more than {RAMP:g} s", warning=True)
+
+    async def _read(self, drive: Drive, halt: Halt) -> Activity:
+        """Read what a drive does; where that cannot be read, it is a doubt of the stop."""
+        spares = halt.spares_programs(drive)
+        found, why = await read_activity(drive, halt.started[drive].axes if spares else None)
+        if why:
+            halt.doubts[drive] = why
+            drive.link.notify(f"{drive.shown}: stop sent, but {why}", warning=True)
+        elif found is not ENDLESS:
+            halt.doubts.pop(drive, None)
+        if spares and halt.single and not why and found is not ENDLESS:
+            halt.rests[drive] = 0 if found.speed else halt.rests.get(drive, 0) + 1
+            return found._replace(runs=False)
+        return found
 
     def _once_more(self, halt: Halt, active: Mapping[Drive, Activity], tries: int) -> None:
         """Stop again what goes on, or give up and say so."""
@@ -417,65 +405,13 @@ class Stopping:
         self._repeat(halt)
 
 
+def _ran(drive: Drive, halt: Halt) -> bool | None:
+    """Whether a program ran in a drive right before a stop; None: not known."""
+    if drive.running is not None and drive.running.at > drive.started_at:
+        return drive.running.runs
+    what = halt.started.get(drive)
+    return True if what is not None and what.program and not what.lasts else None
+
+
 def _hears(state: DriveState, data: bytes) -> bool:
     return state.codec.hears_stop(data, state.address or state.name, not state.settings_unknown)
-
-
-class Activity(NamedTuple):
-    """What a drive did when it was read; nothing, where that is not known."""
-
-    speed: int = 0
-    """Unsigned, of its fastest axis."""
-    runs: bool = False
-    """A program runs."""
-    places: str = ""
-    """The positions of its axes; empty: not read."""
-
-    @property
-    def none(self) -> bool:
-        """Whether it neither moves nor runs a program, or nothing is known."""
-        return not self.speed and not self.runs
-
-    def lessens(self, before: Activity | None) -> bool:
-        """Whether it slows down, as far as two readings show, and no program runs that can move it again."""
-        return not self.runs and (before is None or self.speed < before.speed)
-
-
-NOTHING = Activity()
-ENDLESS = Activity(1 << 40)
-"""Of a drive that another stop kept from being read: faster than any."""
-
-
-async def _read(drive: Drive, halt: Halt) -> Activity:
-    """Read and publish what a drive does; NOTHING also where that cannot be read, which is a doubt of the stop."""
-    if drive.programming and not drive.engaged:
-        return _not_known(drive, halt, "its velocity cannot be read in program mode")
-    try:
-        axes = await drive.motion()
-        assert drive.seen is not None
-        at = drive.seen.transmitted_at
-        runs, why = axes[0].program, ""
-        if runs is None and not any(axis.velocity for axis in axes):  # a drive that moves is stopped again
-            try:
-                runs = await drive.busy()
-            except Stopped:
-                raise
-            except (TimeoutError, DriveError, TransportLost) as error:
-                why = f"velocity 0 was read, and whether a program runs was not: {error}"
-    except Stopped:
-        return ENDLESS
-    except (TimeoutError, DriveError, TransportLost) as error:
-        return _not_known(drive, halt, f"its velocity could not be read: {error}")
-    for each in axes:
-        drive.link.publish(Sample(at, drive.address, each.position, each.velocity, each.axis, each.trouble, runs))
-    if why:
-        return _not_known(drive, halt, why)
-    halt.doubts.pop(drive, None)
-    speed = abs(drive.seen.velocity) if drive.seen is not None else 0
-    return Activity(speed, bool(runs), ", ".join(str(each.position) for each in axes))
-
-
-def _not_known(drive: Drive, halt: Halt, why: str) -> Activity:
-    halt.doubts[drive] = why
-    drive.link.notify(f"{drive.shown}: stop sent, but {why}", warning=True)
-    return NOTHING

@@ -1,20 +1,21 @@
 """Lines that run unattended, and the stop of what they started when they end early.
 
 A script, a macro, piped lines and a `send` are one automation each; an automation inside another belongs to it. It
-records the drives to which it sent anything that can start motion or a program. If it ends before its last line, for
-any reason, those drives and no others are stopped, on every bus that is still open. Nothing is latched. While it runs,
-no other automation starts those drives, or others that it claimed at its beginning.
+records what it sent to each drive that can start motion or a program, and that the drive has not refused (`sending`).
+If it ends before its last line, for any reason, that and nothing else is stopped, on every bus that is still open; a
+drive that was read at rest since is read once more instead (`excuses`). Nothing is latched. While it runs, no other
+automation starts those drives, or others that it claimed at its beginning.
 """
 
 from __future__ import annotations
 
 import asyncio
 import contextlib
-from collections.abc import AsyncIterator, Callable, Collection, Iterable, Iterator
+from collections.abc import AsyncIterator, Callable, Collection, Iterator, Mapping
 from contextvars import ContextVar
 from dataclasses import dataclass, field
 
-from multidrop.dialects import Diagnostic
+from multidrop.dialects import Diagnostic, Started
 from multidrop.drives.bus import Bus
 from multidrop.drives.drive import Drive
 from multidrop.drives.events import isolated
@@ -22,6 +23,7 @@ from multidrop.drives.link import Link
 from multidrop.drives.port_journal import GLOBAL
 from multidrop.drives.stopping import Halt
 from multidrop.shell import stop_report
+from multidrop.shell.at_rest import excused
 from multidrop.shell.workspace import Workspace
 
 LINGER = 3.0
@@ -35,9 +37,22 @@ POLL = 0.02
 TRIAL = 10.0
 """The time for the trial of the stop key, s."""
 AGREED = "/resume agrees to that (send, run: --yes)"
+UNKNOWN = " and any other drive on this line"
+"""What the stop of a line without an address stops as well."""
 Claim = tuple["Link", str]
 """A link and an address on it; a global address is all of the link."""
 _current: ContextVar[Automation | None] = ContextVar("automation", default=None)
+
+
+@dataclass(frozen=True)
+class Sent:
+    """What an automation has sent to a drive that can have started it."""
+
+    at: float
+    """When the last of it was about to be sent, s of the link's clock."""
+    what: Started
+    why: str = ""
+    """Why it may move, where none of that has started it."""
 
 
 @dataclass(eq=False)
@@ -52,7 +67,9 @@ class Automation:
     """The drives that it will start."""
     still: str = ""
     """The reason why it may start nothing now; empty: it may."""
-    started: dict[Drive, None] = field(default_factory=dict)
+    started: dict[Drive, Sent] = field(default_factory=dict)
+    stopped: dict[Drive, Sent] = field(default_factory=dict)
+    """Those of `started` whose stops are written."""
     halts: list[Halt] = field(default_factory=list)
     """The stops of its drives, once they are written."""
 
@@ -97,7 +114,7 @@ class Automations:
             self._stop(automation)  # the canceller goes on, and sees the outcome of the stop
             raise
         except BaseException:
-            self._stop(automation)
+            await self._end(automation)
             await settled(self._workspace)
             for text in outcome(self._workspace, automation.halts):
                 self._workspace.notify(text, warning=True)
@@ -115,44 +132,56 @@ class Automations:
                 hint = "wait for its end, or stop it (/play stop)"
                 raise Diagnostic(f"{who} moves it, so nothing was sent", where, hint)
 
-    def starts(self, drive: Drive, only_ends: bool = False) -> bool:
-        """Record that the current automation can start a drive now. Whether it had not recorded that drive before.
+    @property
+    def current(self) -> Automation | None:
+        return _current.get()
+
+    def starts(self, drive: Drive, what: Started | None = None, *, only_ends: bool = False) -> None:
+        """Record that the current automation can start a drive now; by default anything in it.
 
         Raises Diagnostic where it may not: another automation has the drive. `only_ends`: with a line that can only
-        end motion, which is refused to no `still` one.
+        end motion, which is refused to no `still` one, and starts nothing.
         """
         if self._workspace.doubted and not only_ends:
             raise Diagnostic(self._workspace.doubted, drive.shown, f"press Ctrl+X once; {AGREED}")
         automation = _current.get()
         if automation is None:
-            return False
+            return
         if automation.still and not only_ends:
             raise Diagnostic(automation.still, drive.shown)
         self._check_free((drive.link, drive.address), automation)
         if automation.stops != self._workspace.stops:  # its drives were stopped, and `/resume` let it go on
             automation.stops = self._workspace.stops
             automation.started.clear()
+            automation.stopped.clear()
             automation.halts.clear()
-        if drive in automation.started:
-            return False
-        automation.started[drive] = None
-        return True
+        if not only_ends:
+            self.records(automation, drive, what or Started())
 
-    def spares(self, drive: Drive) -> None:
-        """Take the record back: nothing was sent to the drive."""
-        automation = _current.get()
-        if automation is not None:
+    def records(self, automation: Automation, drive: Drive, what: Started, why: str = "") -> None:
+        before = automation.started.get(drive)
+        automation.started[drive] = Sent(drive.link.stamp(), before.what | what if before is not None else what, why)
+        automation.stopped.pop(drive, None)
+
+    def restores(self, automation: Automation, drive: Drive, before: Sent | None) -> None:
+        """Take the record of a line back: it has started nothing in the drive."""
+        if before is None:
             automation.started.pop(drive, None)
+        elif drive in automation.started:
+            automation.started[drive] = before
 
-    def end(self) -> list[Halt]:
+    async def end(self) -> list[Halt]:
         """Stop at once what the current automation started; what it starts after that is new. Return the stops."""
         automation = _current.get()
         if automation is None:
             return []
-        self._stop(automation)
-        halts = [halt for halt in automation.halts if halt not in self.interrupted]
-        automation.started.clear()
-        automation.halts.clear()
+        try:
+            await self._end(automation)
+        finally:
+            halts = [halt for halt in automation.halts if halt not in self.interrupted]
+            automation.started.clear()
+            automation.stopped.clear()
+            automation.halts.clear()
         return halts
 
     def leave(self) -> None:
@@ -195,32 +224,58 @@ class Automations:
             self._stop(automation)
             self.interrupted += [halt for halt in automation.halts if halt not in self.interrupted]
 
-    def _stop(self, automation: Automation) -> None:
-        """Write the stops onto every wire first, each wire by itself; once for each automation.
+    async def _end(self, automation: Automation) -> None:
+        """Stop what an automation started; read what was at rest since once more first, and stop it if it is not."""
+        excuses = {drive for drive, sent in automation.started.items() if _rested(drive, sent)}
+        self._stop(automation, excuses)
+        try:
+            if excuses and automation.stops == self._workspace.stops:
+                found = [*excuses]
+                at_rest = await asyncio.gather(*(excused(drive) for drive in found))
+                for drive, rests in zip(found, at_rest, strict=True):
+                    if rests:
+                        automation.started.pop(drive, None)
+        finally:
+            self._stop(automation)
+
+    def _stop(self, automation: Automation, but: Collection[Drive] = ()) -> None:
+        """Write the stops onto every wire first, each wire by itself; once for each drive.
 
         A device that did not identify itself gets no stop that nobody asked for, and is named.
         """
-        if automation.halts or automation.stops != self._workspace.stops:
+        if automation.stops != self._workspace.stops:
             return  # a stop of everything came meanwhile
-        strangers = [drive for drive in automation.started if drive.state.stranger]
+        due = {
+            drive: sent
+            for drive, sent in automation.started.items()
+            if drive not in but and drive not in automation.stopped
+        }
+        strangers = [drive for drive in due if drive.state.stranger]
         for drive in strangers:
-            del automation.started[drive]
-        for link, only in _by_link(automation.started).items():
+            del due[drive], automation.started[drive]
+        automation.stopped |= due
+        written: list[Halt] = []
+        for link, only in _by_link(due).items():
             with isolated(f"the stop of {link.name}"):
-                automation.halts.append(self._halt(link, only))
-        for halt in automation.halts:
+                written.append(self._halt(link, only))
+        automation.halts += written
+        for halt in written:
             with isolated(f"the stop of {halt.link.name}"):
                 if bus := self._open_bus(halt.link):
                     bus.halted(halt)
         for drive in strangers:
             name = self._workspace.display_name(drive)
             self._workspace.notify(f"{name}: no stop was sent, as {drive.state.stranger}", warning=True)
+        for drive, sent in due.items():
+            if sent.why:
+                self._workspace.notify(f"{self._workspace.display_name(drive)}: {sent.why}", warning=True)
 
-    def _halt(self, link: Link, only: list[Drive]) -> Halt:
+    def _halt(self, link: Link, only: dict[Drive, Sent]) -> Halt:
+        started = {drive: sent.what for drive, sent in only.items()}
         bus = self._open_bus(link)
         if bus is None:
-            return Halt(link, self._workspace.now(), 0, False, tuple(only), trouble=["closed"])
-        return bus.halt(None if any(drive.address in GLOBAL for drive in only) else only)
+            return Halt(link, self._workspace.now(), 0, False, tuple(only), started=started, trouble=["closed"])
+        return bus.halt(None if any(drive.address in GLOBAL for drive in only) else started)
 
     def _open_bus(self, link: Link) -> Bus | None:
         """The bus of a link; None once it is closed."""
@@ -239,11 +294,19 @@ def _claiming(automation: Automation, name: str, claims: Collection[Claim]) -> I
         automation.name, automation.claims = before
 
 
-def _by_link(started: Iterable[Drive]) -> dict[Link, list[Drive]]:
-    found: dict[Link, list[Drive]] = {}
-    for drive in started:
-        found.setdefault(drive.link, []).append(drive)
+def _by_link(started: Mapping[Drive, Sent]) -> dict[Link, dict[Drive, Sent]]:
+    found: dict[Link, dict[Drive, Sent]] = {}
+    for drive, sent in started.items():
+        found.setdefault(drive.link, {})[drive] = sent
     return found
+
+
+def _rested(drive: Drive, sent: Sent) -> bool:
+    """Whether a drive was read at rest after the last thing that was sent, and nothing of that moves it again."""
+    seen, running = drive.seen, drive.running
+    runs = running is not None and running.at > sent.at and running.runs
+    at_rest = drive.rested_at > sent.at or (seen is not None and seen.at > sent.at and seen.at_rest(sent.at))
+    return at_rest and not (runs or sent.what.lasts or sent.why or drive.address in GLOBAL)
 
 
 def only_ends(drive: Drive, text: str) -> bool:
@@ -267,11 +330,20 @@ def outcome(workspace: Workspace, halts: list[Halt]) -> list[str]:
     lines = []
     if sent:
         tally = stop_report.of_halts(sent, workspace.wall(sent[0].at), len(workspace.buses) > 1)
-        names = [halt.link.name if halt.whole else ", ".join(map(workspace.display_name, halt.drives)) for halt in sent]
-        lines.append(f"{'stopped' if tally.stand else 'stop sent to'} {', '.join(names)}: {stop_report.words(tally)}")
-    if others := [workspace.display_name(drive) for halt in sent for drive in halt.others]:
-        lines.append(f"stopped as well, because the stop of their line has no name: {', '.join(others)}")
+        names = ", ".join(_names(workspace, halt.drives) or halt.link.name for halt in sent)
+        every = UNKNOWN if any(halt.reaches_unknown for halt in sent) else ""
+        lines.append(f"{'stopped' if tally.stand else 'stop sent to'} {names}{every}: {stop_report.words(tally)}")
+    if others := _names(workspace, [drive for halt in sent for drive in halt.others]):
+        lines.append(f"their line has only one stop, so these stopped too: {others}")
+    programs = {drive: ran for halt in sent for drive, ran in halt.programs.items()}
+    for ran, said in ((True, "program ended"), (None, "program ended, if one was running")):
+        if ended := _names(workspace, [drive for drive, each in programs.items() if each is ran]):
+            lines.append(f"{said}: {ended}")
     return lines + stop_report.unreached(halts, workspace.now())
+
+
+def _names(workspace: Workspace, drives: Collection[Drive]) -> str:
+    return ", ".join(map(workspace.display_name, drives))
 
 
 def stop_key_trial(workspace: Workspace) -> str:

@@ -9,6 +9,7 @@ person's word. A report has neither serial number nor name of a host, a port or 
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -260,8 +261,6 @@ class Asking:
             return DONE
         if question.does == MOVES and session.scaled:
             await imported(TRAVEL)(session.units, drive, line, By.OPERATOR)
-        if drive.starts(line):
-            session.path.starting(drive)
         taken: list[Transaction] = []
 
         def note(concluded: Concluded) -> None:
@@ -270,7 +269,8 @@ class Asking:
 
         leave = session.buses[drive.link.name].witnesses.add(note)
         try:
-            text = "; ".join(await self._sent(line)) or DONE
+            async with session.path.starting(drive, line) if drive.starts(line) else contextlib.nullcontext():
+                text = "; ".join(await self._sent(line)) or DONE
         except Refused as refusal:
             text = table.refused.format(code=refusal.code, text=taken[-1].reply.text if taken else "")
         except NoAnswer:

@@ -11,7 +11,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import AsyncIterator, Iterator, Sequence
 from contextvars import ContextVar
 from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any
@@ -39,6 +39,7 @@ from multidrop.shell.openings import Openings
 from multidrop.shell.operations.table import find
 from multidrop.shell.playing import played_by
 from multidrop.shell.raw import RawLine, text_of
+from multidrop.shell.sending import sending
 from multidrop.shell.twins.twins import Twins
 from multidrop.shell.waits import in_motion
 from multidrop.shell.workspace import LATCHED, Workspace
@@ -300,16 +301,14 @@ class LinePath:
             session.changed()
         session.addressed.add((bus.name, drive.address))
         session.lately.begin()
-        before, started = drive.commands, False
+        before = drive.commands
         if _changes_program(drive, text):
             imported(SIGHT)(session, drive).changes()
         try:
-            started = starts and session.automations.starts(drive, only_ends(drive, text))
-            printed = await drive.send(text, check)
+            ends = only_ends(drive, text)
+            async with sending(session.automations, drive, text, starts=starts, only_ends=ends):
+                printed = await drive.send(text, check)
         except FAILURES as failure:
-            unsent = started and drive.commands == before and drive.address not in EVERYONE
-            if unsent and isinstance(failure, DriveError):
-                session.automations.spares(drive)
             if recorded is not None:
                 recorded.came_back([f"failed: {failure}"])
             raise
@@ -390,12 +389,25 @@ class LinePath:
         if stops != self._session.stops:
             raise Stopped("a stop came before the answer counted; nothing was sent")
 
-    def starting(self, drive: Drive) -> None:
-        """Note that the next request can start motion or a program of a drive."""
-        drive.check_start()
+    @contextlib.asynccontextmanager
+    async def starting(self, drive: Drive, text: str = "", *, parts: bool = False) -> AsyncIterator[None]:
+        """Send in the body a line, or what can start anything in a drive. `parts`: it is several requests."""
+        if text and not drive.starts(text):
+            async with sending(self._session.automations, drive, text, starts=False, parts=parts):
+                yield
+            return
+        drive.check_start(text)
         self._session.addressed.add((drive.link.name, drive.address))
-        self._session.automations.starts(drive)
-        drive.starts_now()
+        before = drive.commanded_at
+        async with sending(self._session.automations, drive, text, starts=True, parts=parts):
+            drive.starts_now()
+            noted = drive.commanded_at
+            try:
+                yield
+            except Refused as refusal:
+                if refusal.certain and not parts and drive.commanded_at == noted:
+                    drive.commanded_at = before
+                raise
 
     def _allow(self, by: By) -> None:
         if self._session.latched and by is not By.OPERATOR:

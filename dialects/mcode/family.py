@@ -43,6 +43,7 @@ MCODE = Family(
     assign=points.assign,
     programs_at="multidrop.dialects.mcode.host.programs:PROGRAMS",
     guards=Guards(guards.NAMES, guarded, guards.word_of, guards.only_ends, guards.only_reads),
+    vouched=classify.vouched,
     protection=guards.CYBER_SECURITY,
     debugging_at="multidrop.dialects.mcode.host.debugging:DEBUGGING",
     repairs=True,

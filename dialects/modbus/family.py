@@ -6,10 +6,10 @@ from functools import partial
 
 from multidrop.dialects.codec import Procedure
 from multidrop.dialects.family import Family, Guard, Guards, Registers
-from multidrop.dialects.mcode.host.classify import referencing
-from multidrop.dialects.mcode.manual import guards, help, points
+from multidrop.dialects.mcode.host import classify
+from multidrop.dialects.mcode.manual import grammar, guards, help, points
 from multidrop.dialects.modbus.host import operations
-from multidrop.dialects.modbus.host.codec import Modbus, ModbusState, pdu_codec
+from multidrop.dialects.modbus.host.codec import USER, Modbus, ModbusState, pdu_codec
 from multidrop.dialects.modbus.host.mapping import ALTERNATIVE, lines_of
 from multidrop.dialects.modbus.host.operations import identify
 from multidrop.dialects.modbus.manual.registers import REGISTERS
@@ -26,6 +26,17 @@ def homed(state: ModbusState) -> Procedure[bool]:
     return not (yield from operations.flag(state, "EF"))
 
 
+def vouched(text: str, product: str) -> bool:
+    """Whether the tables show nothing for which a drive would refuse a line: a value that its register takes."""
+    statement = grammar.parsed(text, USER)
+    if statement is None or statement.word == "PR":
+        return classify.vouched(text, product)
+    register, values = REGISTERS.get(statement.word), [getattr(each, "value", None) for each in statement.arguments]
+    if register is None or len(values) != 1 or not isinstance(values[0], int):
+        return False
+    return register.writable and register.allows(values[0])
+
+
 MODBUS = Family(
     name=Modbus.family,
     codec=Modbus(),
@@ -37,7 +48,7 @@ MODBUS = Family(
     moving=partial(operations.flag, name="MV"),
     busy=partial(operations.flag, name="BY"),
     status=operations.status,
-    referencing=referencing,
+    referencing=classify.referencing,
     homed=homed,
     language=help,
     rests_in_place=False,
@@ -55,6 +66,7 @@ MODBUS = Family(
         device=operations.device,
     ),
     guards=Guards(guards.NAMES, guarded, guards.word_of, guards.only_ends, guards.only_reads),
+    vouched=vouched,
     protection=guards.CYBER_SECURITY,
     prepare=pdu_codec,
     certifying_at="multidrop.dialects.modbus.host.operations:CERTIFYING",

@@ -7,6 +7,7 @@ motor, and those of communication, are left alone unless they are named.
 
 from __future__ import annotations
 
+import contextlib
 import difflib
 import json
 from collections.abc import Awaitable, Callable, Iterator, Mapping, Sequence
@@ -314,9 +315,9 @@ async def send(session: Session, drive: Drive, plan: Plan, options: Options, wha
     session.addressed.add((drive.link.name, drive.address))
     with running(session, f"{session.display_name(drive)}: {what}") as progress:
         for number, change in enumerate(plan, 1):
-            if change.name in options.named and drive.starts(change.text):
-                session.path.starting(drive)
-            await transferring(drive, drive.family.values.parameters.write(drive.state, change))
+            named = change.name in options.named
+            async with session.path.starting(drive, change.text) if named else contextlib.nullcontext():
+                await transferring(drive, drive.family.values.parameters.write(drive.state, change))
             written.append(change)
             progress(number, len(plan))
 

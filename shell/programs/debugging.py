@@ -96,8 +96,8 @@ class Debugger:
         await self._run(self._debugging.idle(self._drive.state, place, neighbours))
         self._place, self._last = place, None
         self._last_at = self._free_at = self._session.now()
-        self._session.path.starting(self._drive)
-        await self._run(start(self._drive.state, place))
+        async with self._session.path.starting(self._drive, parts=True):
+            await self._run(start(self._drive.state, place))
 
     async def step(self) -> None:
         """Execute one line; show it, and the watched values that it changed."""
@@ -106,9 +106,9 @@ class Debugger:
             raise Inexpressible(f"{name}: {self._debugging.no_step}; nothing was sent")
         await self._check_waits()
         await self._read_listing()
-        self._session.path.starting(self._drive)
-        self._waits = True
-        stepped = await self._run(self._debugging.step(self._drive.state, self._listing.rows))
+        async with self._session.path.starting(self._drive, parts=True):
+            self._waits = True
+            stepped = await self._run(self._debugging.step(self._drive.state, self._listing.rows))
         self._executed(stepped.row, stepped.hold)
         changed = ""
         try:
@@ -130,8 +130,8 @@ class Debugger:
     async def go_on(self) -> None:
         """Let the program run on at normal speed."""
         await self._check_waits()
-        self._session.path.starting(self._drive)
-        await self._run(self._debugging.go_on(self._drive.state, self._place))
+        async with self._session.path.starting(self._drive, parts=True):
+            await self._run(self._debugging.go_on(self._drive.state, self._place))
         self._waits = False
         self._sight.seen(None)
         note = ", and shows no lines: /break now breaks it where it is" if self.break_point else ""

@@ -8,6 +8,7 @@ disk.
 from __future__ import annotations
 
 import asyncio
+import contextlib
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -242,13 +243,14 @@ class _Download:
         """Send the file; a refusal names its line."""
         drive, workspace = self._drive, self._session
         workspace.addressed.add((drive.link.name, drive.address))
-        if any(drive.codec.starts_motion(line.text) for line in self._programs.executed(lines)):
-            self._session.path.starting(drive)
+        moves = any(drive.codec.starts_motion(line.text) for line in self._programs.executed(lines))
+        begins = workspace.path.starting(drive, parts=True) if moves else contextlib.nullcontext()
         if self._programs.size(lines) and drive.family.debugging is not None:
             Sight(workspace, drive).changes()
         try:
-            with running(workspace, f"{self._name}: download") as job:
-                sent = await drive.download(lines, held, job)
+            async with begins:
+                with running(workspace, f"{self._name}: download") as job:
+                    sent = await drive.download(lines, held, job)
         except DriveError as error:
             text = str(error)
             error.args = (f"{self._file}:{text.removeprefix('line ') if text.startswith('line ') else f' {text}'}",)
@@ -296,7 +298,8 @@ class _Download:
 
     async def start(self, line: str) -> None:
         drive, workspace = self._drive, self._session
-        workspace.path.starting(drive)
-        for text in await drive.send(line):
+        async with workspace.path.starting(drive, line):
+            printed = await drive.send(line)
+        for text in printed:
             workspace.publish(Printed(workspace.now(), drive.link.name, drive.address, text))
         self._say(f"started ({line})")

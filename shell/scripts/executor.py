@@ -181,7 +181,7 @@ class _Aftermath:
 
     async def run(self, ended: Ended) -> None:
         """Stop, report, execute `on_early_end`, read where the drives stand. A stop of everything cuts it short."""
-        halts = self._session.automations.end()
+        halts = await self._session.automations.end()
         self._execution.is_over = True
         found: tuple[Standing, ...] = ()
         try:
@@ -275,7 +275,7 @@ class _Aftermath:
         if not failed:
             automations.leave()
             return
-        for text in outcome(self._session, automations.end()):
+        for text in outcome(self._session, await automations.end()):
             self._warn(text)
 
 

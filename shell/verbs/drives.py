@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import re
 import shlex
 from typing import Any
@@ -158,12 +159,15 @@ def _registered(call: Call) -> tuple[Drive, Registers[Any]]:
     return drive, registers
 
 
-async def _show(call: Call, drive: Drive, talk: Procedure[tuple[str, ...]], *, writes: bool = False) -> None:
-    if writes:
-        await call.session.path.agreed_to_write(drive, f"{call.verb.name} {call.rest.strip()}", call.by)
-        call.session.path.starting(drive)
-    for line in await drive.run(talk, typed=True):
-        call.session.output(line)
+async def _show(call: Call, drive: Drive, talk: Procedure[tuple[str, ...]], writes: str | None = None) -> None:
+    """Show what a conversation prints. `writes`: the line that does the same; empty: it may do anything."""
+    session = call.session
+    if writes is not None:
+        await session.path.agreed_to_write(drive, f"{call.verb.name} {call.rest.strip()}", call.by)
+    async with session.path.starting(drive, writes) if writes is not None else contextlib.nullcontext():
+        printed = await drive.run(talk, typed=True)
+    for line in printed:
+        session.output(line)
 
 
 def _number(call: Call, text: str) -> int:
@@ -185,9 +189,12 @@ async def register(call: Call) -> None:
         await _show(call, drive, registers.read(drive.state, address, count))
         return
     values = [_number(call, text.strip()) for text in found[2].split(",")]
-    for line in registers.lines(address, values):
+    lines = registers.lines(address, values)
+    for line in lines:
         await call.session.path.guard(drive, line, call.by)
-    await _show(call, drive, registers.write(drive.state, address, values), writes=True)
+    known = len(lines) == len(values) and len([line for line in lines if drive.starts(line)]) < 2
+    writes = next(filter(drive.starts, lines), lines[0]) if known else ""
+    await _show(call, drive, registers.write(drive.state, address, values), writes)
 
 
 async def coil(call: Call) -> None:
@@ -199,7 +206,10 @@ async def coil(call: Call) -> None:
     if len(words) == 1:
         await _show(call, drive, registers.read_coil(drive.state, number))
     elif words[1] in ("0", "1"):
-        await _show(call, drive, registers.write_coil(drive.state, number, words[1] == "1"), writes=True)
+        line = f"O{number}={words[1]}"
+        await _show(
+            call, drive, registers.write_coil(drive.state, number, words[1] == "1"), "" if drive.starts(line) else line
+        )
     else:
         raise call.wrong()
 

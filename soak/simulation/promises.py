@@ -23,6 +23,10 @@ def _automation(world: World) -> Iterator[str]:
     yield from world.history.told.stopped_too
 
 
+def _spared(world: World) -> Iterator[str]:
+    yield from world.history.told.unspared
+
+
 def _asked(world: World) -> Iterator[str | Granted]:
     told = world.history.told
     for guarded in told.guarded:
@@ -123,6 +127,12 @@ PROMISES = (
         "Drives that automation moved are stopped at its early end, and no others.",
         "What a report means",
         _automation,
+    ),
+    Rule(
+        "spared",
+        "A line that was refused, reads, or sets a value stops no drive.",
+        "What a report means",
+        _spared,
     ),
     Rule(
         "asked",

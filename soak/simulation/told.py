@@ -103,5 +103,7 @@ class Told:
     """Runs that ended early, whose drives were not looked at yet."""
     unstopped: list[str] = field(default_factory=list)
     """Drives that went on after the early end of what had moved them."""
+    unspared: list[str] = field(default_factory=list)
+    """Drives that the early end of what had started nothing has stopped."""
     stopped_too: list[str] = field(default_factory=list)
     """Drives that an early end stopped, although it had not moved them."""

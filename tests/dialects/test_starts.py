@@ -18,7 +18,7 @@ STARTS = {
         *("FL=1", "PM=1", "DE=1", "CF", "TS=60000", "TE=1", "TI=1,G1", "OE G1", "IP", "IS=1,4,1", "S1=4,0", "BR G1"),
         *("100", "-51200", "G1", "Q1=5", "XX", "MR", "MR 5,,", 'PR "not closed', "\x07"),
     ),
-    Modbus(): ("MR 100", "SL 0", "VM=5", "P=0", "R1=5", "E", "XX"),
+    Modbus(): ("MR 100", "SL 5", "EX G1", "JE=1", "TE=1", "HM 1", "PM=1", "IP", "XX", "SL", "MR 5,,"),
     Pmx(): (
         *("X1000", "Y-5", "X1Y2", "I1:2", "TX5", "JX+", "J-", "HX+", "LY-", "ZHX+", "ZX-", "HLY+", "SR0=1", "SR1=3"),
         *("GS3", "JO", "SLX=1", "PX=5", "EY=0", "EO=3", "CLRX", "foo", "XX"),
@@ -29,7 +29,10 @@ STARTS_NOTHING = {
         *("PR P", "pr V", 'PR P,"a ",V', "PR AL", "PR ER", "", "' a remark", "L", "L G1", "E", "PG", "PG 100", "PS"),
         *("S", "CP", "VM=500000", "A=1000", "P=0", "R1=5", "EM=1", 'DN="a"', "O1=1", "VA Q1", "IC R1", "ER=0", "LB G1"),
     ),
-    Modbus(): ("PR P", "  pr V", "PR P,V"),
+    Modbus(): (
+        *("PR P", "  pr V", "PR P,V", "SL 0", "JE=0", "TE=0", "VM=5", "P=0", "R1=5", "V1=5", "E", "RC=200", "IC R1"),
+        *("S", "O1=1", "", "' a remark"),
+    ),
     Pmx(): ("PX", "MSTX", "ID", "SLX", "EO", "SASTAT0", "STOP", "ABORTX", "ABS", "INC", "HSPD=500", "DO1=1", "V5=1"),
 }
 

@@ -71,8 +71,8 @@ def test_an_uncaught_exception_shows_the_frames_of_the_program_only(run: Any) ->
     done = run("def turn():\n    a.move(1.5)\na.send('SL 1000')\nturn()")
     assert done.returncode == 1
     assert done.stderr.splitlines()[:2] == [
-        "stopped a: velocity 0 was read from both",
-        "stopped as well, because the stop of their line has no name: b",
+        "stopped a: velocity 0 was read from a",
+        "program ended, if one was running: a",
     ]
     assert done.stderr.count('  File "') == 2 == done.stderr.count('  File "job.py"')
     assert done.stderr.endswith("TypeError: 'float' object cannot be interpreted as an integer\n")
@@ -129,7 +129,7 @@ def test_a_signal_interrupts_the_program_and_stops_what_it_moved(run: Any, name:
         f"try:\n    os.kill(os.getpid(), {number:d})\n    time.sleep(60)\nfinally:\n    print('finally')"
     )
     assert done.returncode == 130 and done.stdout == "finally\n"
-    assert done.stderr.splitlines()[0] == "stopped a: velocity 0 was read from both"
+    assert done.stderr.splitlines()[0] == "stopped a: velocity 0 was read from a"
     assert done.stderr.splitlines()[-1] == "interrupted"
     assert signal.getsignal(number) is before
 
@@ -145,7 +145,7 @@ def test_a_program_that_swallows_a_signal_is_interrupted_all_the_same_and_leaves
     kill = f"os.kill(os.getpid(), {signal.SIGTERM:d})"
     done = run(f"import os\na.send('SL 1000')\ntry:\n    {kill}\nexcept BaseException:\n    print(a.moving)")
     assert (done.returncode, done.stdout) == (130, "True\n")
-    assert done.stderr.splitlines()[0] == "stopped a: velocity 0 was read from both"
+    assert done.stderr.splitlines()[0] == "stopped a: velocity 0 was read from a"
     assert done.stderr.splitlines()[-1] == "interrupted"
 
 
@@ -186,7 +186,9 @@ def test_what_a_plain_program_printed_comes_before_a_warning_and_its_traceback(s
         f"import multidrop\nwith multidrop.connect({shop.urls['press']!r}) as session:\n    {text}"
     )
     written = in_one_file(shop, "plain.py")
-    assert written.startswith("turns. stopped b: velocity 0 was read from b\nTraceback")
+    assert written.startswith(
+        "turns. stopped b: velocity 0 was read from b\nprogram ended, if one was running: b\nTraceback"
+    )
 
 
 @pytest.mark.process
@@ -222,4 +224,7 @@ def test_a_plain_program_that_crashes_leaves_nothing_moving(shop: Any) -> None:
         timeout=PATIENCE,
     )
     assert done.returncode == 1 and "ZeroDivisionError" in done.stderr
-    assert done.stderr.endswith("stopped b: velocity 0 was read from b\n") and shop.velocity() == 0
+    assert (
+        done.stderr.endswith("stopped b: velocity 0 was read from b\nprogram ended, if one was running: b\n")
+        and shop.velocity() == 0
+    )

@@ -78,8 +78,7 @@ async def test_whatever_ends_it_early_stops_what_it_started_and_nothing_else(run
         assert shop.moving() == {"gantry:d", "stages:01"}
         assert not shop.session.latched
         assert [text for text in shop.warned() if text.startswith("stopped ")] == [
-            "stopped press:a, gantry:c, eth, stages:00: velocity 0 was read from all 5",
-            "stopped as well, because the stop of their line has no name: press:b",
+            "stopped press:a, gantry:c, eth, stages:00: velocity 0 was read from all 4",
         ]
         await shop.session.run("@gantry:c SL 100", By.SCRIPT)
 
@@ -107,15 +106,15 @@ async def test_reads_never_count(shop):
     assert not [text for text in shop.told() if "stop" in text and "/wait" not in text]
 
 
-async def test_a_stop_without_a_name_says_what_else_it_stopped(shop):
+async def test_a_drive_of_a_party_line_is_stopped_by_its_own_stop(shop):
     for name in ("press:b", "gantry:d"):
         await shop.session.run(GO[name])
     with pytest.raises(DriveError):
         await script(shop.session, GO["press:a"], GO["gantry:c"], "/sleep 1", "/wait stopped 1")
-    assert shop.moving() == {"gantry:d"}
+    assert shop.moving() == {"press:b", "gantry:d"}
     assert shop.warned()[-2:] == [
-        "stopped press:a, gantry:c: velocity 0 was read from all 3",
-        "stopped as well, because the stop of their line has no name: press:b",
+        "stopped press:a, gantry:c: velocity 0 was read from both",
+        "program ended, if one was running: press:a, gantry:c",
     ]
 
 
@@ -123,7 +122,8 @@ async def test_a_line_to_all_is_all(shop):
     with pytest.raises(DriveError):
         await script(shop.session, "@press:* SL 50000", "@stages:* JX+", "/sleep 1", "/wait stopped 1")
     assert shop.moving() == set()
-    assert shop.warned()[-1] == "stopped press, stages: velocity 0 was read from all 4"
+    every = "press:a, press:b, stages:00, stages:01 and any other drive on this line"
+    assert shop.warned()[-2] == f"stopped {every}: velocity 0 was read from all 4"
 
 
 async def test_a_program_counts_when_it_is_executed_and_not_when_it_is_stored(tmp_path, shop):
@@ -135,8 +135,8 @@ async def test_a_program_counts_when_it_is_executed_and_not_when_it_is_stored(tm
     assert shop.moving() == {"press:b"}
     with pytest.raises(Refused):
         await script(shop.session, "@press:a EX G1", "/sleep 1", "@press:a PR XX")
-    assert shop.moving() == set()
-    assert shop.warned()[-2].startswith("stopped press:a: ")
+    assert shop.moving() == {"press:b"}
+    assert shop.warned()[-2].startswith("stopped press:a: ") and shop.warned()[-1] == "program ended: press:a"
 
 
 async def test_what_could_not_be_reached_is_named(shop):
@@ -147,8 +147,9 @@ async def test_what_could_not_be_reached_is_named(shop):
             await asyncio.sleep(1.0)
             await shop.session.run("@press:a PR P")
     assert shop.moving() == {"press:a"}
-    assert shop.warned()[-2:] == [
+    assert shop.warned()[-3:] == [
         "stopped gantry:c: velocity 0 was read from gantry:c",
+        "program ended, if one was running: gantry:c",
         "press: stop not sent (lost): a started 2 s ago and not read since - use the E-stop",
     ]
 
@@ -171,8 +172,7 @@ async def test_a_macro_within_a_script_belongs_to_it(shop):
         await script(shop.session, GO["gantry:c"], "/play m")
     assert shop.moving() == set()
     assert [text for text in shop.warned() if text.startswith("stopped ")] == [
-        "stopped gantry:c, press:b: velocity 0 was read from all 3",
-        "stopped as well, because the stop of their line has no name: press:a",
+        "stopped gantry:c, press:b: velocity 0 was read from both",
     ]
 
 
@@ -192,7 +192,7 @@ async def test_an_interruption_is_written_at_once_and_stops_what_was_started_alo
     await asyncio.sleep(1.0)
     shop.events.clear()
     shop.session.interrupt()
-    assert (shop.written("press"), shop.written("gantry")) == (b"\x1b", b"c\x1b\n")
+    assert (shop.written("press"), shop.written("gantry")) == (b"aE\xda\n", b"c\x1b\n")
     assert (shop.written("eth"), shop.written("stages")) == (b"", b"")
     with pytest.raises(asyncio.CancelledError):
         await running

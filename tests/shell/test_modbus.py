@@ -319,3 +319,44 @@ async def test_a_raw_write_of_a_guarded_register_needs_a_yes(session):
             await session.run(line)
     await session.run("/register 0x8B =600000")
     assert await answers(session, "PR VM", "modbus") == ["600000"]
+
+
+REFUSED = ["RC=200", "/register 0x67 =70000", "/register 0x67 =200", "STATUS", "VM=0", "PR MR", "/register 0x02 =1"]
+
+
+@pytest.mark.parametrize("line", REFUSED)
+async def test_a_refused_line_ends_no_program_and_no_motion(session, line):
+    for each in ("SL 20000", "/sleep 0.5", "EX A3"):
+        await session.run(each if each.startswith("/") else f"@mcode: {each}")
+    await session.run("/use modbus")
+    session.events.clear()
+    with pytest.raises(FAILURES):
+        async with session.automations.run():
+            await session.run(line)
+    assert await answers(session, "PR BY", "mcode") == ["1"]
+    assert await answers(session, "PR V", "mcode") == ["20000"]
+
+
+@pytest.mark.parametrize("line", ["SL 20000", "/register 0x78 =20000", "MA 900000", "/register 0x43 =0,10"])
+async def test_an_accepted_write_that_moves_counts_and_the_program_is_named(session, line):
+    await session.run("@mcode: EX A3")
+    await session.run("/use modbus")
+    assert await answers(session, "PR BY", "modbus") == ["1"]
+    with pytest.raises(FAILURES):
+        async with session.automations.run():
+            for each in (line, "/sleep 0.2", "RC=200"):
+                await session.run(each)
+    told = [event.text for event in session.events if isinstance(event, Notified) and event.warning]
+    assert [text for text in told if text.startswith("program ended")] == ["program ended, if one was running: modbus"]
+    assert await answers(session, "PR BY,V", "mcode") == ["00"]
+
+
+@pytest.mark.parametrize("line", ["JE=0", "R1=5", "VM=500000", "/register 0x67 =20", "/coil 1 1", "SL 0", "PR P"])
+async def test_a_write_that_starts_nothing_leaves_a_program_alone(session, line):
+    await session.run("@mcode: EX A3")
+    await session.run("/use modbus")
+    with pytest.raises(FAILURES):
+        async with session.automations.run():
+            for each in (line, "RC=200"):
+                await session.run(each)
+    assert await answers(session, "PR BY", "mcode") == ["1"]

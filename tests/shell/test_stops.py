@@ -238,7 +238,7 @@ async def test_a_program_that_a_stop_does_not_end_is_named_in_every_report_of_it
         drive = shop.session.buses["press"].drives["a"]
         halt = shop.session.buses["press"].stop([drive])
         await asyncio.sleep(10.0)
-        assert outcome(shop.session, [halt])[0].startswith("stop sent to a: ")
+        assert outcome(shop.session, [halt])[0].startswith("stop sent to a and any other drive on this line: ")
         assert "1 STILL RUNNING A PROGRAM: a" in outcome(shop.session, [halt])[0]
 
 

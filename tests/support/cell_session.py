@@ -61,6 +61,8 @@ def moves(device: Any, now: float) -> bool:
     """Whether a simulated drive moves, an axis of it where it has several."""
     if hasattr(device, "controller"):
         return any(axis.pulses.profile.moving(now) or axis.homing is not None for axis in device.controller.axes)
+    if hasattr(device, "motors"):
+        return any(motor.moving(now) for motor in device.motors)
     return bool(device.moving(now))
 
 

@@ -6,7 +6,7 @@ import re
 from dataclasses import dataclass
 from functools import lru_cache
 
-from multidrop.dialects.codec import Kind
+from multidrop.dialects.codec import Kind, Started
 from multidrop.dialects.family import Referencing
 from multidrop.dialects.mcode.manual.grammar import (
     Argument,
@@ -136,6 +136,51 @@ def starts_motion(text: str) -> bool:
         return True
     row = lookup(statement.word) if statement is not None else None
     return statement is not None and (row is None or row.starts)
+
+
+MOTIONS = frozenset({"MA", "MR", "SL", "HM", "HI"})
+"""Instructions that start one motion. After it nothing moves by itself."""
+
+
+@lru_cache(maxsize=256)
+def started(text: str) -> Started:
+    """What a line that is executed at once can start; the same over Modbus."""
+    statement = parsed(text)
+    word = statement.word if statement is not None else ""
+    if word in MOTIONS:
+        return Started(None, program=False, lasts=False)
+    return Started(None, program=True, lasts=False) if word == "EX" else Started()
+
+
+@lru_cache(maxsize=256)
+def vouched(text: str, product: str) -> bool:
+    """Whether the tables show nothing for which a drive would refuse a line; its state may be such a thing."""
+    statement = parsed(text)
+    if statement is None or statement.word == "EX":
+        return False
+    row = lookup(statement.word, product)
+    if statement.word == "PR":
+        names = [each for each in statement.arguments if not isinstance(each, (Text, Number))]
+        rows = [lookup(each.word, product) if isinstance(each, Name) else None for each in names]
+        return all(each is not None and each.access != "-" for each in rows)
+    return (
+        row is not None
+        and len(statement.arguments) <= 1
+        and all(
+            isinstance(each, Number) and row.accepts(each.value) and row.access != "RO" for each in statement.arguments
+        )
+    )
+
+
+@lru_cache(maxsize=256)
+def refused_by_tables(text: str, product: str) -> bool:
+    """Whether a drive refuses a line for sure: its word is unknown, or a number is out of range."""
+    statement = parsed(text)
+    row = lookup(statement.word, product) if statement is not None else None
+    if statement is None or row is None:
+        return True
+    numbers = [each.value for each in statement.arguments[:1] if isinstance(each, Number)]
+    return any(not (row.accepts(each) or row.accepts(each, encoder=True)) for each in numbers)
 
 
 def may_displace(text: str) -> bool:

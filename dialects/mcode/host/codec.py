@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import ClassVar
 
-from multidrop.dialects.codec import Codec, Decoded, End, Kind, Reply, Request, StopPiece
+from multidrop.dialects.codec import Codec, Decoded, End, Kind, Reply, Request, Started, StopPiece
 from multidrop.dialects.errors import Inexpressible
 from multidrop.dialects.mcode.host import classify, framing
 from multidrop.dialects.mcode.host.reply_parser import ENDLESS, ReplyLines, ReplyParser, divided
@@ -63,6 +63,8 @@ SLOWEST = 90.0
 """Characters a second on a line of 1200 baud after a gateway, where the host does not know the baud rate."""
 PONG = 0.15
 """The time without a reply to a ping, which EM=2 does not give."""
+APART = 0.03
+"""Seconds of quiet after a line of a stop, so that its reply does not collide with the next line."""
 EXECUTED = 0.003
 """After the last line of a reply a prompt may follow: three characters at 9600 baud."""
 EXECUTING = 0.01
@@ -173,6 +175,7 @@ class MCode(Codec):
     broadcasts: ClassVar[bool] = True
     line_ends: ClassVar[bytes] = b"\r\n"
     stop_debris: ClassVar[re.Pattern[str]] = re.compile(r".*#")
+    error_routine: ClassVar[bool] = True
 
     @property
     def shown(self) -> str:
@@ -346,9 +349,21 @@ class MCode(Codec):
         keys = {0: CONTROL_E, 1: ESCAPE, 2: name + CONTROL_E, 3: name + ESCAPE}
         return escape is None or keys[escape] in data
 
+    def stops_unknown(self, data: bytes) -> bool:
+        return self.party and self.hears_stop(data, NOBODY)
+
     def starts_motion(self, text: str) -> bool:
         """Whether the tables list the word as one that starts motion; a print starts none, an unknown line may."""
         return classify.starts_motion(text)
+
+    def started(self, text: str) -> Started:
+        return classify.started(text)
+
+    def stop_started(self, address: str, started: Started) -> Sequence[StopPiece]:
+        """Return the end of the program, then SL 0, in party mode: no drive but the named one reads these lines."""
+        if not self.party or not (len(address) == 1 and "!" <= address <= "~") or address in EVERY_DRIVE:
+            return ()
+        return tuple(StopPiece(self.encode(self.request(address, text)), APART) for text in ("E", "SL 0"))
 
     def damaged(self, line: str) -> bool:
         return self.checksum > 0 and framing.UNPRINTED.search(line) is not None and not self.restarted(line)

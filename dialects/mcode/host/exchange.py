@@ -238,9 +238,11 @@ def refused(state: MCodeState, request: Request, acknowledged: bool = False) -> 
         raise Refused(
             f"{who(state)}: {described(code, state)}; it refused '{request.text}', or that {other} and it was executed",
             code,
+            certain=False,
         )
     caveat = "; a program runs, whose error it may be" if (yield from _runs(state)) else ""
-    raise Refused(f"{who(state)} refused '{request.text}': {described(code, state)}{caveat}", code)
+    refusal = f"{who(state)} refused '{request.text}': {described(code, state)}{caveat}"
+    raise Refused(refusal, code, certain=not caveat or classify.refused_by_tables(request.text, state.product))
 
 
 def _came_by_itself(request: Request, code: int) -> bool:

@@ -35,6 +35,9 @@ from multidrop.dialects.state import Owed
 # (MCode reference 5.1.98; facts of real units.)
 
 
+NOT_SENT = "was not sent"
+
+
 def enter_program(state: MCodeState, request: Request) -> Procedure[tuple[str, ...]]:
     """Send PG n in EM=0, the only mode that shows whether the drive entered program mode."""
     request = yield from unsent_if_stopped(who(state), request, before_request(state, request))
@@ -146,7 +149,7 @@ def program_line(state: MCodeState, request: Request) -> Procedure[tuple[str, ..
     """Send a line in program mode: the drive stores it, and nothing else may be asked."""
     moves = classify.starts_motion(request.text)  # in a drive that was without power meanwhile
     if (moves or state.reply_pending or state.settings_unknown) and not classify.leaves_program(request.text):
-        yield from unsent_if_stopped(who(state), request, _make_sure(state, request, "was not sent"))
+        yield from unsent_if_stopped(who(state), request, _make_sure(state, request, NOT_SENT))
     reply = yield replace(request, kind=Kind.PROGRAM)
     if reply.end in (End.TIMEOUT, End.DAMAGED):
         state.reply_lost()
@@ -161,7 +164,8 @@ def program_line(state: MCodeState, request: Request) -> Procedure[tuple[str, ..
         )
     elif not inside:
         yield from _left(state, reply)
-        raise Refused(f"{who(state)} was not in program mode any more: '{request.text}' was executed and not stored")
+        executed = f"'{request.text}' was executed and not stored"
+        raise Refused(f"{who(state)} was not in program mode any more: {executed}", certain=False)
     return ()
 
 
@@ -180,14 +184,13 @@ def _make_sure(state: MCodeState, request: Request, fate: str) -> Procedure[None
         return
     state.reply_outstanding()
     if reply.prompt == "?":
-        raise Refused(
-            f"{who(state)} shows an error, and not whether it is in program mode: '{request.text}' {fate}; type PG"
-        )
+        shows = f"{who(state)} shows an error, and not whether it is in program mode"
+        raise Refused(f"{shows}: '{request.text}' {fate}; type PG", certain=fate == NOT_SENT)
     if not reply.prompt:
         yield from find_again(state, request)
     state.synchronised()
     yield from _left(state, reply)
-    raise Refused(f"{who(state)} is not in program mode any more: '{request.text}' {fate}")
+    raise Refused(f"{who(state)} is not in program mode any more: '{request.text}' {fate}", certain=fate == NOT_SENT)
 
 
 # Proof of a command that shows no sign of its execution: its effect is read where reading is harmless.

@@ -10,7 +10,10 @@ from dataclasses import dataclass
 from functools import cache
 from typing import TYPE_CHECKING, ClassVar
 
-from multidrop.dialects.codec import Codec, Decoded, End, Reply, Request, StopPiece
+from multidrop.dialects.codec import Codec, Decoded, End, Reply, Request, Started, StopPiece
+from multidrop.dialects.mcode.host import classify
+from multidrop.dialects.mcode.manual.grammar import LineError, parse
+from multidrop.dialects.mcode.manual.table import lookup
 from multidrop.dialects.modbus.host import framing
 from multidrop.dialects.modbus.manual.registers import REGISTERS
 from multidrop.dialects.state import DriveState
@@ -26,6 +29,10 @@ WRITES = (framing.WRITE_COIL, framing.WRITE_REGISTERS, framing.WRITE_SPECIFIC)
 
 UNKNOWN = "this device did not identify itself as a Lexium drive"
 """What is said of a device whose identification (43/14) does not name a Lexium drive, or was not read."""
+USER = frozenset(f"V{n}" for n in range(1, 9))
+"""The user variables that have a register."""
+ENDS_AT_0 = frozenset({"SL", "JE", "TE"})
+"""Words that start nothing with the value 0."""
 
 
 @cache
@@ -44,6 +51,7 @@ class Modbus(Codec):
     family: ClassVar[str] = "modbus"
     framed: ClassVar[bool] = True
     numbered: ClassVar[bool] = True
+    error_routine: ClassVar[bool] = True
 
     def encode(self, request: Request) -> bytes:
         return pdu_codec().message(request.tag % NUMBERS, request.body, self.unit)
@@ -97,8 +105,18 @@ class Modbus(Codec):
         return True
 
     def starts_motion(self, text: str) -> bool:
-        """Whether a line is a write, each of which may start motion; a print only reads."""
-        return text.strip()[:2].upper() != "PR"
+        """Whether the register of the word can start motion or a program, and the value does not end it."""
+        try:
+            statement = parse(text, USER)
+        except LineError:
+            return True
+        if statement is None or statement.word in USER:
+            return False
+        row, values = lookup(statement.word), [getattr(each, "value", None) for each in statement.arguments]
+        return row is None or (row.starts and not (row.name in ENDS_AT_0 and values == [0]))
+
+    def started(self, text: str) -> Started:
+        return classify.started(text)
 
 
 def _reply(asked: bytes, answer: bytes) -> Reply:

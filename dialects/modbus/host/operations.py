@@ -15,11 +15,11 @@ from multidrop.dialects.errors import Inexpressible, NoAnswer, Refused
 from multidrop.dialects.exchange import unanswered
 from multidrop.dialects.family import Hints, Motion
 from multidrop.dialects.mcode.host.state import described, report_error, who
-from multidrop.dialects.mcode.manual import grammar
+from multidrop.dialects.mcode.manual import errors, grammar
 from multidrop.dialects.mcode.manual.points import STATUS, in_words
 from multidrop.dialects.mcode.manual.program_file import commented, spaced
 from multidrop.dialects.modbus.host import framing, mapping
-from multidrop.dialects.modbus.host.codec import UNKNOWN, Modbus, ModbusState, pdu_codec
+from multidrop.dialects.modbus.host.codec import UNKNOWN, USER, Modbus, ModbusState, pdu_codec
 from multidrop.dialects.modbus.host.mapping import Reading
 from multidrop.dialects.modbus.manual.registers import AT, REGISTERS, ROWS, Register
 
@@ -131,7 +131,8 @@ def carried_out(state: ModbusState, text: str, pdu: bytes) -> Procedure[bytes]:
         if not clear:
             old = f"{described(code, state)}; it may be older than '{text}', as the flag could not be read before"
             raise NoAnswer(f"{who(state)}: {old}: it is not known whether '{text}' was executed; it was sent once")
-        raise Refused(f"{who(state)} refused '{text}': {described(code, state)}", code)
+        refusal = f"{who(state)} refused '{text}': {described(code, state)}"
+        raise Refused(refusal, code, certain=code not in errors.BY_ITSELF)
     return answer
 
 
@@ -141,7 +142,6 @@ def flagged(state: ModbusState) -> Procedure[bool]:
     return state.error
 
 
-USER = frozenset(f"V{n}" for n in range(1, 9))
 OUTPUTS = 3
 MOST = 2
 """Most registers in one request (4.2.4, 4.2.5)."""

@@ -10,9 +10,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
-from multidrop.dialects.codec import Codec, Decoded, End, Kind, Reply, Request, StopPiece
+from multidrop.dialects.codec import Codec, Decoded, End, Kind, Reply, Request, Started, StopPiece
 from multidrop.dialects.errors import Inexpressible
-from multidrop.dialects.pmx.manual.table import lookup, reads, starts_motion
+from multidrop.dialects.pmx.manual.table import AXES, MOTIONS, PROGRAMS, axes_of, lookup, reads, starts_motion
 from multidrop.dialects.state import DriveState
 
 LONGEST = 62
@@ -47,6 +47,7 @@ class Pmx(Codec):
     addressed: bool = True
     family: ClassVar[str] = "pmx"
     stop_replies: ClassVar[bool] = True
+    spares: ClassVar[bool] = True
 
     def request(self, address: str, text: str) -> Request:
         """Build the request for a command, as typed: case matters. Raises Inexpressible where it cannot be sent."""
@@ -144,6 +145,20 @@ class Pmx(Codec):
     def starts_motion(self, text: str) -> bool:
         """Whether the table lists the command as one that starts motion; a read starts none, an unknown command may."""
         return starts_motion(text)
+
+    def started(self, text: str) -> Started:
+        row = lookup(text)
+        if row is None:
+            return Started()
+        program = row.name in PROGRAMS
+        return Started(axes_of(text), program, lasts=not program and row.name not in MOTIONS)
+
+    def stop_started(self, address: str, started: Started) -> Sequence[StopPiece]:
+        """Return ABORT for each axis that was started; with a program the usual stop."""
+        if started.program:
+            return (StopPiece(self.stop([address]), GAP), *self.stop_again([address])[1:])
+        axes = [axis for axis in AXES if started.axes is None or axis.lower() in started.axes]
+        return tuple(StopPiece(self._command(address, f"ABORT{axis}"), GAP) for axis in axes)
 
     def invalidate(self) -> bytes:
         """Return the end of a command that no unit knows; should a unit read it otherwise, ABORT follows at once."""

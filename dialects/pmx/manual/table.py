@@ -111,6 +111,20 @@ def starts_motion(text: str) -> bool:
     return row is None or (row.starts and not reads(text))
 
 
+MOTIONS = frozenset({"X", "Y", "I", "T", "J", "H", "L", "ZH", "Z", "HL"})
+"""Commands that start one motion. After it nothing moves by itself."""
+PROGRAMS = frozenset({"SR", "GS"})
+
+
+def axes_of(text: str) -> frozenset[str] | None:
+    """The axes of a command that starts no program, in small letters; None: any."""
+    row = lookup(text)
+    if row is None or row.name in PROGRAMS:
+        return None
+    rest = text.strip().upper() if "place" in row.shapes else text.strip().upper().removeprefix(row.name)
+    return frozenset(axis.lower() for axis in AXES if axis in rest.partition("=")[0]) or None
+
+
 # Replies in words: status numbers, and refusals with meaning and remedy.
 #
 # A refusal begins with a question mark; an unknown command follows it. (PMX-2ED-SA manual, tables 7.2, 7.9, 7.12,

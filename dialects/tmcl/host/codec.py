@@ -15,11 +15,11 @@ from dataclasses import dataclass, field, replace
 from struct import Struct
 from typing import ClassVar, NamedTuple
 
-from multidrop.dialects.codec import Codec, Decoded, End, Kind, Reply, Request, StopPiece
+from multidrop.dialects.codec import Codec, Decoded, End, Kind, Reply, Request, Started, StopPiece
 from multidrop.dialects.errors import Inexpressible
 from multidrop.dialects.state import DriveState, Owed
 from multidrop.dialects.tmcl.manual import commands
-from multidrop.dialects.tmcl.manual.commands import Call, Command, Search, Status, Version, accepted
+from multidrop.dialects.tmcl.manual.commands import Call, Command, Move, Search, Status, Version, accepted
 from multidrop.dialects.tmcl.manual.instructions import spelled
 
 LENGTH = 9
@@ -109,6 +109,7 @@ class Tmcl(Codec):
     family: ClassVar[str] = "tmcl"
     framed: ClassVar[bool] = True
     stop_replies: ClassVar[bool] = True
+    spares: ClassVar[bool] = True
     stop_debris: ClassVar[re.Pattern[str]] = re.compile(r"heard .*")
 
     def request(self, address: str, text: str, call: Call) -> Request:
@@ -218,6 +219,26 @@ class Tmcl(Codec):
         """Look the line up in the table of commands; an invalid line may start anything."""
         call = commands.parsed(text)
         return call is None or call.moves
+
+    def started(self, text: str) -> Started:
+        call = commands.parsed(text)
+        if call is None or call.row is None:
+            return Started()
+        together = call.command == Command.MVP and call.type == Move.COORD
+        return Started(None if together else frozenset({str(call.motor)}), program=False, lasts=call.lasts)
+
+    def stop_started(self, address: str, started: Started) -> Sequence[StopPiece]:
+        """Return MST for each motor that was started, and the end of its search; with a program the usual stop."""
+        if started.program or self.storing:
+            return tuple(StopPiece(each, GAP) for each in (*self._first([address]), *self._stops([address])))
+        [name] = _modules([address])
+        motors = range(dict(self.motors).get(name, MOST_MOTORS))
+        return tuple(
+            StopPiece(frame_of(int(name), Call(command, kind, motor)), GAP)
+            for command, kind in ((Command.MST, 0), (Command.RFS, Search.STOP))
+            for motor in motors
+            if started.axes is None or str(motor) in started.axes
+        )
 
     def answers(self, request: Request, line: str) -> bool:
         """Whether the line is a reply of this module to a command that only reads."""

@@ -179,7 +179,14 @@ class Call:
             return self.type == Search.START
         return self.row is None or self.row.moves
 
+    @property
+    def lasts(self) -> bool:
+        """Whether what it starts may move the motor again, once that was at rest."""
+        return self.command in (Command.SAP, Command.RSAP) and self.type not in TARGETS
 
+
+TARGETS = frozenset({0, 2})
+"""Axis parameters that start one motion when they are set: target position and velocity."""
 STARTING_PARAMETERS = frozenset({0, 1, 2, 4})
 """Axis parameters that can start a motion when they are set.
 

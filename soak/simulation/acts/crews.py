@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 from multidrop.shell.events import FAILURES
 from soak.simulation.act import Act
-from soak.simulation.acts.automation import Lines, later, motion, pause, refused, tell
+from soak.simulation.acts.automation import Lines, later, motion, pause, refused, setting, tell
 from soak.simulation.acts.files import download
 from soak.simulation.acts.guests import half_line
 from soak.simulation.acts.phrases import PHRASES, STOP, number, target
@@ -325,22 +325,48 @@ def beside_a_mover(world: World, rng: Random) -> float:
         return at_each_drive(world, rng)
     place = rng.choice(places)
     first, second = rng.sample(place.names, 2)
+    _starts_by_hand(world, place, first)
+    run = Run(f"m{world.step}", f"/play m{world.step}", automatic=True)
+    lines = Lines(world, rng, run, place.name, second, f"@{target(place, second)}", PHRASES[place.language])
+    steps = [*motion(lines), *pause(lines), *(refused(lines) if rng.random() < 0.7 else ["/sleep 2"])]
+    _plays(world, run, steps)
+    later(world, 1.5 + rng.random(), b"/play stop\r")
+    return 9.0
+
+
+def refused_beside_a_mover(world: World, rng: Random) -> float:
+    """Start a drive by hand, and run a macro on any drive of its line that only sets values, and is refused."""
+    place = rng.choice([each for each in world.places if PHRASES[each.language].endless])
+    _starts_by_hand(world, place, rng.choice(place.names))
+    run = Run(f"m{world.step}", f"/play m{world.step}", automatic=True)
+    drive = rng.choice(place.names)
+    lines = Lines(world, rng, run, place.name, drive, f"@{target(place, drive)}", PHRASES[place.language])
+    wrong = rng.choice((refused(lines), [f"{lines.at} STATUS"], [f"{lines.at} PR STATUS"], [f"{lines.at} MA 1,2,3,4"]))
+    _plays(world, run, [*setting(lines) * (rng.random() < 0.5), *wrong])
+    return 9.0
+
+
+def _starts_by_hand(world: World, place: Place, drive: str) -> None:
     phrases = PHRASES[place.language]
     text = phrases.motion.format(phrases.first_motion + number(world))
-    typed = f"@{target(place, first)} {text}"
-    world.history.commands[typed] = Command(text, place.name, first, world.loop.now, world.stops)
+    typed = f"@{target(place, drive)} {text}"
+    world.history.commands[typed] = Command(text, place.name, drive, world.loop.now, world.stops)
     world.person.type(f"{typed}\r".encode())
-    run = Run(f"m{world.step}", f"/play m{world.step}", automatic=True)
-    lines = Lines(world, rng, run, place.name, second, f"@{target(place, second)}", phrases)
-    steps = [*motion(lines), *pause(lines), *(refused(lines) if rng.random() < 0.7 else ["/sleep 2"])]
+
+
+def _plays(world: World, run: Run, steps: list[str]) -> None:
+    """Play a macro a little later."""
     folder = world.session.settings.macros
     folder.mkdir(parents=True, exist_ok=True)
     text = f'name = "{run.name}"\n' + "".join(f"[[step]]\nafter = 0.1\nline = '{step}'\n" for step in steps)
     (folder / f"{run.name}.toml").write_text(text)
     tell(world, run)
     later(world, 0.5, f"{run.typed}\r".encode())
-    later(world, 1.5 + rng.random(), b"/play stop\r")
-    return 9.0
+
+
+def _endless(world: World) -> bool:
+    """Whether a drive can move until something ends it, on a line where noise changes no command."""
+    return any(PHRASES[each.language].endless for each in world.places) and not world.climate.wire.harmful
 
 
 MARKS = {
@@ -388,5 +414,6 @@ AFTER_CREWS = (
     ),
     Act("marks in lines", 1, marks_in_lines),
     Act("half line at a share", 1, half_line, where=lambda world: bool(world.shares)),
+    Act("refused beside a mover", 1, refused_beside_a_mover, where=_endless),
 )
 """The last of all, each once."""

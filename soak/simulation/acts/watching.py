@@ -31,6 +31,7 @@ SETTLED = 5.0
 RAMP = 1.0
 """The time, s, in which a drive that got its stop stands."""
 MOTIONS = ("SL ", "MR ", "MA ", "X", "MVP ")
+STOPPED_TOO = "so these stopped too: "
 TROUBLE = re.compile(
     r"NOT KNOWN|NOT REACHED|STILL |stop not sent|could not be read|slows down|trying again|not reached"
 )
@@ -157,7 +158,11 @@ def examine(world: World, run: Run) -> None:
         elif (line, drive) in {move[:2] for move in run.moves}:
             continue  # a person's motion of a drive that the run had moved ends with it
         elif not moves and before.at < run.ended and _only_ended_by(world, run, before):
-            told.stopped_too.append(f"{text}: {before.text!r} was not of it, and was stopped")
+            words = f"{text}: {before.text!r} was not of it, and was stopped"
+            if not run.moves and "refused '" in run.failure:
+                told.unspared.append(words)
+            elif not _stopped_as_well(world, before):
+                told.stopped_too.append(words)
 
 
 def _only_ended_by(world: World, run: Run, started: Executed) -> bool:
@@ -174,15 +179,14 @@ def _only_ended_by(world: World, run: Run, started: Executed) -> bool:
         or world.history.damage.get(started.line)
         or any(at >= started.at for at in world.cut.get((started.line, started.drive), []))
         or _said(world, started.line, started.at, re.compile("trying again|was lost|restart"))
-        or _stopped_as_well(world, started)
     )
 
 
 def _stopped_as_well(world: World, started: Executed) -> bool:
-    """Whether the session said that a stop without a name has reached a drive, too; one line alone is not named."""
+    """Whether the session said that the stop of a line has reached a drive, too; one line alone is not named."""
     names = {started.drive, f"{started.line}:{started.drive}"}
-    said = [text for at, text in world.history.notices if at >= started.at and text.startswith("stopped as well")]
-    return any(names & set(text.rpartition("has no name: ")[2].split(", ")) for text in said)
+    said = [text for at, text in world.history.notices if at >= started.at and STOPPED_TOO in text]
+    return any(names & set(text.rpartition(STOPPED_TOO)[2].split(", ")) for text in said)
 
 
 def _said(world: World, line: str, since: float, words: re.Pattern[str]) -> bool:

@@ -47,7 +47,7 @@ async def test_a_failure_names_macro_step_and_file_and_the_report_what_was_sent_
         "  step 5: @b QQ 1 -> FAILED: b refused 'QQ 1': error 60: unknown command (check the spelling; /help NAME "
         "explains a word)",
     ]
-    assert shop.warned()[6].startswith("stopped press:a, press:b: velocity 0 was read from both")
+    assert shop.warned()[6].startswith("stopped press:b: velocity 0 was read from press:b")
     assert shop.warned()[-1].startswith("press:a is at rest at 500; press:b is at rest at ")
     assert shop.moving() == set() and not shop.session.latched
     assert b"9000" not in shop.written("press")

@@ -15,6 +15,7 @@ from tests.support.until import PATIENCE
 pytestmark = pytest.mark.process
 
 CELL = bus("press", party("a"), party("b"), baud=0, serve=[*TCP, "pty:press.tty"])
+STOPPED = "interrupted; stopped a, b: velocity 0 was read from both\nprogram ended, if one was running: a, b\n"
 
 
 KNOWN = "party=1&checksum=1&em=1"
@@ -78,7 +79,7 @@ def test_a_signal_in_a_script_stops_what_it_moved(shop, name):
     assert shop.standing()[1] != "0\n0\n"
     script.send_signal(getattr(signal, f"SIG{name}", name))
     _, err = script.communicate(timeout=PATIENCE)
-    assert (script.returncode, err) == (130, "interrupted; stopped a, b: velocity 0 was read from both\n")
+    assert (script.returncode, err) == (130, STOPPED)
     assert shop.standing() == (0, "0\n0\n", "")
 
 
@@ -93,7 +94,7 @@ def test_a_log_swallows_no_signal(shop):
     assert len(open_) == 2 < len(masks), "the threads that wait for the signal, and no other"
     script.send_signal(signal.SIGPIPE)
     _, err = script.communicate(timeout=PATIENCE)
-    assert (script.returncode, err) == (130, "interrupted; stopped a, b: velocity 0 was read from both\n")
+    assert (script.returncode, err) == (130, STOPPED)
 
 
 def test_a_terminal_that_hangs_up_stops_what_the_script_moved(shop):
@@ -191,20 +192,20 @@ def test_a_refusal_in_a_script_stops_what_it_started_says_so_and_keeps_its_exit_
     assert shop.send("@b PR P", "@a SL 100000") == (0, "0\n", "")
     script = shop.start("run", shop.script("@b SL 5000\n@b XX\n"), "--on", shop.url)
     _, err = script.communicate(timeout=PATIENCE)
-    others = "stopped as well, because the stop of their line has no name: a"
     assert script.returncode == 1
-    assert (
-        err.splitlines()[:2] == ["stopped b: velocity 0 was read from both", others]
-        and "script.txt:2: b refused" in err
-    )
-    assert shop.standing() == (0, "0\n0\n", "")
+    assert err.splitlines()[0] == "stopped b: velocity 0 was read from b"
+    assert "script.txt:2: b refused" in err
+    assert shop.standing() == (0, "100000\n0\n", "")
 
 
-def test_a_send_that_succeeds_leaves_its_drive_moving_and_one_that_fails_does_not(shop):
+def test_a_send_that_succeeds_leaves_its_drive_moving_and_one_that_is_refused_stops_what_it_started(shop):
     shop.turn()
     assert shop.standing()[1] == "100000\n0\n"
     code, _, err = shop.send("@a PR P", "@a XX")
-    assert (code, err.splitlines()[0]) == (1, "stopped a: velocity 0 was read from both")
+    assert code == 1 and err.startswith("a refused 'XX': error 60")
+    assert shop.standing()[1] == "100000\n0\n"
+    code, _, err = shop.send("@a MR 900000", "@a XX")
+    assert (code, err.splitlines()[0]) == (1, "stopped a: velocity 0 was read from a")
     assert shop.standing()[1] == "0\n0\n"
 
 
@@ -221,7 +222,7 @@ def test_an_interrupted_reader_stops_nothing(shop):
 def test_a_piped_shell_that_is_refused_stops_what_it_started(shop):
     piped = shop.start("shell", shop.url)
     _, err = piped.communicate("@b SL 5000\n@b XX\n", timeout=PATIENCE)
-    assert piped.returncode == 1 and err.startswith("stopped b: velocity 0 was read from both\n")
+    assert piped.returncode == 1 and err.startswith("stopped b: velocity 0 was read from b\n")
     assert shop.standing() == (0, "0\n0\n", "")
 
 

@@ -1,0 +1,66 @@
+"""What a drive does after a stop, as it is read, and published."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from multidrop.dialects import DriveError, Stopped
+from multidrop.drives.drive import Drive
+from multidrop.drives.events import Sample
+from multidrop.transports import TransportLost
+
+
+class Activity(NamedTuple):
+    """What a drive did when it was read; nothing, where that is not known."""
+
+    speed: int = 0
+    """Unsigned, of its fastest axis."""
+    runs: bool = False
+    """A program runs."""
+    places: str = ""
+    """The positions of its axes; empty: not read."""
+
+    @property
+    def none(self) -> bool:
+        """Whether it neither moves nor runs a program, or nothing is known."""
+        return not self.speed and not self.runs
+
+    def lessens(self, before: Activity | None) -> bool:
+        """Whether it slows down, as far as two readings show, and no program runs that can move it again."""
+        return not self.runs and (before is None or self.speed < before.speed)
+
+
+NOTHING = Activity()
+ENDLESS = Activity(1 << 40)
+"""Of a drive that another stop kept from being read: faster than any."""
+
+
+async def read_activity(drive: Drive, axes: frozenset[str] | None) -> tuple[Activity, str]:
+    """Read and publish what a drive does; NOTHING with the reason where that cannot be read. `axes`: those that count.
+
+    None: all axes.
+    """
+    if drive.programming and not drive.engaged:
+        return NOTHING, "its velocity cannot be read in program mode"
+    try:
+        found = await drive.motion()
+        assert drive.seen is not None
+        at = drive.seen.transmitted_at
+        runs, why = found[0].program, ""
+        if runs is None and not any(axis.velocity for axis in found):  # a drive that moves is stopped again
+            try:
+                runs = await drive.busy()
+            except Stopped:
+                raise
+            except (TimeoutError, DriveError, TransportLost) as error:
+                why = f"velocity 0 was read, and whether a program runs was not: {error}"
+    except Stopped:
+        return ENDLESS, ""
+    except (TimeoutError, DriveError, TransportLost) as error:
+        return NOTHING, f"its velocity could not be read: {error}"
+    for each in found:
+        drive.link.publish(Sample(at, drive.address, each.position, each.velocity, each.axis, each.trouble, runs))
+    speeds = zip(found, drive.seen.velocities, strict=True) if drive.seen is not None and not why else ()
+    speed = max((abs(each) for axis, each in speeds if axes is None or axis.axis in axes), default=0)
+    places = "" if why else ", ".join(str(each.position) for each in found)
+    return Activity(speed, bool(runs) and not why, places), why

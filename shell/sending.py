@@ -1,0 +1,101 @@
+"""What a line of an automation has started, by what became of the line.
+
+It has started nothing if it was not sent, or if the drive has refused it, and no routine of the drive for errors began
+because of that. Whatever else became of it, it may have been executed.
+"""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import AsyncIterator
+from dataclasses import dataclass
+
+from multidrop.dialects import Inexpressible, Refused, Started
+from multidrop.dialects.errors import Differs
+from multidrop.drives.drive import Drive
+from multidrop.drives.port_journal import GLOBAL
+from multidrop.shell import at_rest
+from multidrop.shell.automation import Automation, Automations, Sent
+from multidrop.shell.events import FAILURES
+from multidrop.transports import TransportLost
+
+
+@dataclass(frozen=True)
+class _Before:
+    """What was known of a drive before a line."""
+
+    sent: Sent | None
+    requests: int
+    commanded_at: float
+    active: bool
+
+
+@contextlib.asynccontextmanager
+async def sending(
+    automations: Automations, drive: Drive, text: str, *, starts: bool, only_ends: bool = False, parts: bool = False
+) -> AsyncIterator[None]:
+    """Send a line in the body, and record what it can start; with an empty text anything.
+
+    `parts`: it is several requests, of which a drive may have executed one before it refused another.
+
+    Raises what the body raises, Diagnostic where the line must not start the drive, Stopped.
+    """
+    automation = automations.current
+    if automation is not None and not parts and _has_routine(drive) and drive not in automation.started:
+        await at_rest.look_before(drive, text)
+    what = drive.codec.started(text) if text else Started()
+    stored, at = drive.stores, drive.link.stamp()
+    before = {each: _before(automation, each) for each in drive.recipients}
+    for each in before if starts else ():
+        automations.starts(each, what, only_ends=only_ends)
+    try:
+        yield
+    except FAILURES as failure:
+        if automation is None:
+            raise
+        if stored and not drive.stores and drive.starts(text):  # it was executed, as program mode had ended
+            automations.records(automation, drive, what)
+            raise
+        for each, was in before.items():
+            each_as_it_was = each is drive or each.commanded_at == was.commanded_at
+            if each_as_it_was and _started_nothing(each, was, failure, parts):
+                automations.restores(automation, each, was.sent)
+            sure = each in automation.started or was.active or stored
+            if not sure and _has_error(each, was, failure, at):
+                await _after_error(automations, automation, each)
+        raise
+
+
+def _before(automation: Automation | None, drive: Drive) -> _Before:
+    sent = automation.started.get(drive) if automation is not None else None
+    return _Before(sent, drive.requests, drive.commanded_at, bool(at_rest.known_active(drive)))
+
+
+def _has_routine(drive: Drive) -> bool:
+    return drive.codec.error_routine and drive.address not in GLOBAL and not drive.stores
+
+
+def _started_nothing(drive: Drive, before: _Before, failure: BaseException, parts: bool) -> bool:
+    """Whether a line that failed has started nothing by itself in a drive."""
+    if isinstance(failure, TransportLost) and (failure.unproven or failure.executed):
+        return False
+    if drive.requests == before.requests:
+        return True
+    if parts or (isinstance(failure, Refused) and not failure.certain):
+        return False
+    return isinstance(failure, (Refused, Inexpressible, Differs))
+
+
+def _has_error(drive: Drive, before: _Before, failure: BaseException, at: float) -> bool:
+    """Whether a drive has shown an error that may have started its routine for errors."""
+    if not _has_routine(drive) or drive.requests == before.requests:
+        return False
+    return isinstance(failure, Refused) or drive.state.last_error_at > at
+
+
+async def _after_error(automations: Automations, automation: Automation, drive: Drive) -> None:
+    """Record that a drive may have been started by its routine for errors, unless it is read to be at rest."""
+    before = automation.started.get(drive)
+    automations.records(automation, drive, Started(), at_rest.ROUTINE)
+    if await at_rest.at_rest_after_error(drive):
+        automations.restores(automation, drive, before)
