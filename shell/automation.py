@@ -226,7 +226,9 @@ class Automations:
 
     async def _end(self, automation: Automation) -> None:
         """Stop what an automation started; read what was at rest since once more first, and stop it if it is not."""
-        excuses = {drive for drive, sent in automation.started.items() if _rested(drive, sent)}
+        excuses = {
+            drive for drive, sent in automation.started.items() if _rested(drive, sent) and not drive.state.stranger
+        }
         self._stop(automation, excuses)
         try:
             if excuses and automation.stops == self._workspace.stops:

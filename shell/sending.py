@@ -72,7 +72,7 @@ def _before(automation: Automation | None, drive: Drive) -> _Before:
 
 
 def _has_routine(drive: Drive) -> bool:
-    return drive.codec.error_routine and drive.address not in GLOBAL and not drive.stores
+    return drive.codec.error_routine and drive.address not in GLOBAL and not (drive.stores or drive.state.stranger)
 
 
 def _started_nothing(drive: Drive, before: _Before, failure: BaseException, parts: bool) -> bool:
