@@ -199,6 +199,8 @@ class Automations:
         """Write the stops onto every wire first, each wire by itself; once for each automation."""
         if automation.halts or automation.stops != self._workspace.stops:
             return  # a stop of everything came meanwhile
+        for drive in (each for bus in self._workspace.buses.values() for each in bus.all_drives):
+            drive.motions.close(automation)
         for link, only in _by_link(automation.started).items():
             with isolated(f"the stop of {link.name}"):
                 automation.halts.append(self._halt(link, only))
@@ -241,6 +243,16 @@ def only_ends(drive: Drive, text: str) -> bool:
     """True if a line that counts as a start can only end motion, as a velocity of 0."""
     guards = drive.family.guards
     return guards is not None and guards.only_ends(text)
+
+
+def sequence(workspace: Workspace) -> object:
+    """Who sends the lines of this task: an automation, else the person at the session."""
+    return _current.get() or workspace
+
+
+def is_automation() -> bool:
+    """True if an automation sends the lines of this task."""
+    return _current.get() is not None
 
 
 async def settled(workspace: Workspace) -> None:

@@ -20,6 +20,7 @@ from multidrop.dialects import Diagnostic, DriveError, Refused, Stopped
 from multidrop.dialects.on_demand import imported
 from multidrop.drives.bus import Bus
 from multidrop.drives.drive import Drive
+from multidrop.shell import motions
 from multidrop.shell.automation import AGREED, ENDING, Automations, only_ends
 from multidrop.shell.configuration import Settings
 from multidrop.shell.connect.opening import Opener, open_buses
@@ -300,7 +301,7 @@ class LinePath:
         before, started = drive.commands, False
         try:
             started = starts and session.automations.starts(drive, only_ends(drive, text))
-            printed = await drive.send(text, check)
+            printed = await motions.send(session, drive, text, check)
         except FAILURES as failure:
             unsent = started and drive.commands == before and drive.address not in EVERYONE
             if unsent and isinstance(failure, DriveError):

@@ -320,6 +320,8 @@ class Workspace(Channel):
             with isolated(f"the stop of {bus.name}"):
                 halts.append(bus.halt(follows=follows))
         self.latched = True
+        for drive in (each for bus in self.buses.values() for each in bus.all_drives):
+            drive.motions.stopped(None)
         self.tasks.stop()
         self.questions.open.stop()
         for halt in halts:
