@@ -71,6 +71,17 @@ class Diagnostic(Exception):
         return f"{head}{self.message}{tail}"
 
 
-PUBLIC = (DriveError, Refused, NoAnswer, Stopped, Inexpressible, Differs, Timeout, MotionFailed, Unreferenced, Diagnostic)
+PUBLIC = (
+    DriveError,
+    Refused,
+    NoAnswer,
+    Stopped,
+    Inexpressible,
+    Differs,
+    Timeout,
+    MotionFailed,
+    Unreferenced,
+    Diagnostic,
+)
 for _each in PUBLIC:
     _each.__module__ = "multidrop"  # a traceback shows the name by which a program catches it

@@ -1,12 +1,12 @@
 """How a motion ends: what a line begins, the signs of a failure, and the judgement of what was read at its end.
 
-A family supplies a `Motions`. It knows its drives, and no sequences: `judge` says what the drive shows. Whose stop ended
-a motion, and whether that is a failure, is decided once for all families (`drives.motion_record`).
+A family supplies a `Motions`. It knows its drives, and no sequences: `judge` says what the drive shows. Whose stop
+ended a motion, and whether that is a failure, is decided once for all families (`drives.motion_record`).
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import Enum
 from types import MappingProxyType
@@ -23,7 +23,6 @@ NO_SIGNS: Signs = MappingProxyType({})
 
 def _no_signs_read() -> Signs:
     return NO_SIGNS
-
 
 
 class Outcome(Enum):
@@ -44,6 +43,8 @@ class Outcome(Enum):
 
 
 class MoveKind(Enum):
+    """What a line begins."""
+
     POSITION = "position"
     VELOCITY = "velocity"
     HOMING = "homing"
@@ -77,6 +78,15 @@ class Effect:
 NOTHING = Effect()
 
 
+def joined(effects: Sequence[Effect]) -> Effect:
+    """What several lines do together."""
+    return Effect(
+        tuple(move for each in effects for move in each.begins),
+        frozenset(axis for each in effects for axis in each.ends),
+        frozenset(axis for each in effects for axis in each.unknown),
+    )
+
+
 @dataclass(frozen=True)
 class Evidence:
     """What the host knows of a motion that seems to have ended."""
@@ -87,6 +97,8 @@ class Evidence:
     """The signs from before it: of an own motion from right before its line, else from the beginning of the wait."""
     errors: tuple[int, ...] = ()
     """The numbers of errors that were read, and thereby cleared, since it began; newest last."""
+    stopped: bool = False
+    """This session has stopped it since, so that an error of a line cut off by the stop says nothing of the motion."""
     program: bool = False
     """A program may have moved the axis since: one was started, or seen to run."""
 

@@ -12,7 +12,6 @@ from dataclasses import dataclass, field
 
 from multidrop.dialects.codec import Codec
 
-
 KEPT_ERRORS = 8
 
 

@@ -8,8 +8,16 @@ from dataclasses import dataclass
 from typing import Any, Protocol, TypeVar
 
 from multidrop.dialects.codec import Codec, Priority, Procedure
-from multidrop.dialects.errors import Differs, DriveError, Inexpressible, MotionFailed, NoAnswer, Refused, Stopped
-from multidrop.dialects.errors import Unreferenced
+from multidrop.dialects.errors import (
+    Differs,
+    DriveError,
+    Inexpressible,
+    MotionFailed,
+    NoAnswer,
+    Refused,
+    Stopped,
+    Unreferenced,
+)
 from multidrop.dialects.families import FAMILIES, program_languages
 from multidrop.dialects.family import Family, Motion, Programs
 from multidrop.dialects.files import SourceLine

@@ -43,7 +43,7 @@ class Course:
         return self.ending is None
 
     def evidence(self, errors: tuple[int, ...]) -> Evidence:
-        return Evidence(self.move, self.before, errors, self.program)
+        return Evidence(self.move, self.before, errors, self.stopped or self.stopped_by_other, self.program)
 
     def judged(self, found: Ending) -> Ending:
         """Decide whether what the drive shows is a failure of this motion, and keep it."""

@@ -8,18 +8,23 @@ it was, and who stopped it (`drives.motion_record`).
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Iterable, Sequence
+from collections.abc import Awaitable, Callable, Iterable, Sequence
+from contextvars import ContextVar
 from dataclasses import replace
+from typing import TypeVar
 
-from multidrop.dialects import Inexpressible, NoAnswer, Procedure, Refused
+from multidrop.dialects import Inexpressible, NoAnswer, Procedure, Refused, Stopped
 from multidrop.dialects.errors import MotionFailed
-from multidrop.dialects.motions import NO_SIGNS, Effect, Ending, Evidence, Outcome, Signs
+from multidrop.dialects.motions import NO_MOTIONS, NO_SIGNS, Ending, Evidence, Outcome, Signs, joined
 from multidrop.drives.drive import NOT_SENT, Check, Drive, still
 from multidrop.drives.motion_record import Course, Courses
 from multidrop.drives.port_journal import GLOBAL
 from multidrop.shell.automation import is_automation, sequence
 from multidrop.shell.workspace import Workspace
 
+T = TypeVar("T")
+OUTCOME: ContextVar[list[str] | None] = ContextVar("outcome", default=None)
+"""Takes the word of a `/wait ended`, for the script whose line it is."""
 WORST = (
     Outcome.UNKNOWN,
     Outcome.POWER,
@@ -42,43 +47,63 @@ def failure(name: str, ending: Ending) -> MotionFailed:
 # Lines
 
 
-async def send(workspace: Workspace, drive: Drive, text: str, check: Check | None) -> tuple[str, ...]:
+async def send(workspace: Workspace, drive: Drive, text: str, check: Check | None = None) -> tuple[str, ...]:
     """Send a line as `Drive.send` does, and record what it does to motions.
 
     Raises MotionFailed where an error shows that a motion of the same automation has failed: before the line, which is
     then not sent, or after it. A person at the session is only told. A line that ends motion is never held back.
     """
-    line = _Line(workspace, drive, text, check)
-    if line.effect.begins or not line.effect.ends:
-        for each in line.reached:
-            if each.state.error and each.motions.open_of(line.by):
-                await each.run(line.judged_before(each))
-    return await line.send()
+    line = _Line(workspace, drive, (text,), check)
+    return await line.run(lambda check: drive.send(text, check))
+
+
+async def perform(workspace: Workspace, drive: Drive, lines: Sequence[str], work: Procedure[T]) -> T:
+    """Run a conversation that does what these lines do, as `send` sends a line."""
+
+    def checked(check: Check | None) -> Procedure[T]:
+        if check is not None:
+            yield from check(drive)
+        return (yield from work)
+
+    return await _Line(workspace, drive, lines, None).run(lambda check: drive.run(checked(check)))
+
+
+class _Before:
+    """The motions of a drive before a line."""
+
+    def __init__(self, drive: Drive, courses: Courses, suspects: list[Course]) -> None:
+        self.drive, self.courses, self.suspects, self.errors = drive, courses, suspects, drive.state.errors_read
 
 
 class _Line:
-    """One line, the drives that it reaches, and what it does to their motions."""
+    """A line, the drives that it reaches, and what it does to their motions."""
 
-    def __init__(self, workspace: Workspace, drive: Drive, text: str, check: Check | None) -> None:
+    def __init__(self, workspace: Workspace, drive: Drive, lines: Sequence[str], check: Check | None) -> None:
+        motions, state = drive.family.motions, drive.state
         self.by = sequence(workspace)
-        self.effect = Effect() if drive.stores else drive.family.motions.effect(drive.state, text)
+        self.effect = joined(() if drive.stores else [motions.effect(state, each) for each in lines])
         bus = workspace.buses.get(drive.link.name)
         to_all = bus is not None and drive.address in GLOBAL
         self.reached = bus.all_drives if bus is not None and to_all else [drive]
-        self._workspace, self._drive, self._text, self._check, self._to_all = workspace, drive, text, check, to_all
+        self._workspace, self._text, self._check, self._to_all = workspace, " ".join(lines).strip(), check, to_all
 
-    async def send(self) -> tuple[str, ...]:
-        check, drive = self._check, self._drive
+    async def run(self, execute: Callable[[Check | None], Awaitable[T]]) -> T:
+        """Execute it, with a check right before it, and record what it did."""
+        check = self._check
+        if self.effect.begins or not self.effect.ends:
+            for each in self.reached:
+                if each.state.error and self._suspect(each):
+                    await each.run(self._judged_before(each))
         if self.effect.begins and self._to_all:
             await self._prepare_each()
         elif self.effect.begins:
             check = self._checked
-        before = [(each, each.motions.copy(), each.state.errors_read) for each in self.reached]
+        before = [_Before(each, each.motions.copy(), self._suspect(each)) for each in self.reached]
         try:
-            printed = await drive.send(self._text, check)
+            result = await execute(check)
         except NOT_SENT as refusal:
-            for each, courses, _ in before:
-                each.motions.restore(courses)
+            for each in before:
+                each.drive.motions.restore(each.courses)
             if not isinstance(refusal, MotionFailed):
                 await self._judge_after(before, f"; {refusal}")
             raise
@@ -86,8 +111,12 @@ class _Line:
             self._took_effect()
             raise
         self._took_effect()
-        await self._judge_after(before, f"; '{self._text.strip()}' was executed")
-        return printed
+        await self._judge_after(before, f"; '{self._text}' was executed")
+        return result
+
+    def _suspect(self, drive: Drive) -> list[Course]:
+        """The motions of this sequence of which an error may be: not those that it has stopped itself."""
+        return [each for each in drive.motions.open_of(self.by) if not each.stopped]
 
     def _took_effect(self) -> None:
         for each in self.reached:
@@ -110,9 +139,15 @@ class _Line:
 
     def _signs(self, drive: Drive) -> Procedure[Signs]:
         motions, state = drive.family.motions, drive.state
-        signs = yield from motions.signs(state)
-        if state.error and drive.motions.open_of(self.by):
-            yield from self.judged_before(drive)
+        unsent = f"'{self._text}' was not sent"
+        try:
+            signs = yield from motions.signs(state)
+        except NoAnswer:
+            raise NoAnswer(f"{drive.shown} does not reply: {unsent}") from None
+        except Stopped:
+            raise Stopped(f"{drive.shown}: stopped; {unsent}") from None
+        if state.error and self._suspect(drive):
+            yield from self._judged_before(drive)
         return (yield from motions.old(state, signs, True))
 
     def _record(self, drive: Drive, signs: Signs) -> None:
@@ -127,20 +162,20 @@ class _Line:
         if courses:
             state.motion_begun()
 
-    def judged_before(self, drive: Drive) -> Procedure[None]:
+    def _judged_before(self, drive: Drive) -> Procedure[None]:
         """Judge the motions of this sequence whose error the next line would clear. Raises MotionFailed."""
-        for course in drive.motions.open_of(self.by):
+        for course in self._suspect(drive):
             failed = yield from _sign_of(drive, course)
             if failed is not None:
-                self._report(drive, failed, f"; '{self._text.strip()}' was not sent")
+                self._report(drive, failed, f"; '{self._text}' was not sent")
 
-    async def _judge_after(self, before: list[tuple[Drive, Courses, int]], fate: str) -> None:
+    async def _judge_after(self, before: Sequence[_Before], fate: str) -> None:
         """Judge the motions of this sequence of which an error was read with the line. Raises MotionFailed."""
-        for drive, _, count in before:
-            new = drive.state.errors_since(count)
-            if any(map(drive.family.motions.fails, new)):
-                for course in drive.motions.open_of(self.by):
-                    failed = await drive.run(_sign_of(drive, course))
+        for each in before:
+            drive = each.drive
+            if any(map(drive.family.motions.fails, drive.state.errors_since(each.errors))):
+                for course in each.suspects:
+                    failed = await drive.run(_sign_of(drive, course)) if course.open else None
                     if failed is not None:
                         self._report(drive, failed, fate)
 
@@ -184,6 +219,7 @@ class Watch:
         self._by, self._accepts = sequence(workspace), ended
         self._signs: dict[Drive, Signs] = {}
         self._errors: dict[Drive, int] = {}
+        self._silent: set[Drive] = set()
         self.endings: dict[Drive, list[Ending]] = {}
         """How the motions of each drive ended that was judged."""
 
@@ -232,7 +268,9 @@ class Watch:
         motions, state = drive.family.motions, drive.state
         signs = self._signs.get(drive, NO_SIGNS)
         evidence = Evidence(None, signs, state.errors_since(self._errors.get(drive, state.errors_read)))
-        endings = []
+        endings: list[Ending] = []
+        if motions is NO_MOTIONS:
+            return endings
         for axis in drive.family.units.axes(state):
             found = await drive.run(motions.judge(state, axis, evidence))
             if found is not None:
@@ -240,11 +278,19 @@ class Watch:
                 endings.append(replace(found, failed=bad))
         return endings
 
-    def unknown(self, drive: Drive, why: str) -> None:
-        """Take it that nothing can be read of a drive any more."""
+    @property
+    def left(self) -> list[Drive]:
+        """The drives that can still be asked."""
+        return [each for each in self.drives if each not in self._silent]
+
+    def silent(self, drive: Drive, error: NoAnswer) -> None:
+        """Take it that the end of what moves a drive cannot be read. Raises the error, unless any ending will do."""
+        if not self._accepts:
+            raise error
+        self._silent.add(drive)
         for course in self.own(drive):
-            _judged(drive, course, Ending(Outcome.UNKNOWN, course.move.axis, reason=why))
-        self.endings[drive] = [Ending(Outcome.UNKNOWN, reason=why)]
+            _judged(drive, course, Ending(Outcome.UNKNOWN, course.move.axis, reason=str(error)))
+        self.endings[drive] = [Ending(Outcome.UNKNOWN, reason=str(error))]
 
     @property
     def worst(self) -> tuple[Drive, Ending] | None:
@@ -267,4 +313,3 @@ async def check_own(workspace: Workspace, drives: Iterable[Drive] | None = None)
     for drive in every:
         if drive.motions.open_of(by) and not drive.programming and await still(drive):
             await Watch(workspace, [drive]).judge(drive)
-

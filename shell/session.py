@@ -373,11 +373,13 @@ class LinePath:
         if stops != self._session.stops:
             raise Stopped("a stop came before the answer counted; nothing was sent")
 
-    def starting(self, drive: Drive) -> None:
-        """Note that the next request can start motion or a program of a drive."""
+    def starting(self, drive: Drive, program: bool = True) -> None:
+        """Note that the next request can start motion or, if `program`, a program of a drive."""
         drive.check_start()
         self._session.addressed.add((drive.link.name, drive.address))
         self._session.automations.starts(drive)
+        if program:
+            drive.motions.runs()
         drive.starts_now()
 
     def _allow(self, by: By) -> None:

@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
-from multidrop.dialects import Diagnostic, DriveError, Motion
+from multidrop.dialects import Diagnostic, DriveError, Motion, NoAnswer
 from multidrop.dialects.errors import Timeout
 from multidrop.drives.bus import Bus
 from multidrop.drives.drive import REST, Check, Drive, Running, confirmed_motion
@@ -97,7 +97,7 @@ async def wait(
     said: str = "",
     ended: bool = False,
 ) -> Watch:
-    """Wait until every drive is at rest in two readings and its motion is over; with `idle`, also until no program runs.
+    """Wait until every drive is at rest in two readings, its motion over; with `idle`, also until no program runs.
 
     `drives` None: those that this session sent a line to, else the selected one. `said`: what a person called this.
     Raises MotionFailed for a motion that did not end as it should, unless `ended` accepts every ending; Timeout after
@@ -134,14 +134,21 @@ async def _moving(workspace: Workspace, watch: Watch, idle: bool) -> Drive | Non
     for reading in range(2):
         if reading:
             await sleep(APART)
-        for drive in watch.drives:
+        for drive in watch.left:
             if (moving is not None and not watch.own(drive)) or (reading and drive not in before):
                 continue
             _check_asked(workspace, drive)
-            place = await drive.rest()
-            if place is None or before.setdefault(drive, place) != place or (idle and await drive.busy()):
+            try:
+                place = await drive.rest()
+                rests = place is not None and before.setdefault(drive, place) == place
+                rests = rests and not (idle and await drive.busy())
+            except NoAnswer as error:
+                watch.silent(drive, error)
+                rests = False
+            else:
+                moving = moving if rests else moving or drive
+            if not rests:
                 before.pop(drive, None)
-                moving = moving or drive
     for drive in before:
         if not await watch.judge(drive):
             moving = moving or drive

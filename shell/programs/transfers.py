@@ -20,6 +20,7 @@ from multidrop.dialects.files import program_text_of
 from multidrop.dialects.program_files import LOCKED, Difference, Held, errors, refuse
 from multidrop.dialects.text import counted
 from multidrop.drives.drive import Drive, still
+from multidrop.shell import motions
 from multidrop.shell.channel import running, transferring
 from multidrop.shell.events import By, Printed
 from multidrop.shell.program_listing import check_one, read
@@ -287,6 +288,6 @@ class _Download:
     async def start(self, line: str) -> None:
         drive, workspace = self._drive, self._session
         workspace.path.starting(drive)
-        for text in await drive.send(line):
+        for text in await motions.send(workspace, drive, line):
             workspace.publish(Printed(workspace.now(), drive.link.name, drive.address, text))
         self._say(f"started ({line})")

@@ -17,6 +17,7 @@ from multidrop.dialects.text import counted
 from multidrop.macros import checked_values, fill
 from multidrop.shell import waits
 from multidrop.shell.events import FAILURES, By, Failed
+from multidrop.shell.motions import OUTCOME, check_own
 from multidrop.shell.playing import Playing, StepProgress, cast
 from multidrop.shell.scripts import words
 from multidrop.shell.scripts.captured_prints import Hearing
@@ -236,7 +237,11 @@ class Execution:
             await self.block(node.body, frame)
 
     async def _goes_on(self, line: ScriptLine, frame: Frame) -> bool:
-        return await self._own(line, frame, self._condition) == (line.word == "/while")
+        """Whether a loop has another round; one that waits for a motion which has failed ends with that failure."""
+        goes_on = await self._own(line, frame, self._condition) == (line.word == "/while")
+        if goes_on and not self.is_over:
+            await self._own(line, frame, lambda text, frame: check_own(self.session))
+        return goes_on
 
     async def _play(self, node: CallMacro, frame: Frame) -> None:
         async def values(text: str, frame: Frame) -> tuple[Values, Mapping[str, str]]:
@@ -268,8 +273,11 @@ class Execution:
         with self._reporting(line, frame, afresh=True) as reported:
             if frame.values is not None:
                 reported.sent = fill(line.text, frame.values)
-            place = frame.place
+            place, outcome = frame.place, list[str]()
+            OUTCOME.set(outcome)
             await self.session.run(place.pinned(reported.sent) if place else reported.sent, frame.by)
+            for word in outcome:
+                frame.names[words.OUTCOME] = word
             if place is not None:
                 place.passed(reported.sent)
 

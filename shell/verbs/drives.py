@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import shlex
+from collections.abc import Sequence
 from typing import Any
 
 from multidrop.dialects import Diagnostic, Inexpressible, Procedure
@@ -11,6 +12,7 @@ from multidrop.dialects.families import FAMILIES, TABLE
 from multidrop.dialects.family import Registers
 from multidrop.dialects.text import whole
 from multidrop.drives.drive import Drive
+from multidrop.shell import motions
 from multidrop.shell.events import By
 from multidrop.shell.operations.conditions import simulated_cell
 from multidrop.shell.params import work
@@ -158,10 +160,15 @@ def _registered(call: Call) -> tuple[Drive, Registers[Any]]:
     return drive, registers
 
 
-async def _show(call: Call, drive: Drive, talk: Procedure[tuple[str, ...]], *, writes: bool = False) -> None:
-    if writes:
-        call.session.path.starting(drive)
+async def _show(call: Call, drive: Drive, talk: Procedure[tuple[str, ...]]) -> None:
     for line in await drive.run(talk):
+        call.session.output(line)
+
+
+async def _write(call: Call, drive: Drive, talk: Procedure[tuple[str, ...]], lines: Sequence[str] = ()) -> None:
+    """Run a conversation that writes; `lines` do the same, as far as words have its registers."""
+    call.session.path.starting(drive, program=False)
+    for line in await motions.perform(call.session, drive, lines, talk):
         call.session.output(line)
 
 
@@ -186,7 +193,7 @@ async def register(call: Call) -> None:
     values = [_number(call, text.strip()) for text in found[2].split(",")]
     for line in registers.lines(address, values):
         await call.session.path.guard(drive, line, call.by)
-    await _show(call, drive, registers.write(drive.state, address, values), writes=True)
+    await _write(call, drive, registers.write(drive.state, address, values), registers.lines(address, values))
 
 
 async def coil(call: Call) -> None:
@@ -198,7 +205,7 @@ async def coil(call: Call) -> None:
     if len(words) == 1:
         await _show(call, drive, registers.read_coil(drive.state, number))
     elif words[1] in ("0", "1"):
-        await _show(call, drive, registers.write_coil(drive.state, number, words[1] == "1"), writes=True)
+        await _write(call, drive, registers.write_coil(drive.state, number, words[1] == "1"))
     else:
         raise call.wrong()
 

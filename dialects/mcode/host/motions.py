@@ -19,7 +19,7 @@ from multidrop.dialects.errors import DriveError
 from multidrop.dialects.mcode.host import classify, exchange, operations
 from multidrop.dialects.mcode.host.before_request import before_request, value_of
 from multidrop.dialects.mcode.host.classify import INTEGER
-from multidrop.dialects.mcode.host.state import MCodeState, described, refuse_in_program, who
+from multidrop.dialects.mcode.host.state import MCodeState, described, earlier_error, refuse_in_program, who
 from multidrop.dialects.mcode.manual import errors
 from multidrop.dialects.mcode.manual.errors import ErrorNumber as E
 from multidrop.dialects.mcode.manual.grammar import Number, Statement, parsed
@@ -135,7 +135,7 @@ def motions(access: Access[S]) -> Motions[S]:
             return found
         code = yield from access.error(state)
         if code:
-            state.note(f"{who(state)}: an old error, now cleared: {described(code, state)}")
+            state.note(f"{who(state)}: {earlier_error(code, state)}")
         return found if code is None else {**found, "EF": 0}
 
     def judge(state: S, axis: str, evidence: Evidence) -> Procedure[Ending | None]:
@@ -158,12 +158,14 @@ def _judge(access: Access[S], state: S, evidence: Evidence) -> Procedure[Ending 
     codes = [code for code in evidence.errors if code in errors.BY_ITSELF]
     if found.get("EF") and not before.get("EF"):
         state.error_flag_read(True)
+        count = state.errors_read
         if program and (yield from access.handles_errors(state)):
             return ending
-        code = yield from access.error(state)
+        listed = state.errors_since(count)  # the list has reported it, and cleared it
+        code = listed[-1] if listed else (yield from access.error(state))
         if code is None:
             return replace(ending, outcome=Outcome.UNKNOWN, reason="an error is set, and its number could not be read")
-        codes += [code] if code else []
+        codes += [code] if code and (code in errors.BY_ITSELF or not evidence.stopped) else []
     if homing and codes and set(codes) <= LIMITS:
         turns = yield from access.values(state, ("LM",))
         if turns.get("LM") in TURNS_ROUND:
