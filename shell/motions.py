@@ -102,8 +102,8 @@ class _Line:
         try:
             result = await execute(check)
         except NOT_SENT as refusal:
-            for each in before:
-                each.drive.motions.restore(each.courses)
+            for was in before:
+                was.drive.motions.restore(was.courses)
             if not isinstance(refusal, MotionFailed):
                 await self._judge_after(before, f"; {refusal}")
             raise

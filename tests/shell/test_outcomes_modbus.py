@@ -10,8 +10,8 @@ import pytest
 
 from multidrop.dialects.errors import MotionFailed
 from multidrop.drives.events import Traffic
-from multidrop.shell.events import OnBus
 from multidrop.shell.configuration import Settings
+from multidrop.shell.events import OnBus
 from multidrop.shell.session import Session
 from multidrop.simulator.cells import read
 from multidrop.simulator.floor import Floor
