@@ -199,8 +199,6 @@ class Automations:
         """Write the stops onto every wire first, each wire by itself; once for each automation."""
         if automation.halts or automation.stops != self._workspace.stops:
             return  # a stop of everything came meanwhile
-        for drive in (each for bus in self._workspace.buses.values() for each in bus.all_drives):
-            drive.motions.close(automation)
         for link, only in _by_link(automation.started).items():
             with isolated(f"the stop of {link.name}"):
                 automation.halts.append(self._halt(link, only))
@@ -208,6 +206,8 @@ class Automations:
             with isolated(f"the stop of {halt.link.name}"):
                 if bus := self._open_bus(halt.link):
                     bus.halted(halt)
+        for drive in (each for bus in self._workspace.buses.values() for each in bus.all_drives):
+            drive.motions.close(automation)
 
     def _halt(self, link: Link, only: list[Drive]) -> Halt:
         bus = self._open_bus(link)

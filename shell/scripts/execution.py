@@ -270,16 +270,16 @@ class Execution:
 
     async def line(self, line: ScriptLine, frame: Frame) -> None:
         """Execute an ordinary line, with values filled in if there are any."""
+        outcome: list[str] = []
+        OUTCOME.set(outcome)
         with self._reporting(line, frame, afresh=True) as reported:
             if frame.values is not None:
                 reported.sent = fill(line.text, frame.values)
-            place, outcome = frame.place, list[str]()
-            OUTCOME.set(outcome)
+            place = frame.place
             await self.session.run(place.pinned(reported.sent) if place else reported.sent, frame.by)
-            for word in outcome:
-                frame.names[words.OUTCOME] = word
             if place is not None:
                 place.passed(reported.sent)
+            frame.names.update((words.OUTCOME, word) for word in outcome)
 
     async def _own(self, line: ScriptLine, frame: Frame, work: Work[T], counts: bool = False) -> T:
         """Execute a verb of scripts. One that only steers has a result only where it fails; any other one `counts`."""
