@@ -1,7 +1,7 @@
 """Motions that fail in the middle of a script: a limit switch closes, or something blocks the rotor.
 
-The last steps of the stories that end with `CREWS`, so no other story is changed by them. The line after the wait is the
-one that matters: it may go out only if the drive is at its target.
+The last steps of the stories that end with `CREWS`, so no other story is changed by them. The line after the wait is
+the one that matters: it may go out only if the drive is at its target.
 """
 
 from __future__ import annotations
@@ -71,6 +71,4 @@ def failing(world: World, rng: Random) -> float:
     return 25.0
 
 
-FAILING = Act(
-    "failing motion", 1, failing, where=lambda world: any(each.language in LEXIUM for each in world.places)
-)
+FAILING = Act("failing motion", 1, failing, where=lambda world: any(each.language in LEXIUM for each in world.places))
