@@ -39,6 +39,25 @@ class Timeout(DriveError, TimeoutError):
     """A wait ran out. What it waited for may still happen."""
 
 
+class MotionFailed(DriveError):
+    """A motion did not end as it should: at a limit, by a stall, by a stop of someone else, or nobody knows how.
+
+    `position` and `target` are in the drive's own units, None where they are not known. `outcome` is the word that
+    `/wait ended` gives (`limit`, `stall`, ...).
+    """
+
+    def __init__(
+        self,
+        message: str,
+        reason: str = "",
+        position: int | None = None,
+        target: int | None = None,
+        outcome: str = "unknown",
+    ) -> None:
+        super().__init__(message)
+        self.reason, self.position, self.target, self.outcome = reason, position, target, outcome
+
+
 class Unreferenced(DriveError):
     """A drive may have been restarted or moved while its line was lost, so nothing that moves it was sent."""
 
@@ -56,6 +75,17 @@ class Diagnostic(Exception):
         return f"{head}{self.message}{tail}"
 
 
-PUBLIC = (DriveError, Refused, NoAnswer, Stopped, Inexpressible, Differs, Timeout, Unreferenced, Diagnostic)
+PUBLIC = (
+    DriveError,
+    Refused,
+    NoAnswer,
+    Stopped,
+    Inexpressible,
+    Differs,
+    Timeout,
+    MotionFailed,
+    Unreferenced,
+    Diagnostic,
+)
 for _each in PUBLIC:
     _each.__module__ = "multidrop"  # a traceback shows the name by which a program catches it

@@ -20,6 +20,7 @@ from multidrop.dialects.state import DriveState, Owed, Remembered
 if TYPE_CHECKING:
     from multidrop.dialects.certifying import Certifying
     from multidrop.dialects.debugging import Debugging
+    from multidrop.dialects.motions import Motions
     from multidrop.dialects.program_files import Difference, Held
     from multidrop.dialects.scanning import Scan
     from multidrop.dialects.units import Units
@@ -280,6 +281,8 @@ class Family(Generic[S]):
     """The place of its `Scan`."""
     certifying_at: str = ""
     """The place of its `Certifying`."""
+    motions_at: str = "multidrop.dialects.motions:NO_MOTIONS"
+    """The place of its `Motions`. By default nothing is known of a motion but that it has ended."""
     registers: Registers[S] | None = None
     baud: int = 9600
     """The default baud of a serial line."""
@@ -321,6 +324,12 @@ class Family(Generic[S]):
     @property
     def units(self) -> Units[S]:
         found: Units[S] = imported(self.units_at)
+        return found
+
+    @property
+    def motions(self) -> Motions[S]:
+        """How its motions begin and end."""
+        found: Motions[S] = imported(self.motions_at)
         return found
 
     @property

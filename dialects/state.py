@@ -12,6 +12,8 @@ from dataclasses import dataclass, field
 
 from multidrop.dialects.codec import Codec
 
+KEPT_ERRORS = 8
+
 
 @dataclass(frozen=True)
 class Owed:
@@ -73,6 +75,12 @@ class DriveState:
     """The number of the last error that was read of it, which cleared it; 0: none was read."""
     last_error_at: float = -math.inf
     """When that was, s; infinite until the conversation that has read it goes on."""
+    errors: tuple[int, ...] = ()
+    """The numbers of the last errors that were read of it, newest last."""
+    errors_read: int = 0
+    """How many were read in all."""
+    moved: bool = False
+    """A motion was begun whose end was not judged yet: an error may be of that motion."""
     reply_pending: bool = False
     """A reply is outstanding and may arrive late; the next reply must be distinguished from it."""
     settings_unknown: bool = False
@@ -163,6 +171,18 @@ class DriveState:
         self.error = flag
         if code:
             self.last_error, self.last_error_at = code, math.inf
+            self.errors, self.errors_read = (*self.errors[1 - KEPT_ERRORS :], code), self.errors_read + 1
+
+    def errors_since(self, count: int) -> tuple[int, ...]:
+        """The numbers of errors that were read since `errors_read` was `count`, as far as they are kept."""
+        new = self.errors_read - count
+        return self.errors[-new:] if new else ()
+
+    def motion_begun(self) -> None:
+        self.moved = True
+
+    def motion_judged(self) -> None:
+        self.moved = False
 
     def date_error(self, now: float) -> None:
         """Give an error that was just read its time: a conversation has no clock."""

@@ -7,7 +7,16 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Protocol, TypeVar
 
 from multidrop.dialects.codec import Codec, Priority, Procedure
-from multidrop.dialects.errors import Differs, DriveError, Inexpressible, NoAnswer, Refused, Stopped, Unreferenced
+from multidrop.dialects.errors import (
+    Differs,
+    DriveError,
+    Inexpressible,
+    MotionFailed,
+    NoAnswer,
+    Refused,
+    Stopped,
+    Unreferenced,
+)
 from multidrop.dialects.families import FAMILIES, program_languages
 from multidrop.dialects.family import Family, Motion, Programs
 from multidrop.dialects.files import SourceLine
@@ -17,6 +26,7 @@ from multidrop.dialects.values import Value
 from multidrop.drives.conversations import ASKING, Conversation, Conversations, OnOver, awaited, refuse_stranger
 from multidrop.drives.events import Changed, Outcome, Transaction
 from multidrop.drives.link import Link
+from multidrop.drives.motion_record import MotionRecord
 from multidrop.drives.port_journal import GLOBAL
 from multidrop.drives.protected_units import Values, protection, silent
 from multidrop.drives.readings import REST as REST
@@ -25,6 +35,8 @@ from multidrop.drives.readings import Running as Running
 from multidrop.transports import TransportLost
 
 T = TypeVar("T")
+NOT_SENT = (Refused, Inexpressible, Differs, MotionFailed)
+"""Failures after which a line was not executed."""
 
 
 class Neighbours(Protocol):
@@ -88,6 +100,7 @@ class Drive:
         """What had been sent, and the stops, as the last homing of each axis had begun."""
         self.homed: dict[str, bool] = {}
         """The axes whose last homing was seen to end, and whether it ended well."""
+        self.motions = MotionRecord()
         self.hold = ""
         """The reason for which nothing may start it while its position is not referenced; empty: there is none."""
         self.strict = False
@@ -181,7 +194,7 @@ class Drive:
         self.starting += 1
         try:
             return await self._send(text, check)
-        except (Refused, Inexpressible, Differs):
+        except NOT_SENT:
             if self.commanded_at == noted:
                 self.commanded_at = before[self]
             raise
@@ -221,7 +234,7 @@ class Drive:
             if self.state.address:
                 raise
             raise silent(error, self.link, self.family, self.product) from None
-        except (Refused, Inexpressible, Differs) as error:
+        except NOT_SENT as error:
             refused = True
             if isinstance(error, Refused):
                 raise self._values.refused(known, text, error, self.product) from None
@@ -358,7 +371,7 @@ class Drive:
                 axes, at = outcome.result[0], outcome.first.sent_at
                 self.seen = self._judged.reading(at, outcome.last.transmitted_at, axes, family.rests_in_place)
                 if axes[0].program is not None:
-                    self.running = Running(at, axes[0].program)
+                    self._program_read(at, axes[0].program)
                 self.calm = not (self.state.running or (self.running is not None and self.running.runs))
                 at_rest = self.seen.velocity == 0
                 self.resting = (at, self.commands, {axis.axis: axis.position for axis in axes} if at_rest else {})
@@ -380,8 +393,13 @@ class Drive:
     async def busy(self) -> bool:
         at = self.link.now()
         runs = await self.run(self.family.busy(self.state))
-        self.running = Running(at, runs)
+        self._program_read(at, runs)
         return runs
+
+    def _program_read(self, at: float, runs: bool) -> None:
+        self.running = Running(at, runs)
+        if runs:
+            self.motions.runs()
 
     async def run(self, procedure: Procedure[T], typed: bool = False) -> T:
         return await awaited(lambda over: self.start(procedure, over, typed))

@@ -44,6 +44,7 @@ if TYPE_CHECKING:
     from multidrop.dialects.errors import Differs as Differs
     from multidrop.dialects.errors import DriveError as DriveError
     from multidrop.dialects.errors import Inexpressible as Inexpressible
+    from multidrop.dialects.errors import MotionFailed as MotionFailed
     from multidrop.dialects.errors import NoAnswer as NoAnswer
     from multidrop.dialects.errors import Refused as Refused
     from multidrop.dialects.errors import Stopped as Stopped
@@ -64,7 +65,7 @@ _PLACES = {
     "multidrop.api.simulated": "SimulatedCell simulate",
     "multidrop.api.telemetry": "AsyncTelemetry Sample Samples read_rrd",
     "multidrop.dialects.errors": (
-        "Diagnostic Differs DriveError Inexpressible NoAnswer Refused Stopped Timeout Unreferenced"
+        "Diagnostic Differs DriveError Inexpressible MotionFailed NoAnswer Refused Stopped Timeout Unreferenced"
     ),
     "multidrop.transports": "TransportLost Unreachable",
 }

@@ -271,6 +271,8 @@ class Automations:
         for drive, sent in due.items():
             if sent.why:
                 self._workspace.notify(f"{self._workspace.display_name(drive)}: {sent.why}", warning=True)
+        for drive in (each for bus in self._workspace.buses.values() for each in bus.all_drives):
+            drive.motions.close(automation)
 
     def _halt(self, link: Link, only: dict[Drive, Sent]) -> Halt:
         started = {drive: sent.what for drive, sent in only.items()}
@@ -315,6 +317,16 @@ def only_ends(drive: Drive, text: str) -> bool:
     """True if a line that counts as a start can only end motion, as a velocity of 0."""
     guards = drive.family.guards
     return guards is not None and guards.only_ends(text)
+
+
+def sequence(workspace: Workspace) -> object:
+    """Who sends the lines of this task: an automation, else the person at the session."""
+    return _current.get() or workspace
+
+
+def is_automation() -> bool:
+    """True if an automation sends the lines of this task."""
+    return _current.get() is not None
 
 
 async def settled(workspace: Workspace) -> None:

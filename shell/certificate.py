@@ -254,7 +254,7 @@ class Asking:
         """Send one line once, as a typed line is sent; return its answer as a text."""
         drive, session, table = self._drive, self._session, self._table
         if line == WAIT:
-            await wait(session, LONGEST_MOVE, idle=False, drives=[drive])
+            await wait(session, LONGEST_MOVE, idle=False, drives=[drive], ended=True)  # some of its moves are to fail
             return DONE
         if line.startswith(SLEEP):
             await asyncio.sleep(float(line.removeprefix(SLEEP)))

@@ -26,6 +26,7 @@ class _Before:
 
     sent: Sent | None
     requests: int
+    commands: int
     commanded_at: float
     active: bool
 
@@ -68,7 +69,12 @@ async def sending(
 
 def _before(automation: Automation | None, drive: Drive) -> _Before:
     sent = automation.started.get(drive) if automation is not None else None
-    return _Before(sent, drive.requests, drive.commanded_at, bool(at_rest.known_active(drive)))
+    return _Before(sent, drive.requests, _commands(drive), drive.commanded_at, bool(at_rest.known_active(drive)))
+
+
+def _commands(drive: Drive) -> int:
+    """The number of requests that may do more than ask; one to all drives has no reply, so each of those counts."""
+    return drive.requests if drive.address in GLOBAL else drive.commands
 
 
 def _has_routine(drive: Drive) -> bool:
@@ -79,7 +85,7 @@ def _started_nothing(drive: Drive, before: _Before, failure: BaseException, part
     """Whether a line that failed has started nothing by itself in a drive."""
     if isinstance(failure, TransportLost) and (failure.unproven or failure.executed):
         return False
-    if drive.requests == before.requests:
+    if _commands(drive) == before.commands:  # at most the questions before the line were sent
         return True
     if parts or (isinstance(failure, Refused) and not failure.certain):
         return False

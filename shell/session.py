@@ -20,6 +20,7 @@ from multidrop.dialects import Diagnostic, DriveError, Refused, Stopped
 from multidrop.dialects.on_demand import imported
 from multidrop.drives.bus import Bus
 from multidrop.drives.drive import Drive
+from multidrop.shell import motions
 from multidrop.shell.automation import AGREED, ENDING, Automations, only_ends
 from multidrop.shell.configuration import Settings
 from multidrop.shell.connect.opening import Opener, open_buses
@@ -307,7 +308,7 @@ class LinePath:
         try:
             ends = only_ends(drive, text)
             async with sending(session.automations, drive, text, starts=starts, only_ends=ends):
-                printed = await drive.send(text, check)
+                printed = await motions.send(session, drive, text, check)
         except FAILURES as failure:
             if recorded is not None:
                 recorded.came_back([f"failed: {failure}"])
@@ -398,6 +399,8 @@ class LinePath:
             return
         drive.check_start(text)
         self._session.addressed.add((drive.link.name, drive.address))
+        if not text:  # a program may be among it
+            drive.motions.runs()
         before = drive.commanded_at
         async with sending(self._session.automations, drive, text, starts=True, parts=parts):
             drive.starts_now()

@@ -13,11 +13,12 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
-from multidrop.dialects import Diagnostic, DriveError, Motion
+from multidrop.dialects import Diagnostic, DriveError, Motion, NoAnswer
 from multidrop.dialects.errors import Timeout
 from multidrop.drives.bus import Bus
 from multidrop.drives.drive import REST, Check, Drive, Running, confirmed_motion
 from multidrop.shell.line_syntax import EVERYONE
+from multidrop.shell.motions import Watch, check_own
 from multidrop.shell.stop_report import UNCONFIRMED, last_seen
 from multidrop.shell.workspace import Workspace
 from multidrop.transports import TransportLost
@@ -88,41 +89,77 @@ async def sleep(duration: float) -> None:
 
 
 async def wait(
-    workspace: Workspace, limit: float, *, idle: bool, drives: Sequence[Drive] | None = None, said: str = ""
-) -> None:
-    """Wait until every drive is at rest in two readings; with `idle`, also until no program runs.
+    workspace: Workspace,
+    limit: float,
+    *,
+    idle: bool,
+    drives: Sequence[Drive] | None = None,
+    said: str = "",
+    ended: bool = False,
+) -> Watch:
+    """Wait until every drive is at rest in two readings, its motion over; with `idle`, also until no program runs.
 
     `drives` None: those that this session sent a line to, else the selected one. `said`: what a person called this.
-    Raises Timeout after `limit` seconds, DriveError for a drive in program mode (it would store the question).
+    Raises MotionFailed for a motion that did not end as it should, unless `ended` accepts every ending; Timeout after
+    `limit` seconds, DriveError for a drive in program mode (it would store the question).
     """
     deadline = workspace.now() + limit
-    if drives is None:
-        addressed = [(workspace.buses[bus].drives, address) for bus, address in sorted(workspace.addressed)]
-        each_of = [(known, known if address in EVERYONE else [address]) for known, address in addressed]
-        found = [known[address] for known, addresses in each_of for address in addresses if address in known]
-        drives = list(dict.fromkeys(found)) or [workspace.drive()]
-    while moving := await _moving(workspace, drives, idle):
+    watch = Watch(workspace, _addressed(workspace) if drives is None else drives, ended)
+    for drive in watch.drives:
+        _check_asked(workspace, drive)
+    await watch.begin()
+    while moving := await _moving(workspace, watch, idle):
         if workspace.now() >= deadline:
-            verb = said or ("/wait idle" if idle else "/wait stopped")
+            verb = said or f"/wait {'ended' if ended else 'idle' if idle else 'stopped'}"
             raise Timeout(f"{verb}: {workspace.display_name(moving)} still runs after {limit:g} s")
         await sleep(APART)
+    return watch
 
 
-async def _moving(workspace: Workspace, drives: Sequence[Drive], idle: bool) -> Drive | None:
-    """The first drive that is not at rest, in one place, in both of two readings."""
+def _addressed(workspace: Workspace) -> list[Drive]:
+    """The drives that this session sent a line to, else the selected one."""
+    addressed = [(workspace.buses[bus].drives, address) for bus, address in sorted(workspace.addressed)]
+    each_of = [(known, known if address in EVERYONE else [address]) for known, address in addressed]
+    found = [known[address] for known, addresses in each_of for address in addresses if address in known]
+    return list(dict.fromkeys(found)) or [workspace.drive()]
+
+
+async def _moving(workspace: Workspace, watch: Watch, idle: bool) -> Drive | None:
+    """The first drive that is not at rest, in one place, in both of two readings, or whose motion is not over.
+
+    The others are read on only as long as a motion of this sequence may have failed there meanwhile.
+    """
     before: dict[Drive, tuple[int, ...]] = {}
+    moving: Drive | None = None
     for reading in range(2):
         if reading:
             await sleep(APART)
-        for drive in drives:
-            if drive.programming:
-                raise DriveError(
-                    f"{workspace.display_name(drive)} is in program mode and would store the question; PG ends it"
-                )
-            place = await drive.rest()
-            if place is None or before.setdefault(drive, place) != place or (idle and await drive.busy()):
-                return drive
-    return None
+        for drive in watch.left:
+            if (moving is not None and not watch.own(drive)) or (reading and drive not in before):
+                continue
+            _check_asked(workspace, drive)
+            try:
+                place = await drive.rest()
+                rests = place is not None and before.setdefault(drive, place) == place
+                rests = rests and not (idle and await drive.busy())
+            except NoAnswer as error:
+                watch.silent(drive, error)
+                rests = False
+            else:
+                moving = moving if rests else moving or drive
+            if not rests:
+                before.pop(drive, None)
+    for drive in before:
+        if not await watch.judge(drive):
+            moving = moving or drive
+    return moving
+
+
+def _check_asked(workspace: Workspace, drive: Drive) -> None:
+    """Raise DriveError where the drive would store a question."""
+    if drive.programming:
+        name = workspace.display_name(drive)
+        raise DriveError(f"{name} is in program mode and would store the question; PG ends it")
 
 
 async def wait_value(
@@ -130,7 +167,7 @@ async def wait_value(
 ) -> None:
     """Wait until a drive reports a value. Raises Timeout after `limit` seconds, Diagnostic for no such value.
 
-    `units`: where it is a quantity.
+    It ends early with MotionFailed once a motion of this automation has failed. `units`: where it is a quantity.
     """
     line, name, check = question(workspace, drive, wanted), workspace.display_name(drive), None
     if units is not None:
@@ -140,6 +177,7 @@ async def wait_value(
     while not wanted.holds(seen := await _value(workspace, drive, line, check)):
         if workspace.now() >= deadline:
             raise Timeout(f"{said} {wanted.text}: {name} still reports {seen} after {limit:g} s")
+        await check_own(workspace)
         await sleep(APART)
 
 
@@ -157,8 +195,7 @@ def question(workspace: Workspace, drive: Drive, wanted: Condition) -> str:
 async def _value(workspace: Workspace, drive: Drive, line: str, check: Check | None) -> int:
     """Ask a drive for a value."""
     name = workspace.display_name(drive)
-    if drive.programming:
-        raise DriveError(f"{name} is in program mode and would store the question; PG ends it")
+    _check_asked(workspace, drive)
     printed = await drive.send(line, check)
     if len(printed) != 1 or not re.fullmatch(r"\s*[+-]?\d{1,15}\s*", printed[0], re.ASCII):
         raise DriveError(f"{name}: {line} printed {', '.join(printed) or 'nothing'}; a wait needs a whole number")

@@ -325,6 +325,8 @@ class Workspace(Channel):
         for halt in halts:
             with isolated(f"the stop of {halt.link.name}"):
                 self.buses[halt.link.name].halted(halt)
+        for drive in (each for bus in self.buses.values() for each in bus.all_drives):
+            drive.motions.stopped(None)
         with isolated("the notice of a stop"):
             unreached = stop_report.unreached(halts, self.now())
             opening = _still_opening(self.opening, self.stops)

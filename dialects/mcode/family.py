@@ -52,5 +52,6 @@ MCODE = Family(
     certifying_at="multidrop.dialects.mcode.host.programs:CERTIFYING",
     values_at="multidrop.dialects.mcode.host.values:VALUES",
     units_at="multidrop.dialects.mcode.host.units:UNITS",
+    motions_at="multidrop.dialects.mcode.host.motions:MOTIONS",
     stop_bytes=STOP_BYTES,
 )

@@ -70,6 +70,7 @@ MODBUS = Family(
     protection=guards.CYBER_SECURITY,
     prepare=pdu_codec,
     certifying_at="multidrop.dialects.modbus.host.operations:CERTIFYING",
+    motions_at="multidrop.dialects.modbus.host.motions:MOTIONS",
     values_at="multidrop.dialects.modbus.host.values:VALUES",
     units_at="multidrop.dialects.modbus.host.values:UNITS",
 )

@@ -237,7 +237,8 @@ class AsyncDrive(DriveFacts):
     async def wait(self, timeout: float = waits.LIMIT, *, idle: bool = False) -> None:
         """Wait until two readings show it at rest; with `idle` also until no program runs.
 
-        Raises Timeout after `timeout` seconds, DriveError where a homing has ended with an error.
+        Raises MotionFailed where its last motion of this session did not end as it should, Timeout after `timeout`
+        seconds, DriveError where a homing has ended with an error.
         """
         drive, shell = self._drive, self._calls.shell
         await self._calls.run(lambda: waits.wait(shell, timeout, idle=idle, drives=[drive], said="wait"))
@@ -249,7 +250,10 @@ class AsyncDrive(DriveFacts):
             await self.motion()
 
     async def wait_for(self, condition: str, timeout: float = waits.LIMIT) -> None:
-        """Wait until the drive reports a value: `I1=1`, `P>=51200`, `P > {10 mm}`. Raises Timeout, Diagnostic."""
+        """Wait until the drive reports a value: `I1=1`, `P>=51200`, `P > {10 mm}`.
+
+        Raises MotionFailed once a motion of this session has failed, Timeout, Diagnostic.
+        """
         wanted, shell = waits.condition(condition), self._calls.shell
         if wanted is None or wanted.target:
             raise Diagnostic(f"no condition {condition!r}", self.name, "valid: as in wait_for('I1=1')")
@@ -408,6 +412,7 @@ class AsyncDrive(DriveFacts):
         """Stop this drive now; await what is returned for the report. It refuses nothing afterwards."""
         shell = self._calls.shell
         halt = shell.bus(self._drive.link.name).stop([self._drive])
+        self._drive.motions.stopped(None)
         several = len(shell.buses) > 1
         return Stopping(shell, lambda: stop_report.of_halts([halt], shell.wall(halt.at), several))
 

@@ -21,6 +21,7 @@ from multidrop.dialects.files import check_program_text, program_text_of
 from multidrop.dialects.program_files import LOCKED, Difference, Held, errors, refuse
 from multidrop.dialects.text import counted
 from multidrop.drives.drive import Drive, still
+from multidrop.shell import motions
 from multidrop.shell.channel import running, transferring
 from multidrop.shell.events import By, Printed
 from multidrop.shell.program_listing import Sight, check_one, read
@@ -299,7 +300,7 @@ class _Download:
     async def start(self, line: str) -> None:
         drive, workspace = self._drive, self._session
         async with workspace.path.starting(drive, line):
-            printed = await drive.send(line)
+            printed = await motions.send(workspace, drive, line)
         for text in printed:
             workspace.publish(Printed(workspace.now(), drive.link.name, drive.address, text))
         self._say(f"started ({line})")

@@ -17,6 +17,7 @@ from multidrop.dialects.text import counted
 from multidrop.macros import checked_values, fill
 from multidrop.shell import waits
 from multidrop.shell.events import FAILURES, By, Failed
+from multidrop.shell.motions import OUTCOME, check_own
 from multidrop.shell.playing import Playing, StepProgress, cast
 from multidrop.shell.scripts import words
 from multidrop.shell.scripts.captured_prints import Hearing
@@ -236,7 +237,11 @@ class Execution:
             await self.block(node.body, frame)
 
     async def _goes_on(self, line: ScriptLine, frame: Frame) -> bool:
-        return await self._own(line, frame, self._condition) == (line.word == "/while")
+        """Whether a loop has another round; one that waits for a motion which has failed ends with that failure."""
+        goes_on = await self._own(line, frame, self._condition) == (line.word == "/while")
+        if goes_on and not self.is_over:
+            await self._own(line, frame, lambda text, frame: check_own(self.session))
+        return goes_on
 
     async def _play(self, node: CallMacro, frame: Frame) -> None:
         async def values(text: str, frame: Frame) -> tuple[Values, Mapping[str, str]]:
@@ -265,6 +270,8 @@ class Execution:
 
     async def line(self, line: ScriptLine, frame: Frame) -> None:
         """Execute an ordinary line, with values filled in if there are any."""
+        outcome: list[str] = []
+        OUTCOME.set(outcome)
         with self._reporting(line, frame, afresh=True) as reported:
             if frame.values is not None:
                 reported.sent = fill(line.text, frame.values)
@@ -272,6 +279,7 @@ class Execution:
             await self.session.run(place.pinned(reported.sent) if place else reported.sent, frame.by)
             if place is not None:
                 place.passed(reported.sent)
+            frame.names.update((words.OUTCOME, word) for word in outcome)
 
     async def _own(self, line: ScriptLine, frame: Frame, work: Work[T], counts: bool = False) -> T:
         """Execute a verb of scripts. One that only steers has a result only where it fails; any other one `counts`."""

@@ -199,6 +199,7 @@ class _Checker:
         self._takes_any = any(line.word == "/raw" or re.search(r"\bPG\b", line.text, re.I) for line in lines)
         """Program mode or raw mode may take a word as it is."""
         changing = {name for line in lines if line.word == "/set" for name in line.text.split()[1:2]}
+        changing |= {words.OUTCOME for line in lines if words.sets_outcome(line.text)}
         self._names: dict[str, str | None] = {n: None if n in changing else v for n, v in values.items()}
 
     def script(self) -> list[Node]:
@@ -274,6 +275,9 @@ class _Checker:
         if word == "/set":
             name, _ = words.setting(text, self._names)
             self._names[name] = None
+        elif words.sets_outcome(text):
+            find(word).check(words.rest_of(text))
+            self._names[words.OUTCOME] = None
         elif word in ("/assert", "/verify"):
             words.check(text, self._names)
         elif word == "/expect":

@@ -21,6 +21,8 @@ from multidrop.shell.scripts.expression import Comparison, Expression, Name, Val
 
 T = TypeVar("T", bound=Expression)
 NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*", re.ASCII)
+OUTCOME = "outcome"
+"""The name that a `/wait ended` sets."""
 MOST = 10**9
 """The largest number of repetitions."""
 SECONDS = 1.0
@@ -177,6 +179,11 @@ def _parsed(text: str, rest: str, names: Collection[str], parsing: Callable[[str
 
 
 @cache
+def sets_outcome(text: str) -> bool:
+    """True for a `/wait ended`."""
+    return text.split()[:2] == ["/wait", "ended"]
+
+
 def _is_word(name: str) -> bool:
     """True if a name in capitals is a word of a family; then it is not clear what is meant."""
     return name == name.upper() and any(family.language.knows(name) for family in FAMILIES.values())

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import contextlib
 import re
 import shlex
+from collections.abc import Sequence
 from typing import Any
 
 from multidrop.dialects import Diagnostic, Inexpressible, Procedure
@@ -12,6 +12,7 @@ from multidrop.dialects.families import FAMILIES, TABLE
 from multidrop.dialects.family import Registers
 from multidrop.dialects.text import whole
 from multidrop.drives.drive import Drive
+from multidrop.shell import motions
 from multidrop.shell.events import By
 from multidrop.shell.operations.conditions import simulated_cell
 from multidrop.shell.params import work
@@ -159,13 +160,21 @@ def _registered(call: Call) -> tuple[Drive, Registers[Any]]:
     return drive, registers
 
 
-async def _show(call: Call, drive: Drive, talk: Procedure[tuple[str, ...]], writes: str | None = None) -> None:
-    """Show what a conversation prints. `writes`: the line that does the same; empty: it may do anything."""
+async def _show(call: Call, drive: Drive, talk: Procedure[tuple[str, ...]]) -> None:
+    for line in await drive.run(talk, typed=True):
+        call.session.output(line)
+
+
+async def _write(
+    call: Call, drive: Drive, talk: Procedure[tuple[str, ...]], writes: str, lines: Sequence[str] = ()
+) -> None:
+    """Run a conversation that writes. `writes`: the line that does the same as far as it starts something; empty: it
+    may do anything. `lines` do the same, as far as words have its registers.
+    """
     session = call.session
-    if writes is not None:
-        await session.path.agreed_to_write(drive, f"{call.verb.name} {call.rest.strip()}", call.by)
-    async with session.path.starting(drive, writes) if writes is not None else contextlib.nullcontext():
-        printed = await drive.run(talk, typed=True)
+    await session.path.agreed_to_write(drive, f"{call.verb.name} {call.rest.strip()}", call.by)
+    async with session.path.starting(drive, writes):
+        printed = await motions.perform(session, drive, lines, talk)
     for line in printed:
         session.output(line)
 
@@ -194,7 +203,7 @@ async def register(call: Call) -> None:
         await call.session.path.guard(drive, line, call.by)
     known = len(lines) == len(values) and len([line for line in lines if drive.starts(line)]) < 2
     writes = next(filter(drive.starts, lines), lines[0]) if known else ""
-    await _show(call, drive, registers.write(drive.state, address, values), writes)
+    await _write(call, drive, registers.write(drive.state, address, values), writes, lines)
 
 
 async def coil(call: Call) -> None:
@@ -207,9 +216,8 @@ async def coil(call: Call) -> None:
         await _show(call, drive, registers.read_coil(drive.state, number))
     elif words[1] in ("0", "1"):
         line = f"O{number}={words[1]}"
-        await _show(
-            call, drive, registers.write_coil(drive.state, number, words[1] == "1"), "" if drive.starts(line) else line
-        )
+        writes = "" if drive.starts(line) else line
+        await _write(call, drive, registers.write_coil(drive.state, number, words[1] == "1"), writes)
     else:
         raise call.wrong()
 

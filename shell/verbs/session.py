@@ -10,10 +10,12 @@ from typing import NamedTuple
 from multidrop.dialects import Diagnostic, Stopped
 from multidrop.dialects.families import DEFAULT, FAMILIES, languages
 from multidrop.dialects.family import Language
+from multidrop.dialects.motions import Outcome
 from multidrop.shell import configuration, stop_report, waits
 from multidrop.shell.events import By
 from multidrop.shell.log import files
 from multidrop.shell.log.writer import SessionLog
+from multidrop.shell.motions import OUTCOME
 from multidrop.shell.new_file import STANDARD_OUTPUT
 from multidrop.shell.operations.conditions import ON_SCREEN
 from multidrop.shell.operations.operation import Operation
@@ -86,6 +88,8 @@ class Wait(NamedTuple):
     text: str = ""
     value: waits.Condition | None = None
     idle: bool = False
+    ended: bool = False
+    """However their motions ended."""
 
 
 def duration(verb: Operation, rest: str) -> float:
@@ -103,10 +107,10 @@ def wanted_wait(verb: Operation, rest: str) -> Wait:
             raise verb.wrong(f"no condition {match['condition']}; valid: I1=1, @b P>=51200")
         return Wait(_limit(verb, match["seconds"]), value=wanted)
     match split(rest, verb.name):
-        case [("stopped" | "idle") as state]:
-            return Wait(waits.LIMIT, idle=state == "idle")
-        case [("stopped" | "idle") as state, seconds]:
-            return Wait(_limit(verb, seconds), idle=state == "idle")
+        case [("stopped" | "idle" | "ended") as state]:
+            return Wait(waits.LIMIT, idle=state == "idle", ended=state == "ended")
+        case [("stopped" | "idle" | "ended") as state, seconds]:
+            return Wait(_limit(verb, seconds), idle=state == "idle", ended=state == "ended")
     raise verb.wrong()
 
 
@@ -135,7 +139,14 @@ async def wait(call: Call) -> None:
         drive, units = call.drive(wanted.value.target), call.session.units if wanted.value.quantity else None
         await waits.wait_value(call.session, drive, wanted.value, wanted.limit, units)
     else:
-        await waits.wait(call.session, wanted.limit, idle=wanted.idle)
+        watch = await waits.wait(call.session, wanted.limit, idle=wanted.idle, ended=wanted.ended)
+        if wanted.ended:
+            ending = watch.worst
+            outcome = Outcome.REACHED if ending is None else ending[1].outcome
+            if (asked := OUTCOME.get()) is not None:
+                asked[:] = [outcome.value]
+            told = "" if ending is None else f" ({ending[1].described(call.session.display_name(ending[0]))})"
+            call.session.notify(f"outcome: {outcome.value}{told}", outcome=True)
 
 
 async def page(call: Call) -> None:

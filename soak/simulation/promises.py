@@ -27,6 +27,26 @@ def _spared(world: World) -> Iterator[str]:
     yield from world.history.told.unspared
 
 
+NEAR = 2
+"""How far from its target a drive may rest, in its own units."""
+SHORT = re.compile(r"stopped at -?\d+ of \d+")
+
+
+def _outcome(world: World) -> Iterator[str | Granted]:
+    """The line after a wait is executed at the target only, and what is at its target was not said to have failed."""
+    for each in world.history.told.awaited:
+        line, drive, text = each.after
+        done = any((one.line, one.drive, one.text) == each.after for one in world.history.executed)
+        there = abs(each.position - each.goal) <= NEAR
+        words = f"{line}:{drive} at {each.position} of {each.goal}: {text!r} was {'' if done else 'not '}executed"
+        words += f" ({each.run.failure or 'done'})"
+        wrong = (done and not there) or (not done and there and SHORT.search(each.run.failure))
+        cut = any(each.run.began <= at <= each.run.ended for at in world.cut.get((line, drive), ()))
+        if wrong and not cut:
+            noisy = became(world, line, each.run.ended, each.run.began)
+            yield Granted(BARE_COMMAND, words) if noisy else words
+
+
 def _asked(world: World) -> Iterator[str | Granted]:
     told = world.history.told
     for guarded in told.guarded:
@@ -121,6 +141,13 @@ PROMISES = (
         "No macro and no script that begins between a stop and `/resume` sends anything.",
         "What a stop promises",
         _latched,
+    ),
+    Rule(
+        "outcome",
+        "A motion that failed is not reported as a success.",
+        "How a motion ended",
+        _outcome,
+        (BARE_COMMAND,),
     ),
     Rule(
         "automation",

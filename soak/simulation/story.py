@@ -15,7 +15,9 @@ from multidrop.dialects import Diagnostic
 from soak.simulation import acts_connections
 from soak.simulation.act import Act
 from soak.simulation.acts.automation import AUTOMATION
-from soak.simulation.acts.crews import AFTER_CREWS, CREWS
+from soak.simulation.acts.crews import AFTER_CREWS as LAST_CREWS
+from soak.simulation.acts.crews import CREWS
+from soak.simulation.acts.failing import FAILING
 from soak.simulation.acts.files import FILES
 from soak.simulation.acts.hand import HAND
 from soak.simulation.acts.meetings import MEETINGS
@@ -146,6 +148,8 @@ ACTS = (
 )
 
 
+AFTER_CREWS = (*LAST_CREWS, FAILING, FAILING)
+"""The last of all, each once in its place."""
 MEETING = 0.3
 """How many seeds have the acts of `MEETINGS`, and how many of their steps: the other stories are without them."""
 AT_WORK = 0.2, 0.1

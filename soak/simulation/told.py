@@ -50,6 +50,16 @@ class Run:
 
 
 @dataclass
+class Awaited:
+    """A script that moved a drive, waited, and then sent `after`. `position`: the drive's own, as the script ended."""
+
+    run: Run
+    after: Line
+    goal: int
+    position: int = 0
+
+
+@dataclass
 class Guarded:
     """Lines that are sent after a yes only. `asks` False: nobody is asked."""
 
@@ -88,6 +98,8 @@ class Told:
     """When an input started a program that prints, on which line and in which drive: that clears the error flag."""
     latches: list[tuple[float, bool]] = field(default_factory=list)
     """When the thread of a stop had done its work, and when `/resume` or the next session let automation run again."""
+    awaited: list[Awaited] = field(default_factory=list)
+    """What scripts waited for whose motions may have failed."""
     halts: list[float] = field(default_factory=list)
     """When everything was stopped."""
     stored: list[Put] = field(default_factory=list)

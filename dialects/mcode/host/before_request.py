@@ -17,7 +17,7 @@ from multidrop.dialects.mcode.host.codec import MCode
 from multidrop.dialects.mcode.host.exchange import printed_value, question, read_error, refused, synchronise, value
 from multidrop.dialects.mcode.host.framing import NAK
 from multidrop.dialects.mcode.host.identity import activate_party, asked, find, find_in_text, look_in, pinged
-from multidrop.dialects.mcode.host.state import MCodeState, Place, described, who
+from multidrop.dialects.mcode.host.state import MCodeState, Place, earlier_error, who
 
 
 def before_request(state: MCodeState, request: Request) -> Procedure[Request]:
@@ -107,7 +107,7 @@ def _old_error(state: MCodeState, request: Request) -> Procedure[None]:
     if code is None:
         raise NoAnswer(f"{who(state)}: an error may be set and could not be read; '{request.text}' was not sent")
     if code:
-        state.note(f"{who(state)}: an old error, now cleared: {described(code, state)}")
+        state.note(f"{who(state)}: {earlier_error(code, state)}")
 
 
 def find_again(state: MCodeState, request: Request) -> Procedure[None]:

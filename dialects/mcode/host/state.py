@@ -174,6 +174,13 @@ def report_error(state: DriveState, code: int) -> None:
     state.remark(described(code, state) + (", now cleared" if code else ""))
 
 
+def earlier_error(code: int, state: DriveState) -> str:
+    """Say what an error was that was read before a line, which is not to blame for it."""
+    if state.moved and code in errors.BY_ITSELF:
+        return f"an error since the last motion began, now cleared: {described(code, state)}"
+    return f"an old error, now cleared: {described(code, state)}"
+
+
 def described(code: int, state: DriveState) -> str:
     advice = errors.hint(code, state.product)
     return f"error {code}: {errors.text(code, state.product)}" + (f" ({advice})" if advice else "")

@@ -14,8 +14,9 @@ from multidrop.dialects.codec import End, Kind, Priority, Procedure, Reply, Requ
 from multidrop.dialects.errors import Inexpressible, NoAnswer, Refused
 from multidrop.dialects.exchange import unanswered
 from multidrop.dialects.family import Hints, Motion
-from multidrop.dialects.mcode.host.state import described, report_error, who
-from multidrop.dialects.mcode.manual import errors, grammar
+from multidrop.dialects.mcode.host.state import described, earlier_error, report_error, who
+from multidrop.dialects.mcode.manual import grammar
+from multidrop.dialects.mcode.manual.errors import BY_ITSELF
 from multidrop.dialects.mcode.manual.points import STATUS, in_words
 from multidrop.dialects.mcode.manual.program_file import commented, spaced
 from multidrop.dialects.modbus.host import framing, mapping
@@ -123,7 +124,7 @@ def carried_out(state: ModbusState, text: str, pdu: bytes) -> Procedure[bytes]:
     if state.stranger:
         return (yield from answered(state, request(state, text, pdu)))
     if state.error and (code := (yield from error_number(state))):
-        state.note(f"{who(state)}: an old error, now cleared: {described(code, state)}")
+        state.note(f"{who(state)}: {earlier_error(code, state)}")
     clear = not state.error
     state.error_flag_read(True)  # until it is read: a command that is not answered in time may still be refused
     answer = yield from answered(state, request(state, text, pdu))
@@ -131,8 +132,10 @@ def carried_out(state: ModbusState, text: str, pdu: bytes) -> Procedure[bytes]:
         if not clear:
             old = f"{described(code, state)}; it may be older than '{text}', as the flag could not be read before"
             raise NoAnswer(f"{who(state)}: {old}: it is not known whether '{text}' was executed; it was sent once")
-        refusal = f"{who(state)} refused '{text}': {described(code, state)}"
-        raise Refused(refusal, code, certain=code not in errors.BY_ITSELF)
+        if code in BY_ITSELF:  # the reply confirms the write, and no line is refused by these
+            state.note(f"{who(state)}: '{text}' was executed, and meanwhile: {described(code, state)}, now cleared")
+            return answer
+        raise Refused(f"{who(state)} refused '{text}': {described(code, state)}", code)
     return answer
 
 

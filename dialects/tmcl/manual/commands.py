@@ -259,11 +259,11 @@ def _parsed(text: str) -> Call:
     if len(fields) != len(row.fields):
         raise LineError(f"{row.word} takes {counted(len(row.fields), 'field')}: {row.syntax}")
     values = {}
-    for name, given in zip(row.fields, fields, strict=True):
-        known = row.types.get(given.upper()) if name == TYPE else None
-        if known is None and name == TYPE and row.types and not NUMBER.fullmatch(given):
-            raise LineError(f"{row.word} has no type {given!r}; valid: {', '.join(row.types)}")
-        values[name] = _number(name, given) if known is None else known
+    for name, field in zip(row.fields, fields, strict=True):
+        known = row.types.get(field.upper()) if name == TYPE else None
+        if known is None and name == TYPE and row.types and not NUMBER.fullmatch(field):
+            raise LineError(f"{row.word} has no type {field!r}; valid: {', '.join(row.types)}")
+        values[name] = _number(name, field) if known is None else known
     return Call(row.command, values.get(TYPE, 0), values.get(MOTOR, values.get(BANK, 0)), values.get(VALUE, 0))
 
 

@@ -1,0 +1,260 @@
+"""How the motions of an MCode drive begin and end; the same over Modbus, by registers.
+
+Theory of operation. EF and ST change nothing when they are read; ER is cleared, so it is read for the reason of an own
+motion only. ST stays set until ST=0, and the drive moves on with it: only a change from 0 to 1 is a sign. The target is
+compared in the units of P, within DB where the encoder counts (EE=1), else within one step. Only words that the product
+has are asked: an error could start a resident OE subroutine. (MCode reference 5.1.2, 5.1.28, 5.1.37, 5.1.40, 5.1.83,
+5.1.91, 5.1.120; docs/rulings/motion.md.)
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Generic, TypeVar
+
+from multidrop.dialects.codec import Procedure
+from multidrop.dialects.errors import DriveError
+from multidrop.dialects.mcode.host import classify, exchange, operations
+from multidrop.dialects.mcode.host.before_request import before_request, value_of
+from multidrop.dialects.mcode.host.classify import INTEGER
+from multidrop.dialects.mcode.host.state import MCodeState, described, earlier_error, refuse_in_program, who
+from multidrop.dialects.mcode.manual import errors
+from multidrop.dialects.mcode.manual.errors import ErrorNumber as E
+from multidrop.dialects.mcode.manual.grammar import Number, Statement, parsed
+from multidrop.dialects.mcode.manual.mnemonic import EVERY
+from multidrop.dialects.mcode.manual.table import lookup
+from multidrop.dialects.motions import NOTHING, Effect, Ending, Evidence, Motions, Move, MoveKind, Outcome, Signs
+from multidrop.dialects.state import DriveState
+
+S = TypeVar("S", bound=DriveState)
+AXIS = ""
+ONLY = frozenset({AXIS})
+SIGNS = ("EF", "MV", "BY", "ST", "P", "AF")
+"""What is read before a motion."""
+END = ("EF", "BY", "MP", "ST", "EE", "P", "DB", "AF", "AS")
+"""What is read at its end."""
+FLAGS = frozenset({"EF", "MV", "BY", "MP", "ST", "EE", "JE", "FL", "LK"})
+"""Those of one digit: no separator follows them, as a line has at most 64 characters."""
+FREE = ("TE", "JE", "FL")
+"""What lets a drive move without a line of ours: armed trips, jog inputs, a clock that it follows."""
+TORQUE = 3
+"""The value of AS without targets."""
+TURNS_ROUND = (1, 4)
+"""The values of LM with which a limit turns a homing round."""
+FAULTS: Mapping[int, Outcome] = {
+    8: Outcome.STALL,
+    32: Outcome.ERROR,
+    256: Outcome.ERROR,
+    4: Outcome.ERROR,
+    2: Outcome.ERROR,
+    1: Outcome.ERROR,
+}
+"""Bits of AF that show a failure, most important first; the others are states (5.1.2)."""
+FAULT_WORDS = {
+    8: "locked rotor",
+    32: "hMT hardware fault",
+    256: "hMT is not initialized",
+    4: "the maximum of lead or lag was reached",
+    2: "the lag limit was reached",
+    1: "the lead limit was reached",
+}
+LIMITS = frozenset({E.PLUS_LIMIT, E.MINUS_LIMIT})
+OUTCOMES: Mapping[int, Outcome] = {
+    **dict.fromkeys(LIMITS, Outcome.LIMIT),
+    E.STALL: Outcome.STALL,
+    E.LOCKED_ROTOR: Outcome.STALL,
+    E.MOTOR_VOLTAGE: Outcome.POWER,
+    E.NO_MOTOR_VOLTAGE: Outcome.POWER,
+}
+STALLED = "stalled"
+MOVES = {"MA", "MR"}
+HOMINGS = {"HM", "HI", "HF"}
+
+
+# What a line does
+
+
+def effect(state: DriveState, text: str) -> Effect:
+    """What a typed line of MCode does to the motion of its drive."""
+    statement = parsed(text)
+    if statement is None:
+        return NOTHING
+    word, value = statement.word, _whole(statement)
+    if word in MOVES:
+        absolute, relative = (value, None) if word == "MA" else (None, value)
+        return Effect(begins=(Move(MoveKind.POSITION, AXIS, absolute, relative),))
+    if word == "SL":
+        return Effect(ends=ONLY) if value == 0 else Effect(begins=(Move(MoveKind.VELOCITY, AXIS),))
+    if word in HOMINGS and statement.arguments:
+        return Effect(begins=(Move(MoveKind.HOMING, AXIS),))
+    if word == "EX":
+        return Effect(begins=(Move(MoveKind.PROGRAM, AXIS),))
+    if word in ("PS", "E"):
+        return Effect(ends=ONLY)
+    if word == "RS" or classify.written_word(text) in classify.SCALE | {"JE", "FL"}:
+        return Effect(unknown=ONLY)
+    return NOTHING
+
+
+def _whole(statement: Statement) -> int | None:
+    first = statement.arguments[0] if statement.arguments else None
+    return int(first.value) if isinstance(first, Number) and first.value == int(first.value) else None
+
+
+# Before a motion, and at its end
+
+
+@dataclass(frozen=True)
+class Access(Generic[S]):
+    """How a family reads the words of MCode."""
+
+    values: Callable[[S, Sequence[str]], Procedure[Mapping[str, int]]]
+    """Read those of these words that the product has; nothing is cleared."""
+    error: Callable[[S], Procedure[int | None]]
+    """Read ER, which clears it; None: it could not be read."""
+    handles_errors: Callable[[S], Procedure[bool]]
+    """Whether the program in the drive has an OE routine."""
+
+
+def motions(access: Access[S]) -> Motions[S]:
+    """The record of a family that reads the words of MCode in its own way."""
+
+    def signs(state: S) -> Procedure[Signs]:
+        found = yield from access.values(state, SIGNS)
+        if "EF" in found:
+            state.error_flag_read(bool(found["EF"]))
+        return found
+
+    def old(state: S, found: Signs, own: bool) -> Procedure[Signs]:
+        if not found.get("EF"):
+            return found
+        if not own:
+            state.note(f"{who(state)}: its error flag was set before (EF=1); PR ER shows and clears the error")
+            return found
+        code = yield from access.error(state)
+        if code:
+            state.note(f"{who(state)}: {earlier_error(code, state)}")
+        return found if code is None else {**found, "EF": 0}
+
+    def judge(state: S, axis: str, evidence: Evidence) -> Procedure[Ending | None]:
+        return (yield from _judge(access, state, evidence))
+
+    return Motions(effect=effect, signs=signs, old=old, place=_place, judge=judge, fails=errors.BY_ITSELF.__contains__)
+
+
+def _place(found: Signs, axis: str) -> int | None:
+    return None if found.get("MV") or found.get("BY") else found.get("P")
+
+
+def _judge(access: Access[S], state: S, evidence: Evidence) -> Procedure[Ending | None]:
+    found = yield from access.values(state, END)
+    before, move, position = evidence.before, evidence.move, found.get("P")
+    ending = Ending(Outcome.REACHED, AXIS, position)
+    if move is None:
+        return _seen(found, before, ending)
+    homing, program = move.kind is MoveKind.HOMING, move.kind is MoveKind.PROGRAM
+    codes = [code for code in evidence.errors if code in errors.BY_ITSELF]
+    if found.get("EF") and not before.get("EF"):
+        state.error_flag_read(True)
+        count = state.errors_read
+        if program and (yield from access.handles_errors(state)):
+            return ending
+        listed = state.errors_since(count)  # the list has reported it, and cleared it
+        code = listed[-1] if listed else (yield from access.error(state))
+        if code is None:
+            return replace(ending, outcome=Outcome.UNKNOWN, reason="an error is set, and its number could not be read")
+        codes += [code] if code and (code in errors.BY_ITSELF or not evidence.stopped) else []
+    if homing and codes and set(codes) <= LIMITS:
+        turns = yield from access.values(state, ("LM",))
+        if turns.get("LM") in TURNS_ROUND:
+            state.note(f"{who(state)}: the homing met a limit and turned round: {described(codes[-1], state)}")
+            codes = []
+    if codes:
+        return _failed(ending, codes[-1], state)
+    if (fault := _new_fault(found, before)) is not None:
+        return replace(ending, outcome=fault[0], reason=fault[1])
+    target = move.target
+    if target is None or position is None or found.get("AS") == TORQUE or evidence.program or found.get("BY"):
+        return ending
+    if abs(position - target) <= _tolerance(found):
+        return ending
+    if found.get("EE") and found.get("MP"):
+        return None  # position maintenance may still correct it
+    free = yield from access.values(state, FREE)
+    return ending if any(free.values()) else replace(ending, outcome=Outcome.STOPPED)
+
+
+def _seen(found: Mapping[str, int], before: Signs, ending: Ending) -> Ending:
+    """Judge a motion that somebody else began: only by signs that are new since the wait began."""
+    if (fault := _new_fault(found, before)) is not None:
+        return replace(ending, outcome=fault[0], reason=fault[1])
+    if found.get("EF") and not before.get("EF", 1):
+        return replace(ending, outcome=Outcome.ERROR, reason="its error flag was set; PR ER shows and clears the error")
+    return ending
+
+
+def _failed(ending: Ending, code: int, state: DriveState) -> Ending:
+    outcome = OUTCOMES.get(code, Outcome.ERROR)
+    reason = STALLED if code == E.STALL else f"error {code}: {errors.text(code, state.product)}"
+    return replace(ending, outcome=outcome, reason=reason)
+
+
+def _new_fault(found: Mapping[str, int], before: Signs) -> tuple[Outcome, str] | None:
+    if found.get("ST") and before.get("ST") == 0:
+        return Outcome.STALL, STALLED
+    new = found.get("AF", 0) & ~before.get("AF", -1)
+    return next(((outcome, FAULT_WORDS[bit]) for bit, outcome in FAULTS.items() if new & bit), None)
+
+
+def _tolerance(found: Mapping[str, int]) -> int:
+    """How far from its target a move may end: DB where the encoder counts (not with hMT), else one step."""
+    counts = found.get("EE") and not found.get("AS")
+    return max(found.get("DB", 0), 1) if counts else 1
+
+
+# MCode
+
+
+def known_words(product: str, words: Sequence[str]) -> list[str]:
+    """Those of the words that a product has; of an unknown product, those that every Lexium has."""
+    rows = [(word, lookup(word, product if product in EVERY else "")) for word in words]
+    every = EVERY - frozenset(each for each in EVERY if not each.startswith("LM"))
+    return [
+        word
+        for word, row in rows
+        if row is not None and (product in row.products if product in EVERY else every <= row.products)
+    ]
+
+
+def _values(state: MCodeState, words: Sequence[str]) -> Procedure[Mapping[str, int]]:
+    """Print values in one line."""
+    refuse_in_program(state, "ask again")
+    yield from before_request(state, exchange.question(state, "EF", "[01]"))  # an expected drive shows its product
+    asked = known_words(state.product, words)
+    if not asked:
+        return {}
+    items = "".join(f"{word}," if word in FLAGS else f'{word}," ",' for word in asked[:-1]) + asked[-1]
+    form = "".join("([01])" if word in FLAGS else f"({INTEGER}) " for word in asked).rstrip()
+    printed = re.fullmatch(form, (yield from value_of(state, items, re.sub(r"[()]", "", form))))
+    assert printed is not None
+    found = dict(zip(asked, map(int, printed.groups()), strict=True))
+    if "BY" in found and "EF" in found:
+        state.program_read(error=bool(found["EF"]), running=bool(found["BY"]))
+    return found
+
+
+def _handles_errors(state: MCodeState) -> Procedure[bool]:
+    """Look for OE in the stored program, unless it is locked: the refusal would run that very routine (5.1.75)."""
+    locked = yield from _values(state, ("LK",))
+    if locked.get("LK"):
+        return False
+    try:
+        lines = yield from operations.perform(state, "L")
+    except DriveError:
+        return False
+    return any(re.search(r"(?<![\w\"])OE\b", line, re.I) for line in lines)
+
+
+MOTIONS = motions(Access(_values, exchange.read_error, _handles_errors))

@@ -1,0 +1,40 @@
+"""How the motions of an Ethernet drive begin and end over Modbus: as in MCode, by registers of the same names.
+
+The program cannot be listed over Modbus, so an OE routine in it is not seen. A device that did not identify itself as a
+Lexium is asked for nothing: its registers may mean other things, and reading one may clear something.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from multidrop.dialects.codec import Procedure
+from multidrop.dialects.errors import Refused
+from multidrop.dialects.mcode.host.motions import Access, motions
+from multidrop.dialects.modbus.host.codec import ModbusState
+from multidrop.dialects.modbus.host.operations import PRODUCT, error_number, value
+from multidrop.dialects.modbus.manual.registers import REGISTERS
+
+
+def _values(state: ModbusState, words: Sequence[str]) -> Procedure[Mapping[str, int]]:
+    """Read each of these registers that the product has."""
+    found: dict[str, int] = {}
+    if not PRODUCT.fullmatch(state.product):
+        return found
+    for word in words:
+        register = REGISTERS.get(word)
+        if register is None or not register.readable or (register.only and state.product.startswith("LMDO")):
+            continue
+        try:
+            found[word] = yield from value(state, word)
+        except Refused:
+            continue  # this drive lacks the register
+    return found
+
+
+def _no_handler(state: ModbusState) -> Procedure[bool]:
+    return False
+    yield
+
+
+MOTIONS = motions(Access(_values, error_number, _no_handler))

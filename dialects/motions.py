@@ -1,0 +1,181 @@
+"""How a motion ends: what a line begins, the signs of a failure, and the judgement of what was read at its end.
+
+A family supplies a `Motions`. It knows its drives, and no sequences: `judge` says what the drive shows. Whose stop
+ended a motion, and whether that is a failure, is decided once for all families (`drives.motion_record`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from enum import Enum
+from types import MappingProxyType
+from typing import Generic, TypeVar
+
+from multidrop.dialects.codec import Procedure
+from multidrop.dialects.state import DriveState
+
+S = TypeVar("S", bound=DriveState)
+Signs = Mapping[str, int]
+"""What was read of a drive that may show a failure, by the family's own names. It may hold more, such as a position."""
+NO_SIGNS: Signs = MappingProxyType({})
+
+
+def _no_signs_read() -> Signs:
+    return NO_SIGNS
+
+
+class Outcome(Enum):
+    """How a motion ended; the values are the words of `{outcome}`."""
+
+    REACHED = "reached"
+    """At its target; without a target: it ended, and nothing shows a failure."""
+    REPLACED = "replaced"
+    """Another motion took its place."""
+    STOPPED = "stopped"
+    """Short of its target, and nothing shows a failure: something stopped it."""
+    LIMIT = "limit"
+    STALL = "stall"
+    ERROR = "error"
+    POWER = "power"
+    UNKNOWN = "unknown"
+    """Its end could not be read."""
+
+
+class MoveKind(Enum):
+    """What a line begins."""
+
+    POSITION = "position"
+    VELOCITY = "velocity"
+    HOMING = "homing"
+    PROGRAM = "program"
+
+
+@dataclass(frozen=True)
+class Move:
+    """A motion that a line begins."""
+
+    kind: MoveKind
+    axis: str = ""
+    """As in `Motion.axis`."""
+    target: int | None = None
+    """Where it ends, in the units of `Motion.position`; None: it has no target, or none that is known."""
+    relative: int | None = None
+    """The distance, where the target counts from where the axis is when the line is executed."""
+
+
+@dataclass(frozen=True)
+class Effect:
+    """What a typed line does to the motions of a drive; each axis as in `Motion.axis`."""
+
+    begins: tuple[Move, ...] = ()
+    ends: frozenset[str] = frozenset()
+    """Axes whose motion it stops on purpose."""
+    unknown: frozenset[str] = frozenset()
+    """Axes whose positions or targets have another meaning after it, so that a target is not known any more."""
+
+
+NOTHING = Effect()
+
+
+def joined(effects: Sequence[Effect]) -> Effect:
+    """What several lines do together."""
+    return Effect(
+        tuple(move for each in effects for move in each.begins),
+        frozenset(axis for each in effects for axis in each.ends),
+        frozenset(axis for each in effects for axis in each.unknown),
+    )
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """What the host knows of a motion that seems to have ended."""
+
+    move: Move | None = None
+    """None: somebody else began it, so nothing but a new sign shows a failure, and nothing may be cleared."""
+    before: Signs = field(default_factory=_no_signs_read)
+    """The signs from before it: of an own motion from right before its line, else from the beginning of the wait."""
+    errors: tuple[int, ...] = ()
+    """The numbers of errors that were read, and thereby cleared, since it began; newest last."""
+    stopped: bool = False
+    """This session has stopped it since, so that an error of a line cut off by the stop says nothing of the motion."""
+    program: bool = False
+    """A program may have moved the axis since: one was started, or seen to run."""
+
+
+@dataclass(frozen=True)
+class Ending:
+    """How a motion ended."""
+
+    outcome: Outcome
+    axis: str = ""
+    position: int | None = None
+    target: int | None = None
+    reason: str = ""
+    """In a few words, as after `a stopped at 1200 of 4000: `."""
+    failed: bool = False
+    """Set by the one who knows the sequences, not by the family."""
+
+    def described(self, name: str) -> str:
+        """In words: `a stopped at 1200 of 4000: stalled`."""
+        axis = f" {self.axis.upper()}" if self.axis else ""
+        if self.position is None:
+            return f"{name}{axis} {self._verb}: {self.reason or self.outcome.value}"
+        of = "" if self.target is None or self.target == self.position else f" of {self.target}"
+        reason = self.reason or ("" if self.outcome is Outcome.REACHED else self.outcome.value)
+        parted = ", " if reason.startswith("not ") else ": "
+        return f"{name}{axis} {self._verb} at {self.position}{of}{parted if reason else ''}{reason}"
+
+    @property
+    def _verb(self) -> str:
+        return "is at rest" if self.outcome is Outcome.REACHED else "stopped"
+
+
+def _no_effect(state: DriveState, text: str) -> Effect:
+    return NOTHING
+
+
+def _no_signs(state: DriveState) -> Procedure[Signs]:
+    return NO_SIGNS
+    yield  # a conversation without a request
+
+
+def _nothing_old(state: DriveState, signs: Signs, own: bool) -> Procedure[Signs]:
+    return signs
+    yield
+
+
+def _reached(state: DriveState, axis: str, evidence: Evidence) -> Procedure[Ending | None]:
+    return Ending(Outcome.REACHED, axis)
+    yield
+
+
+@dataclass(frozen=True)
+class Motions(Generic[S]):
+    """What a family says of its motions. Each conversation raises Refused, NoAnswer, Stopped or Inexpressible.
+
+    The defaults know of no motion: such a family's waits end when its drives are at rest.
+    """
+
+    effect: Callable[[S, str], Effect] = _no_effect
+    """What a typed line does to the motions of a drive. Asks nothing."""
+    signs: Callable[[S], Procedure[Signs]] = _no_signs
+    """Read the signs of a failure, and where the axes are; nothing that changes when it is read."""
+    old: Callable[[S, Signs, bool], Procedure[Signs]] = _nothing_old
+    """Report what `signs` show from before; return the signs from which the judgement is to count.
+
+    True: an own motion follows, so what must be cleared before it may be cleared. False: nothing may be cleared.
+    """
+    place: Callable[[Signs, str], int | None] = lambda signs, axis: None
+    """The position of an axis at rest in `signs`; None: it moves, or its position was not read."""
+    judge: Callable[[S, str, Evidence], Procedure[Ending | None]] = _reached
+    """Judge the motion of an axis that two readings show at rest; None: it is not over yet (it settles).
+
+    Of an own motion it may read, for the reason, what reading clears. STOPPED: it ended short of its target, or without
+    a command where the family can tell, and nothing shows a failure; the caller knows who stopped it.
+    """
+    fails: Callable[[int], bool] = lambda code: False
+    """Whether an error number, once read, is that of a motion or of the machine, and not the refusal of a line."""
+
+
+NO_MOTIONS: Motions[DriveState] = Motions()

@@ -1,0 +1,140 @@
+"""The motions of one drive that lines of this session began, and whether their ends are failures.
+
+A sequence is whoever sends lines one after the other: an automation, or the person at the session. A motion is the
+sequence's that began it. For each axis the record has the last motion of each sequence, what was known before it, and
+who has stopped or replaced it since. `Ending.failed` is set here and nowhere else, the same for every family.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+
+from multidrop.dialects.motions import Effect, Ending, Evidence, Move, MoveKind, Outcome, Signs
+
+KEPT = 8
+"""The most motions of one axis that are kept, each of another sequence."""
+NOT_OURS = "not by this script"
+Sequence = object
+"""A sequence, compared by identity."""
+
+
+@dataclass(eq=False)
+class Course:
+    """One motion, from its line to its judgement."""
+
+    move: Move
+    by: Sequence
+    before: Signs
+    errors: int
+    """`DriveState.errors_read` as it began."""
+    program: bool = False
+    """A program was started since, or seen to run."""
+    stopped: bool = False
+    """Its own sequence has stopped it."""
+    stopped_by_other: bool = False
+    replaced: Move | None = None
+    """The motion of another sequence that has replaced it."""
+    ending: Ending | None = None
+    """How it ended, once that was judged."""
+
+    @property
+    def open(self) -> bool:
+        return self.ending is None
+
+    def evidence(self, errors: tuple[int, ...]) -> Evidence:
+        return Evidence(self.move, self.before, errors, self.stopped or self.stopped_by_other, self.program)
+
+    def judged(self, found: Ending) -> Ending:
+        """Decide whether what the drive shows is a failure of this motion, and keep it."""
+        self.ending = self._decided(replace(found, target=self.move.target, failed=False))
+        return self.ending
+
+    def _decided(self, found: Ending) -> Ending:
+        short = found.outcome is Outcome.STOPPED
+        if not short and found.outcome is not Outcome.REACHED:
+            return replace(found, failed=True)
+        if self.stopped:
+            return replace(found, outcome=Outcome.STOPPED, reason="")
+        if self.replaced is not None and (short or self.move.target is None):
+            return replace(found, outcome=Outcome.REPLACED, reason=NOT_OURS, failed=True)
+        if self.stopped_by_other and (short or self.move.target is None):
+            return replace(found, outcome=Outcome.STOPPED, reason=NOT_OURS, failed=True)
+        return replace(found, reason=found.reason or NOT_OURS, failed=True) if short else found
+
+
+Courses = dict[str, list[Course]]
+"""The courses of a drive by axis, the newest last."""
+
+
+class MotionRecord:
+    """The courses of one drive."""
+
+    def __init__(self) -> None:
+        self._courses: Courses = {}
+
+    def begin(self, courses: Iterable[Course]) -> None:
+        """Record motions whose line is on its way. A motion of the same sequence on the same axis is replaced well."""
+        for new in courses:
+            kept = [each for each in self._courses.get(new.move.axis, ()) if each.by is not new.by]
+            for each in kept:
+                if each.open:
+                    each.replaced = new.move
+            self._courses[new.move.axis] = [*kept, new][-KEPT:]
+            if new.move.kind is MoveKind.PROGRAM:
+                for each in self._all():
+                    each.program = True
+
+    def copy(self) -> Courses:
+        """What `restore` brings back, where the drive refused a line."""
+        return {axis: [*courses] for axis, courses in self._courses.items()}
+
+    def restore(self, before: Courses) -> None:
+        for course in self._all():
+            for kept in before.get(course.move.axis, ()):
+                if kept.replaced is course.move:
+                    kept.replaced = None
+        self._courses = before
+
+    def effect(self, effect: Effect, by: Sequence) -> None:
+        """Record what else a line does, which was not refused."""
+        if effect.ends:
+            self.stopped(by, effect.ends)
+        for course in self._open(effect.unknown):
+            course.move = replace(course.move, target=None, relative=None)
+
+    def stopped(self, by: Sequence | None, axes: frozenset[str] | None = None) -> None:
+        """Record a stop of axes (None: all). `by` None: of the whole session, which no sequence outlives unasked."""
+        for course in self._all() if axes is None else self._open(axes):
+            if course.open:
+                course.stopped = course.stopped or by is None or course.by is by
+                course.stopped_by_other = course.stopped_by_other or not (by is None or course.by is by)
+
+    def close(self, by: Sequence) -> None:
+        """Take the motions of a sequence that ends early for stopped by it: they are judged no more."""
+        self.stopped(by)
+        for course in self.open_of(by):
+            course.ending = Ending(Outcome.STOPPED, course.move.axis, target=course.move.target)
+
+    def runs(self) -> None:
+        """Record that a program was seen to run."""
+        for course in self._all():
+            course.program = True
+
+    def of(self, by: Sequence) -> list[Course]:
+        """The last motion of a sequence on each axis."""
+        return [each for each in self._all() if each.by is by]
+
+    def open_of(self, by: Sequence) -> list[Course]:
+        """Those whose end was not judged yet."""
+        return [each for each in self.of(by) if each.open]
+
+    @property
+    def any_open(self) -> bool:
+        return any(each.open for each in self._all())
+
+    def _all(self) -> list[Course]:
+        return [each for courses in self._courses.values() for each in courses]
+
+    def _open(self, axes: frozenset[str]) -> list[Course]:
+        return [each for axis in axes for each in self._courses.get(axis, ()) if each.open]

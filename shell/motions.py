@@ -1,0 +1,324 @@
+"""How motions ended: a line that begins one, and the one place where the end of a motion is judged.
+
+Waits, scripts, macros, typed lines and the Python API come here. Before a line that begins a motion the drive's signs
+of failure are read; at rest they are read again, and the family judges them. The record of the drive says whose motion
+it was, and who stopped it (`drives.motion_record`).
+"""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Awaitable, Callable, Iterable, Sequence
+from contextvars import ContextVar
+from dataclasses import replace
+from typing import TypeVar
+
+from multidrop.dialects import Inexpressible, NoAnswer, Procedure, Refused, Stopped
+from multidrop.dialects.errors import MotionFailed
+from multidrop.dialects.motions import NO_MOTIONS, NO_SIGNS, Ending, Evidence, Motions, Outcome, Signs, joined
+from multidrop.dialects.state import DriveState
+from multidrop.drives.drive import NOT_SENT, Check, Drive, still
+from multidrop.drives.motion_record import Course, Courses
+from multidrop.drives.port_journal import GLOBAL
+from multidrop.shell.automation import is_automation, sequence
+from multidrop.shell.workspace import Workspace
+
+T = TypeVar("T")
+OUTCOME: ContextVar[list[str] | None] = ContextVar("outcome", default=None)
+"""Takes the word of a `/wait ended`, for the script whose line it is."""
+WORST = (
+    Outcome.UNKNOWN,
+    Outcome.POWER,
+    Outcome.ERROR,
+    Outcome.STALL,
+    Outcome.LIMIT,
+    Outcome.STOPPED,
+    Outcome.REPLACED,
+    Outcome.REACHED,
+)
+"""The outcomes, the one to report of several first."""
+
+
+def failure(name: str, ending: Ending) -> MotionFailed:
+    """The error for a motion that failed: `a stopped at 1200 of 4000: stalled`."""
+    reason = ending.reason or ending.outcome.value
+    return MotionFailed(ending.described(name), reason, ending.position, ending.target, ending.outcome.value)
+
+
+def _motions(drive: Drive) -> Motions[DriveState]:
+    """What the family says of a drive's motions; nothing is asked of a device that did not identify itself."""
+    return NO_MOTIONS if drive.state.stranger else drive.family.motions
+
+
+# Lines
+
+
+async def send(workspace: Workspace, drive: Drive, text: str, check: Check | None = None) -> tuple[str, ...]:
+    """Send a line as `Drive.send` does, and record what it does to motions.
+
+    Raises MotionFailed where an error shows that a motion of the same automation has failed: before the line, which is
+    then not sent, or after it. A person at the session is only told. A line that ends motion is never held back.
+    """
+    line = _Line(workspace, drive, (text,), check)
+    return await line.run(lambda check: drive.send(text, check))
+
+
+async def perform(workspace: Workspace, drive: Drive, lines: Sequence[str], work: Procedure[T]) -> T:
+    """Run a conversation that does what these lines do, as `send` sends a line."""
+
+    def checked(check: Check | None) -> Procedure[T]:
+        if check is not None:
+            yield from check(drive)
+        return (yield from work)
+
+    return await _Line(workspace, drive, lines, None).run(lambda check: drive.run(checked(check), typed=True))
+
+
+class _Before:
+    """The motions of a drive before a line."""
+
+    def __init__(self, drive: Drive, courses: Courses, suspects: list[Course]) -> None:
+        self.drive, self.courses, self.suspects, self.errors = drive, courses, suspects, drive.state.errors_read
+
+
+class _Line:
+    """A line, the drives that it reaches, and what it does to their motions."""
+
+    def __init__(self, workspace: Workspace, drive: Drive, lines: Sequence[str], check: Check | None) -> None:
+        motions, state = _motions(drive), drive.state
+        self.by = sequence(workspace)
+        self.effect = joined(() if drive.stores else [motions.effect(state, each) for each in lines])
+        bus = workspace.buses.get(drive.link.name)
+        to_all = bus is not None and drive.address in GLOBAL
+        self.reached = bus.all_drives if bus is not None and to_all else [drive]
+        self._workspace, self._text, self._check, self._to_all = workspace, " ".join(lines).strip(), check, to_all
+
+    async def run(self, execute: Callable[[Check | None], Awaitable[T]]) -> T:
+        """Execute it, with a check right before it, and record what it did."""
+        check = self._check
+        if self.effect.begins or not self.effect.ends:
+            for each in self.reached:
+                if each.state.error and self._suspect(each):
+                    await each.run(self._judged_before(each))
+        if self.effect.begins and self._to_all:
+            await self._prepare_each()
+        elif self.effect.begins:
+            check = self._checked
+        before = [_Before(each, each.motions.copy(), self._suspect(each)) for each in self.reached]
+        try:
+            result = await execute(check)
+        except NOT_SENT as refusal:
+            if isinstance(refusal, Refused) and not refusal.certain:
+                self._took_effect()
+            else:
+                for was in before:
+                    was.drive.motions.restore(was.courses)
+            if not isinstance(refusal, MotionFailed):
+                await self._judge_after(before, f"; {refusal}")
+            raise
+        except BaseException:
+            self._took_effect()
+            raise
+        self._took_effect()
+        await self._judge_after(before, f"; '{self._text}' was executed")
+        return result
+
+    def _suspect(self, drive: Drive) -> list[Course]:
+        """The motions of this sequence of which an error may be: not those that it has stopped itself."""
+        return [each for each in drive.motions.open_of(self.by) if not each.stopped]
+
+    def _took_effect(self) -> None:
+        for each in self.reached:
+            each.motions.effect(self.effect, self.by)
+
+    async def _prepare_each(self) -> None:
+        """Read the signs of each drive that a line to all reaches: one that does not reply has none."""
+        for each in self.reached:
+            signs = NO_SIGNS
+            if not (each.programming or each.link.away):
+                with contextlib.suppress(Refused, NoAnswer, Inexpressible):
+                    signs = await each.run(self._signs(each))
+            self._record(each, signs)
+
+    def _checked(self, drive: Drive) -> Procedure[None]:
+        """Read the signs of the drive in the conversation of its line, right before that, and record its motion."""
+        if self._check is not None:
+            yield from self._check(drive)
+        self._record(drive, (yield from self._signs(drive)))
+
+    def _signs(self, drive: Drive) -> Procedure[Signs]:
+        motions, state = _motions(drive), drive.state
+        unsent = f"'{self._text}' was not sent"
+        try:
+            signs = yield from motions.signs(state)
+        except NoAnswer:
+            raise NoAnswer(f"{drive.shown} does not reply: {unsent}") from None
+        except Stopped:
+            raise Stopped(f"{drive.shown}: stopped; {unsent}") from None
+        if state.error and self._suspect(drive):
+            yield from self._judged_before(drive)
+        return (yield from motions.old(state, signs, True))
+
+    def _record(self, drive: Drive, signs: Signs) -> None:
+        motions, state = _motions(drive), drive.state
+        courses = []
+        for move in self.effect.begins:
+            place = None if move.relative is None else motions.place(signs, move.axis)
+            if place is not None and move.relative is not None:
+                move = replace(move, target=place + move.relative)
+            courses.append(Course(move, self.by, signs, state.errors_read))
+        drive.motions.begin(courses)
+        if courses:
+            state.motion_begun()
+
+    def _judged_before(self, drive: Drive) -> Procedure[None]:
+        """Judge the motions of this sequence whose error the next line would clear. Raises MotionFailed."""
+        for course in self._suspect(drive):
+            failed = yield from _sign_of(drive, course)
+            if failed is not None:
+                self._report(drive, failed, f"; '{self._text}' was not sent")
+
+    async def _judge_after(self, before: Sequence[_Before], fate: str) -> None:
+        """Judge the motions of this sequence of which an error was read with the line. Raises MotionFailed."""
+        for each in before:
+            drive = each.drive
+            if any(map(_motions(drive).fails, drive.state.errors_since(each.errors))):
+                for course in each.suspects:
+                    failed = await drive.run(_sign_of(drive, course)) if course.open else None
+                    if failed is not None:
+                        self._report(drive, failed, fate)
+
+    def _report(self, drive: Drive, failed: Ending, fate: str) -> None:
+        name = self._workspace.display_name(drive)
+        if is_automation():
+            error = failure(name, failed)
+            error.args = (f"{error}{fate}",)
+            raise error
+        self._workspace.notify(failed.described(name), bus=drive.link.name, warning=True)
+
+
+def _sign_of(drive: Drive, course: Course) -> Procedure[Ending | None]:
+    """Judge a motion that may be under way still: by a sign of failure only, not by where it is."""
+    found = yield from _motions(drive).judge(drive.state, course.move.axis, _evidence(drive, course))
+    if found is None or found.outcome in (Outcome.REACHED, Outcome.STOPPED):
+        return None
+    return _judged(drive, course, found)
+
+
+def _evidence(drive: Drive, course: Course) -> Evidence:
+    return course.evidence(drive.state.errors_since(course.errors))
+
+
+def _judged(drive: Drive, course: Course, found: Ending) -> Ending:
+    ending = course.judged(found)
+    if not drive.motions.any_open:
+        drive.state.motion_judged()
+    return ending
+
+
+# Waits
+
+
+class Watch:
+    """The motions whose end a wait waits for: those of its own sequence, else whatever moves each drive."""
+
+    def __init__(self, workspace: Workspace, drives: Sequence[Drive], ended: bool = False) -> None:
+        """`ended`: the wait accepts every ending, also of a motion that was judged before."""
+        self._workspace, self.drives = workspace, drives
+        self._by, self._accepts = sequence(workspace), ended
+        self._signs: dict[Drive, Signs] = {}
+        self._errors: dict[Drive, int] = {}
+        self._silent: set[Drive] = set()
+        self.endings: dict[Drive, list[Ending]] = {}
+        """How the motions of each drive ended that was judged."""
+
+    def own(self, drive: Drive) -> list[Course]:
+        """The motions of this sequence that are not judged yet."""
+        return drive.motions.open_of(self._by)
+
+    async def begin(self) -> None:
+        """Read the signs of the drives that this sequence did not move."""
+        for drive in self.drives:
+            if not self.own(drive) and not drive.programming:
+                motions, state = _motions(drive), drive.state
+                signs = await drive.run(motions.signs(state))
+                self._signs[drive] = await drive.run(motions.old(state, signs, False))
+                self._errors[drive] = state.errors_read
+
+    async def judge(self, drive: Drive) -> bool:
+        """Judge the motions of a drive that is at rest; False: one is not over yet. Raises MotionFailed."""
+        found = await (self._judge_own(drive) if self.own(drive) else self._judge_other(drive))
+        if found is None:
+            return False
+        self.endings.setdefault(drive, []).extend(found)
+        failed = [each for each in found if each.failed]
+        if failed and not self._accepts:
+            raise failure(self._workspace.display_name(drive), min(failed, key=_rank))
+        return True
+
+    async def _judge_own(self, drive: Drive) -> list[Ending] | None:
+        endings = []
+        for course in self.own(drive):
+            motions, axis = _motions(drive), course.move.axis
+            try:
+                found = await drive.run(motions.judge(drive.state, axis, _evidence(drive, course)))
+            except (Refused, NoAnswer) as error:
+                found = Ending(Outcome.UNKNOWN, axis, reason=f"its end could not be read ({error})")
+            if found is None:
+                return None
+            endings.append(_judged(drive, course, found))
+        return endings
+
+    async def _judge_other(self, drive: Drive) -> list[Ending]:
+        if drive in self.endings or drive.programming:
+            return []
+        if self._accepts and (mine := drive.motions.of(self._by)):
+            return [each.ending for each in mine if each.ending is not None]
+        motions, state = _motions(drive), drive.state
+        signs = self._signs.get(drive, NO_SIGNS)
+        evidence = Evidence(None, signs, state.errors_since(self._errors.get(drive, state.errors_read)))
+        endings: list[Ending] = []
+        if motions is NO_MOTIONS:
+            return endings
+        for axis in drive.family.units.axes(state):
+            found = await drive.run(motions.judge(state, axis, evidence))
+            if found is not None:
+                bad = found.outcome not in (Outcome.REACHED, Outcome.STOPPED, Outcome.REPLACED, Outcome.UNKNOWN)
+                endings.append(replace(found, failed=bad))
+        return endings
+
+    @property
+    def left(self) -> list[Drive]:
+        """The drives that can still be asked."""
+        return [each for each in self.drives if each not in self._silent]
+
+    def silent(self, drive: Drive, error: NoAnswer) -> None:
+        """Take it that the end of what moves a drive cannot be read. Raises the error, unless any ending will do."""
+        if not self._accepts:
+            raise error
+        self._silent.add(drive)
+        for course in self.own(drive):
+            _judged(drive, course, Ending(Outcome.UNKNOWN, course.move.axis, reason=str(error)))
+        self.endings[drive] = [Ending(Outcome.UNKNOWN, reason=str(error))]
+
+    @property
+    def worst(self) -> tuple[Drive, Ending] | None:
+        """The ending to report of all."""
+        found = [(drive, each) for drive, endings in self.endings.items() for each in endings]
+        return min(found, key=lambda each: _rank(each[1])) if found else None
+
+
+def _rank(ending: Ending) -> int:
+    return WORST.index(ending.outcome)
+
+
+async def check_own(workspace: Workspace, drives: Iterable[Drive] | None = None) -> None:
+    """Judge the motions of this automation that have come to rest. Raises MotionFailed for one that failed.
+
+    `drives` None: of every open bus. For waits that ask for something else than the end of a motion.
+    """
+    by = sequence(workspace)
+    every = drives if drives is not None else [each for bus in workspace.buses.values() for each in bus.all_drives]
+    for drive in every:
+        if drive.motions.open_of(by) and not drive.programming and await still(drive):
+            await Watch(workspace, [drive]).judge(drive)
