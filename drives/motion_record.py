@@ -47,7 +47,8 @@ class Course:
 
     def judged(self, found: Ending) -> Ending:
         """Decide whether what the drive shows is a failure of this motion, and keep it."""
-        self.ending = self._decided(replace(found, target=self.move.target, failed=False))
+        target = found.target if self.move.target is None else self.move.target
+        self.ending = self._decided(replace(found, target=target, failed=False))
         return self.ending
 
     def _decided(self, found: Ending) -> Ending:

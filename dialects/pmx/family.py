@@ -86,6 +86,7 @@ PMX = Family(
     scan_at="multidrop.dialects.pmx.host.operations:SCAN",
     debugging_at="multidrop.dialects.pmx.host.programs:DEBUGGING",
     certifying_at="multidrop.dialects.pmx.host.operations:CERTIFYING",
+    motions_at="multidrop.dialects.pmx.host.motions:MOTIONS",
     values_at="multidrop.dialects.pmx.host.values:VALUES",
     units_at="multidrop.dialects.pmx.host.units:UNITS",
     stop_bytes=STOP_BYTES,

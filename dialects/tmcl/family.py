@@ -98,6 +98,7 @@ TMCL = Family(
     debugging_at="multidrop.dialects.tmcl.host.programs:DEBUGGING",
     repairs=True,
     certifying_at="multidrop.dialects.tmcl.host.operations:CERTIFYING",
+    motions_at="multidrop.dialects.tmcl.host.motions:MOTIONS",
     values_at="multidrop.dialects.tmcl.host.values:VALUES",
     units_at="multidrop.dialects.tmcl.host.units:UNITS",
     stop_bytes=STOP_BYTES,

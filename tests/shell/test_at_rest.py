@@ -33,7 +33,13 @@ class Moving:
     def __init__(self, monkeypatch: pytest.MonkeyPatch, family: str, *false: int) -> None:
         self.false = set(false)
         self.read = 0
-        own = replace(FAMILIES[family], motion=self._motion, moving=self._moving, busy=self._busy)
+        own = replace(
+            FAMILIES[family],
+            motion=self._motion,
+            moving=self._moving,
+            busy=self._busy,
+            motions_at="multidrop.dialects.motions:NO_MOTIONS",
+        )
         monkeypatch.setattr(Drive, "family", property(lambda drive: own, lambda drive, found: None), raising=False)
 
     def _velocity(self) -> int:

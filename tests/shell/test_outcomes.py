@@ -17,6 +17,7 @@ from multidrop.shell.scripts.executor import run_script
 from multidrop.shell.scripts.reading import WrongScript, read_script
 from multidrop.shell.session import Session
 from tests.support.cell_session import bus, party, session_on
+from tests.support.outcomes import failed, sent
 
 pytestmark = pytest.mark.virtual
 
@@ -31,19 +32,6 @@ async def on(folder: Path, *lines: str, **settings: int) -> AsyncIterator[Sessio
     cell = bus("press", party("a", *lines, **{"CK": 0, **settings}), party("b", CK=0), baud=0)
     async with session_on(folder, cell) as session:
         yield session
-
-
-async def sent(session: Session, *lines: str) -> None:
-    """Run lines as one automation, as `send` does."""
-    async with session.automations.run():
-        for line in lines:
-            await session.run(line)
-
-
-async def failed(session: Session, *lines: str) -> MotionFailed:
-    with pytest.raises(MotionFailed) as caught:
-        await sent(session, *lines)
-    return caught.value
 
 
 async def value(session: Session, word: str) -> int:

@@ -7,6 +7,7 @@ import asyncio
 import pytest
 
 from multidrop.dialects import Diagnostic, Refused, Stopped
+from multidrop.dialects.errors import MotionFailed
 from multidrop.drives.events import Sample
 from multidrop.shell.events import By, Notified, OnBus, Output, Printed
 from multidrop.shell.prompt.complete import complete, hint
@@ -89,7 +90,8 @@ async def test_samples_of_both_axes_reach_whoever_looks(session):
 
 
 async def test_limits_are_told_in_words(session):
-    await say(session, "JY-", "/wait stopped")
+    with pytest.raises(MotionFailed, match="00 Y stopped at -100: minus limit; CLRY clears the error"):
+        await say(session, "JY-", "/wait stopped")
     lines = await say(session, "/status")
     assert lines[1] == "Y: at rest, minus limit error, minus limit switch on; StepNLoop off"
     await say(session, "CLRY")

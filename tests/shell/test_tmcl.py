@@ -110,7 +110,7 @@ def test_nothing_leads_to_it_but_its_name():
 
 async def test_a_module_that_does_not_answer_delays_no_other_modules_stop(session):
     with pytest.raises(NoAnswer):
-        await say(session, "@slide:9 ROR 0, 5")
+        await say(session, "@slide:9 MST 0")
     forms = stop_forms(session.buses["slide"].roster)
     at_once = list(itertools.takewhile(lambda piece: piece.quiet < 0.1, forms.repeats))
     assert {forms.immediate[0], *(piece.data[0] for piece in at_once)} == {1, 7, 9}
