@@ -28,6 +28,7 @@ from multidrop.drives.conversations import ASKING, Conversation, Conversations, 
 from multidrop.drives.events import Changed, Outcome, Transaction
 from multidrop.drives.link import Link
 from multidrop.drives.motion_record import MotionRecord
+from multidrop.drives.motion_record import Running as Running
 from multidrop.drives.port_journal import GLOBAL
 from multidrop.drives.protected_units import Values, protection, silent
 from multidrop.transports import TransportLost
@@ -106,16 +107,6 @@ class Judged:
         if not velocity:
             self.still = [*earlier[-1:], *self.still[len(earlier) :], at]
         return Seen(at, velocity, tuple(velocities), transmitted_at, earlier[-1] if earlier else float("-inf"))
-
-
-@dataclass(frozen=True)
-class Running:
-    """The last reading of a drive's programs."""
-
-    at: float
-    """When it was requested, s of the link's clock."""
-    runs: bool
-    """Whether one runs, which can move the drive again."""
 
 
 Check = Callable[["Drive"], Procedure[None]]
@@ -433,8 +424,7 @@ class Drive:
 
     def _program_read(self, at: float, runs: bool) -> None:
         self.running = Running(at, runs)
-        if runs:
-            self.motions.runs()
+        self.motions.runs(runs)
 
     async def run(self, procedure: Procedure[T]) -> T:
         return await awaited(lambda over: self.start(procedure, over))
