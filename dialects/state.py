@@ -53,6 +53,27 @@ class Remembered:
     em: int
 
 
+class ErrorsRead:
+    """The numbers of the errors that were read of a drive, which cleared them, and whether one may be of a motion."""
+
+    def __init__(self) -> None:
+        self.count = 0
+        self.moving = False
+        """A motion was begun whose end was not judged yet."""
+        self._last: tuple[int, ...] = ()
+
+    def add(self, code: int) -> None:
+        self._last, self.count = (*self._last[1 - KEPT_ERRORS :], code), self.count + 1
+
+    def since(self, count: int) -> tuple[int, ...]:
+        """The numbers that were read since `count` had this value, newest last, as far as they are kept."""
+        return self._last[-(self.count - count) :] if self.count > count else ()
+
+    def motion(self, begun: bool) -> None:
+        """Record that a motion was begun, or that the end of all that were begun is judged."""
+        self.moving = begun
+
+
 @dataclass(eq=False)
 class DriveState:
     """One drive: its codec, its identity, and what is uncertain about it."""
@@ -75,12 +96,8 @@ class DriveState:
     """The number of the last error that was read of it, which cleared it; 0: none was read."""
     last_error_at: float = -math.inf
     """When that was, s; infinite until the conversation that has read it goes on."""
-    errors: tuple[int, ...] = ()
-    """The numbers of the last errors that were read of it, newest last."""
-    errors_read: int = 0
-    """How many were read in all."""
-    moved: bool = False
-    """A motion was begun whose end was not judged yet: an error may be of that motion."""
+    errors: ErrorsRead = field(default_factory=ErrorsRead)
+    """The errors that were read of it."""
     reply_pending: bool = False
     """A reply is outstanding and may arrive late; the next reply must be distinguished from it."""
     settings_unknown: bool = False
@@ -171,18 +188,7 @@ class DriveState:
         self.error = flag
         if code:
             self.last_error, self.last_error_at = code, math.inf
-            self.errors, self.errors_read = (*self.errors[1 - KEPT_ERRORS :], code), self.errors_read + 1
-
-    def errors_since(self, count: int) -> tuple[int, ...]:
-        """The numbers of errors that were read since `errors_read` was `count`, as far as they are kept."""
-        new = self.errors_read - count
-        return self.errors[-new:] if new else ()
-
-    def motion_begun(self) -> None:
-        self.moved = True
-
-    def motion_judged(self) -> None:
-        self.moved = False
+            self.errors.add(code)
 
     def date_error(self, now: float) -> None:
         """Give an error that was just read its time: a conversation has no clock."""

@@ -398,8 +398,7 @@ class Drive:
 
     def _program_read(self, at: float, runs: bool) -> None:
         self.running = Running(at, runs)
-        if runs:
-            self.motions.runs()
+        self.motions.runs(runs)
 
     async def run(self, procedure: Procedure[T], typed: bool = False) -> T:
         return await awaited(lambda over: self.start(procedure, over, typed))

@@ -27,7 +27,7 @@ class Course:
     by: Sequence
     before: Signs
     errors: int
-    """`DriveState.errors_read` as it began."""
+    """`DriveState.errors.count` as it began."""
     program: bool = False
     """A program was started since, or seen to run."""
     stopped: bool = False
@@ -117,10 +117,10 @@ class MotionRecord:
         for course in self.open_of(by):
             course.ending = Ending(Outcome.STOPPED, course.move.axis, target=course.move.target)
 
-    def runs(self) -> None:
-        """Record that a program was seen to run."""
+    def runs(self, seen: bool = True) -> None:
+        """Record whether a program was seen to run, or was started."""
         for course in self._all():
-            course.program = True
+            course.program = course.program or seen
 
     def of(self, by: Sequence) -> list[Course]:
         """The last motion of a sequence on each axis."""

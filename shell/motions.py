@@ -78,7 +78,7 @@ class _Before:
     """The motions of a drive before a line."""
 
     def __init__(self, drive: Drive, courses: Courses, suspects: list[Course]) -> None:
-        self.drive, self.courses, self.suspects, self.errors = drive, courses, suspects, drive.state.errors_read
+        self.drive, self.courses, self.suspects, self.errors = drive, courses, suspects, drive.state.errors.count
 
 
 class _Line:
@@ -166,10 +166,10 @@ class _Line:
             place = None if move.relative is None else motions.place(signs, move.axis)
             if place is not None and move.relative is not None:
                 move = replace(move, target=place + move.relative)
-            courses.append(Course(move, self.by, signs, state.errors_read))
+            courses.append(Course(move, self.by, signs, state.errors.count))
         drive.motions.begin(courses)
         if courses:
-            state.motion_begun()
+            state.errors.motion(True)
 
     def _judged_before(self, drive: Drive) -> Procedure[None]:
         """Judge the motions of this sequence whose error the next line would clear. Raises MotionFailed."""
@@ -182,7 +182,7 @@ class _Line:
         """Judge the motions of this sequence of which an error was read with the line. Raises MotionFailed."""
         for each in before:
             drive = each.drive
-            if any(map(_motions(drive).fails, drive.state.errors_since(each.errors))):
+            if any(map(_motions(drive).fails, drive.state.errors.since(each.errors))):
                 for course in each.suspects:
                     failed = await drive.run(_sign_of(drive, course)) if course.open else None
                     if failed is not None:
@@ -206,13 +206,13 @@ def _sign_of(drive: Drive, course: Course) -> Procedure[Ending | None]:
 
 
 def _evidence(drive: Drive, course: Course) -> Evidence:
-    return course.evidence(drive.state.errors_since(course.errors))
+    return course.evidence(drive.state.errors.since(course.errors))
 
 
 def _judged(drive: Drive, course: Course, found: Ending) -> Ending:
     ending = course.judged(found)
     if not drive.motions.any_open:
-        drive.state.motion_judged()
+        drive.state.errors.motion(False)
     return ending
 
 
@@ -243,7 +243,7 @@ class Watch:
                 motions, state = _motions(drive), drive.state
                 signs = await drive.run(motions.signs(state))
                 self._signs[drive] = await drive.run(motions.old(state, signs, False))
-                self._errors[drive] = state.errors_read
+                self._errors[drive] = state.errors.count
 
     async def judge(self, drive: Drive) -> bool:
         """Judge the motions of a drive that is at rest; False: one is not over yet. Raises MotionFailed."""
@@ -276,7 +276,7 @@ class Watch:
             return [each.ending for each in mine if each.ending is not None]
         motions, state = _motions(drive), drive.state
         signs = self._signs.get(drive, NO_SIGNS)
-        evidence = Evidence(None, signs, state.errors_since(self._errors.get(drive, state.errors_read)))
+        evidence = Evidence(None, signs, state.errors.since(self._errors.get(drive, state.errors.count)))
         endings: list[Ending] = []
         if motions is NO_MOTIONS:
             return endings

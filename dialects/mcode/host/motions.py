@@ -158,10 +158,10 @@ def _judge(access: Access[S], state: S, evidence: Evidence) -> Procedure[Ending 
     codes = [code for code in evidence.errors if code in errors.BY_ITSELF]
     if found.get("EF") and not before.get("EF"):
         state.error_flag_read(True)
-        count = state.errors_read
+        count = state.errors.count
         if program and (yield from access.handles_errors(state)):
             return ending
-        listed = state.errors_since(count)  # the list has reported it, and cleared it
+        listed = state.errors.since(count)  # the list has reported it, and cleared it
         code = listed[-1] if listed else (yield from access.error(state))
         if code is None:
             return replace(ending, outcome=Outcome.UNKNOWN, reason="an error is set, and its number could not be read")
