@@ -16,6 +16,7 @@ from multidrop.transports import TransportLost
 ROUTINE = "its OE routine may have started"
 LIMIT = 1.0
 """The longest time for these readings, s."""
+TRIES = 2
 RECENT = 1.0
 """The greatest age of a reading of a drive that moves, s."""
 LOST = (TimeoutError, DriveError, TransportLost)
@@ -72,10 +73,12 @@ async def look_before(drive: Drive, text: str) -> None:
     """Read what a drive does before a line that it may refuse, where that is not known. Raises Stopped."""
     if drive.family.vouched(text, drive.product) or known_active(drive) is not None or drive.missing:
         return
-    try:
-        async with asyncio.timeout(LIMIT):
-            await active(drive)
-    except Stopped:
-        raise
-    except LOST:
-        return
+    for _ in range(TRIES):  # noise may have damaged a reply, and asking again changes nothing
+        try:
+            async with asyncio.timeout(LIMIT):
+                await active(drive)
+            return
+        except Stopped:
+            raise
+        except LOST:
+            continue
