@@ -187,6 +187,9 @@ class Workspace(Channel):
         if not self.buses:
             raise Diagnostic("nothing is open", hint="/open URL opens a line of drives")
         found = self.buses.get(name or self.selected_bus)
+        if found is None and not name and not self.opening:
+            hint = f"/use selects one: {', '.join(self.buses)}"
+            raise Diagnostic("no bus is selected since the selected one was closed", hint=hint)
         if found is None and not name:
             raise Diagnostic("no bus is ready yet", hint=f"{', '.join(self.buses)} is being opened")
         if found is None:

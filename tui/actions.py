@@ -14,6 +14,7 @@ from textual.widgets import Input, TextArea
 
 from multidrop.tui.assist import Assist
 from multidrop.tui.keymap import Keymap
+from multidrop.tui.leaving import Leaving
 from multidrop.tui.outbox import ended
 from multidrop.tui.palette import LATELY, PADDING, PALETTE, Command, all_commands, commands_like, entries, ordered
 from multidrop.tui.palette import found as help_on
@@ -49,6 +50,7 @@ class Parts(Host):
     opener: Opener
     tour: Tour
     signs: SignFilter
+    leaving: Leaving
     recent: list[str] = field(default_factory=list)
     """The actions of the commands used lately, the last one first."""
     mouse_on: bool = True

@@ -36,6 +36,7 @@ from multidrop.tui.assist import Assist
 from multidrop.tui.frame_scheduler import AGEING, Frames
 from multidrop.tui.key_table import bound
 from multidrop.tui.keymap import FunctionKeys, keymap
+from multidrop.tui.leaving import Leaving
 from multidrop.tui.outbox import Outbox
 from multidrop.tui.panels.view import figures_at, name_at
 from multidrop.tui.polling import Polling
@@ -115,9 +116,14 @@ class MultidropApp(Dressed):
             session, self.main, self.assist, self.outbox, self.selection, self.unsent, self.keyboard, self.questions
         )
         self.texts = Texts(self.assist.drafts())
+        self.leaving = Leaving(
+            self, session, self.keyboard, self.outbox, self.questions, self.stop_all, self._unsaved, self._warn
+        )
         self._inbox: list[SessionEvent] = []
         self._unsubscribe = session.subscribe(self._receive)
         self._stops = session.stops
+        self.stops_to_the_end = False
+        """The reading of the terminal goes on after the app, until `release`: the stop key works until then."""
         self._own_task: asyncio.Task[Any] | None = None
         self._is_composed = False
         """The main screen has its parts: they can be painted."""
@@ -152,6 +158,7 @@ class MultidropApp(Dressed):
             self.opener,
             self.tour,
             self.signs,
+            self.leaving,
         )
         self.act = Actions(parts)
         self._action_targets |= {"act"}
@@ -267,9 +274,17 @@ class MultidropApp(Dressed):
         self._unsubscribe()
         self.polling.end()
 
+    def release(self) -> list[str]:
+        """Give the terminal back, at the end of the process. Name what was typed and not sent, in lines for it."""
+        release = getattr(self._driver, "release", None)
+        if release is not None:
+            release()
+        return self.leaving.named()
+
     def interrupted(self) -> None:
         """Stop what automation moves, and end: a signal came, or the terminal is gone."""
         self.session.interrupt()
+        self.leaving.accept()
         self.exit(INTERRUPTED)
 
     # Frames
@@ -331,7 +346,9 @@ class MultidropApp(Dressed):
     def _look_again(self) -> None:
         """Read buses, drives, selection, macros and the latch again: any may have changed."""
         if self.session.quitting:
-            self.exit(0)
+            if not self.leaving.over:
+                self.leaving.accept()
+                self.exit(0)
             return
         self.selection.catch_up()
         if self.session.selected_bus not in self.main.pages:
@@ -411,8 +428,10 @@ class MultidropApp(Dressed):
         self.stop_all()
 
     async def action_quit(self) -> None:
-        unsaved = [text.name for text in self.texts.unsaved()]
-        await self.questions.quit(lambda: self.outbox.waiting, self.stop_all, unsaved)
+        await self.leaving.key()
+
+    def _unsaved(self) -> list[str]:
+        return [text.name for text in self.texts.unsaved()]
 
 
 def bindings() -> list[BindingType]:

@@ -68,6 +68,7 @@ def join(where: str) -> int:
                 return await show(app)
             finally:
                 await app.session.close()
+                _release(app)
 
         try:
             return asyncio.run(body())
@@ -83,6 +84,7 @@ async def _run(urls: Sequence[str], settings: Settings, reconnect: bool, raw: bo
 
     session = Session(settings, reconnect=reconnect, raw=raw)
     session.twins.wanted = twin
+    app: MultidropApp | None = None
     try:
         with collected_at_rest(partial(at_rest, session)):
             app = MultidropApp(session, urls, Assist(session, settings), driver(), settings.look)
@@ -94,6 +96,8 @@ async def _run(urls: Sequence[str], settings: Settings, reconnect: bool, raw: bo
     finally:
         await _leave(session)
         await session.close()
+        if app is not None:
+            _release(app)
 
 
 def _sharing(app: MultidropApp, settings: Settings) -> AbstractContextManager[object]:
@@ -118,7 +122,7 @@ async def _leave(session: Session) -> None:
     if not session.automations.was_interrupted:
         session.interrupt()
     await session.automations.over(lambda text: write(sys.stderr, text))
-    halts = session.automations.interrupted
+    halts, stops = session.automations.interrupted, session.stops
     if halts or session.latched or session.busy:
         await settled(session)
     with nonblocking() as streams:
@@ -127,10 +131,24 @@ async def _leave(session: Session) -> None:
         if session.latched:
             write(sys.stderr, f"stop: {stop_report.words(session.tally())}")
         await finish(streams, lambda: True)
+        while stops != session.stops:  # the key came after the screen was gone
+            stops = session.stops
+            await settled(session)
+            write(sys.stderr, f"stop: {stop_report.words(session.tally())}")
+            await finish(streams, lambda: True)
+
+
+def _release(app: MultidropApp) -> None:
+    """Give the terminal back, at the very end: until then the stop key works. Name what was typed and not sent."""
+    from multidrop.shell.streams.stdout import write
+
+    for line in app.release():
+        write(sys.stderr, line)
 
 
 async def show(app: MultidropApp) -> int:
     """Run an app until it ends; return its exit code, 1 if it crashed."""
+    app.stops_to_the_end = True
     # On a hang-up, or another signal that ends a process, stop what automation moves, then end the app.
     loop = asyncio.get_running_loop()
     for number in SIGNALS:

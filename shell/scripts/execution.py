@@ -272,6 +272,8 @@ class Execution:
             await self.session.run(place.pinned(reported.sent) if place else reported.sent, frame.by)
             if place is not None:
                 place.passed(reported.sent)
+        if self._quits and line.where:
+            self.session.notify(f"{line.where}: it quits here, and nothing after this line is executed", warning=True)
 
     async def _own(self, line: ScriptLine, frame: Frame, work: Work[T], counts: bool = False) -> T:
         """Execute a verb of scripts. One that only steers has a result only where it fails; any other one `counts`."""

@@ -302,6 +302,10 @@ class FakeSession:
     async def in_motion(self) -> list[str]:
         return self.moves
 
+    def quit(self) -> None:
+        self.quitting = True
+        self.emit(StateChanged(self.time))
+
     def resume(self) -> None:
         self.latched = False
         self.emit(StateChanged(self.time))
