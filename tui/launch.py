@@ -64,6 +64,7 @@ def join(where: str) -> int:
             from multidrop.tui.watching import watch
 
             app = watch(connection, name, early, settings, driver())
+            app.stops_to_the_end = True
             try:
                 return await show(app)
             finally:
@@ -88,6 +89,7 @@ async def _run(urls: Sequence[str], settings: Settings, reconnect: bool, raw: bo
     try:
         with collected_at_rest(partial(at_rest, session)):
             app = MultidropApp(session, urls, Assist(session, settings), driver(), settings.look)
+            app.stops_to_the_end = True
             begin(session)
             if swallows():
                 session.doubted = stop_key_trial(session)
@@ -148,7 +150,6 @@ def _release(app: MultidropApp) -> None:
 
 async def show(app: MultidropApp) -> int:
     """Run an app until it ends; return its exit code, 1 if it crashed."""
-    app.stops_to_the_end = True
     # On a hang-up, or another signal that ends a process, stop what automation moves, then end the app.
     loop = asyncio.get_running_loop()
     for number in SIGNALS:
@@ -156,7 +157,10 @@ async def show(app: MultidropApp) -> int:
     if sys.platform != "win32":
         loop.add_signal_handler(signal.SIGHUP, _hung_up, app)
     await app.run_async()
-    return 1 if app.return_value is None else app.return_value
+    if app.return_value is None:
+        app.boundary.end()
+        return 1
+    return app.return_value
 
 
 def driver() -> type[Driver]:

@@ -173,9 +173,7 @@ async def test_for_a_person_closing_the_selected_bus_selects_another(both):
 
 async def test_a_line_after_the_close_of_the_selected_bus_goes_to_no_other_one(both):
     await both.run("/close press")
-    with pytest.raises(
-        Diagnostic, match="no bus is selected since the selected one was closed; /use selects one: eth"
-    ):
+    with pytest.raises(Diagnostic, match="no bus is selected since the selected one was closed; /use selects one: eth"):
         await both.run("SL 200000")
     assert both.written("eth") == b""
     await both.run("/use eth")
