@@ -174,7 +174,12 @@ class _Poller(Generic[Thing]):
             due.at = now + self.retry
             return self._set_timer(now)
         due.at = max(due.at + self.periods[thing], now)
-        self._begin(thing, due, drive)
+        trouble: list[str] = []
+        with isolated(f"polling {thing} on {self._link.name}", trouble):
+            self._begin(thing, due, drive)
+        if trouble:
+            self._busy = False
+            self._put_off(thing, due, FAILED.format(trouble[0]))
 
     def _held_up(self, now: float) -> float:
         """Seconds for which the next poll of a party line waits after a print. What people ask for never waits.
@@ -246,9 +251,15 @@ class _Poller(Generic[Thing]):
         with isolated(what, trouble):
             yield
         if trouble:
-            due.at = self._link.now() + AFTER_DEFECT
-            drive = self._drive(thing)
-            self._link.notify(f"{drive.shown}: {report.format(trouble[0])}", drive.address, warning=True)
+            self._put_off(thing, due, report.format(trouble[0]))
+        else:
+            self._set_timer(self._link.now())
+
+    def _put_off(self, thing: Thing, due: _Due, report: str) -> None:
+        """Report a defect, and read the thing again after a pause."""
+        due.at = self._link.now() + AFTER_DEFECT
+        drive = self._drive(thing)
+        self._link.notify(f"{drive.shown}: {report}", drive.address, warning=True)
         self._set_timer(self._link.now())
 
     def _back_off(self, due: _Due) -> None:

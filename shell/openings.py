@@ -186,10 +186,12 @@ class Openings:
         searching = Scanning(workspace, beside, connection, lambda found: workspace.output(found.words()))
         url = ""
         try:
+            record.searched = True
             await workspace.reconnections.remove(bus.name)
             await bus.link.detach(TransportLost(f"{bus.name} is being searched for drives"))
             await searching.run([], False)
         finally:
+            record.searched = False
             if bus.name in workspace.buses:
                 if searching.found:
                     url, before = url_of(searching.found), connection

@@ -39,6 +39,8 @@ from multidrop.shell.openings import Failed as OpeningFailed
 from multidrop.shell.openings import Openings
 from multidrop.shell.operations.table import find
 from multidrop.shell.playing import played_by
+from multidrop.shell.quitting import ENDING as QUITTING
+from multidrop.shell.quitting import EVEN_NOW, Unanswered
 from multidrop.shell.raw import RawLine, text_of
 from multidrop.shell.sending import sending
 from multidrop.shell.twins.twins import Twins
@@ -100,6 +102,7 @@ class Session(Workspace):
         """
         super().__init__(settings or Settings(), reconnect)
         self.automations, self.twins = Automations(self), Twins(self, partial(_apart, self))
+        self.unanswered = Unanswered()
         self.path = LinePath(self)
         self.openings = Openings(self, opener or partial(open_buses, state=self.settings.state), lazy, raw, tried)
         self._background: dict[asyncio.Task[Any], None] = {}
@@ -170,12 +173,15 @@ class Session(Workspace):
             try:
                 if since is not None and since != self.stops:
                     raise Stopped(f"a stop came after '{typed.strip()}' was typed; it was not sent")
+                if self.quitting and by is By.OPERATOR and typed.strip() != EVEN_NOW:
+                    raise Diagnostic(f"{QUITTING}, so '{typed.strip()}' was not sent")
                 parsed = _raw_line(self, line) or (parse(line) if isinstance(line, str) else line)
                 if isinstance(parsed, DriveLine):
                     parsed = self.path.meant(parsed, by)
                 if isinstance(parsed, DriveLine):
                     target = parsed
-                    await self.path.text(parsed, by)
+                    with self.unanswered.sending(typed):
+                        await self.path.text(parsed, by)
                 elif parsed is not None:
                     await self.path.verb(parsed, by)
             except FAILURES as failure:
@@ -228,12 +234,19 @@ class Session(Workspace):
         self.questions.open.cancel()
 
     async def in_motion(self) -> list[str]:
-        """A line for each drive that moves or may move; takes two seconds at most, once what was stopped has ended."""
+        """A line for each drive that moves or may move, and for each line that was sent and is not answered in time.
+
+        It waits until what was stopped has ended and what was sent is answered, for the time-outs of the lines at
+        most, and then reads for two seconds at most. A line whose question is open is not sent yet.
+        """
         await self.tasks.stopped(ENDING)
-        return await in_motion(self)
+        late: list[str] = []
+        if not self.questions.open.busy:
+            late = await self.unanswered.answered(max((bus.line.timeout for bus in self.buses.values()), default=0.0))
+        return [*late, *await in_motion(self)]
 
     def quit(self) -> None:
-        """Ask the front end to end; drives go on as they are."""
+        """Ask the front end to end; drives go on as they are. No line of a person is sent from here on."""
         self.quitting = True
         self.changed()
 

@@ -57,7 +57,7 @@ class OpenBus:
     bus: Bus
     opened: Opened
     connection: Connection | None
-    """Its URL; None: a search opened it."""
+    """Its URL; None: a search opened it, or it mirrors one of another screen."""
     in_cell: str
     """The name that a simulated bus has in its cell."""
     place: float
@@ -65,6 +65,10 @@ class OpenBus:
     unwatch: Callable[[], None]
     doubt: str = ""
     """The error of the configuration that took its names, units or guards; it is read only until a person agrees."""
+    probe: bool = False
+    """A search has opened it for a moment, so that a stop reaches it; a person did not."""
+    searched: bool = False
+    """Its port is being searched for drives, by a search that has taken it over."""
     port: str = ""
     """The name of its port, the same in every session; empty for a simulated one."""
     selected: Drive | None = None
@@ -172,6 +176,15 @@ class Workspace(Channel):
         return self._open[bus]
 
     @property
+    def shown(self) -> list[Bus]:
+        """The buses that a person has opened, in their order; a search opens others for a moment."""
+        return [bus for bus, each in self._open.items() if not each.probe]
+
+    def missing(self, bus: Bus) -> bool:
+        """True if a bus is lost; while its port is searched for drives it is not."""
+        return bus.lost is not None and not self._open[bus].searched
+
+    @property
     def raw(self) -> dict[str, RawLine]:
         """The buses in raw mode, by name."""
         return {bus.name: each.raw for bus, each in self._open.items() if each.raw is not None}
@@ -187,6 +200,9 @@ class Workspace(Channel):
         if not self.buses:
             raise Diagnostic("nothing is open", hint="/open URL opens a line of drives")
         found = self.buses.get(name or self.selected_bus)
+        if found is None and not name and not self.opening:
+            hint = f"/use selects one: {', '.join(self.buses)}"
+            raise Diagnostic("no bus is selected since the selected one was closed", hint=hint)
         if found is None and not name:
             raise Diagnostic("no bus is ready yet", hint=f"{', '.join(self.buses)} is being opened")
         if found is None:

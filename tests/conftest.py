@@ -21,6 +21,7 @@ from multidrop.drives.line import Finished, Line, Write
 from multidrop.simulator.cell.spec import Faults
 from multidrop.simulator.cells import read
 from multidrop.simulator.floor import Floor
+from multidrop.tui import boundary
 from tests.support.faults import disturb
 from tests.support.procedure import ProcedureRunner
 
@@ -30,6 +31,9 @@ pytest_plugins = [
     "tests.support.front_door",
     "tests.support.served_cell",
 ]
+
+boundary.RAISES = True
+# A defect of the screen fails the test that meets it.
 
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 sys.dont_write_bytecode = False

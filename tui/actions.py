@@ -14,8 +14,10 @@ from textual.widgets import Input, TextArea
 
 from multidrop.macros import Macro
 from multidrop.shell.line_syntax import showing
+from multidrop.shell.session import Session
 from multidrop.tui.assist import Assist
 from multidrop.tui.keymap import Keymap
+from multidrop.tui.leaving import Leaving
 from multidrop.tui.outbox import ended
 from multidrop.tui.palette import LATELY, PADDING, PALETTE, Command, all_commands, commands_like, entries, ordered
 from multidrop.tui.palette import found as help_on
@@ -37,6 +39,11 @@ HELP = "Help"
 CTRL_C = "Ctrl+Q quits, Ctrl+X stops all drives"
 
 
+def names_of(session: Session) -> list[str]:
+    """The names of the buses that have tabs."""
+    return [bus.name for bus in session.shown]
+
+
 @dataclass
 class Parts(Host):
     """The parts of one app that its actions work on."""
@@ -51,6 +58,7 @@ class Parts(Host):
     opener: Opener
     tour: Tour
     signs: SignFilter
+    leaving: Leaving
     recent: list[str] = field(default_factory=list)
     """The actions of the commands used lately, the last one first."""
     mouse_on: bool = True
@@ -146,7 +154,7 @@ class Actions:
         parts, beside = self._parts, self._parts.main.beside
         if not beside.display:
             drives, _ = drive_choices(parts.session, partial(glances_of, parts.session, parts.model))
-            lines = [Offer(f"{name}\n", f" {name:<8} all of the line") for name in parts.session.buses]
+            lines = [Offer(f"{name}\n", f" {name:<8} all of the line") for name in names_of(parts.session)]
             if lines:
                 halves = Choose("The other half shows", [*drives, *lines])
                 await parts.questions.open(halves, lambda key: self._show_half(*place_of(key)))
@@ -184,13 +192,13 @@ class Actions:
 
     def action_bus(self, step: int) -> None:
         """Show the next bus, or the one before."""
-        names, selected = list(self._parts.session.buses), self._parts.session.selected_bus
+        names, selected = names_of(self._parts.session), self._parts.session.selected_bus
         if names:
             at = names.index(selected) if selected in names else 0
             self._parts.selection.select("", names[(at + step) % len(names)])
 
     def action_bus_number(self, number: int) -> None:
-        names = list(self._parts.session.buses)
+        names = names_of(self._parts.session)
         if number <= len(names):
             self._parts.selection.select("", names[number - 1])
 

@@ -13,29 +13,36 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any, ClassVar
 
 from rich.console import RenderableType
 from textual import events
 from textual._compositor import ChopsUpdate, LayoutUpdate
+from textual._context import active_message_pump
 from textual.binding import BindingType
+from textual.dom import DOMNode
 from textual.driver import Driver
 from textual.geometry import Size
 from textual.message import Message
 from textual.screen import Screen
+from textual.widget import Widget
+from textual.widgets import Static
 
 from multidrop.dialects import Diagnostic
 from multidrop.drives.events import Unsolicited
 from multidrop.shell.configuration import DEFAULT_LOOK, Look
 from multidrop.shell.events import Failed, OnBus, Printed, SessionEvent, StateChanged
 from multidrop.shell.session import Session
+from multidrop.tui import boundary
 from multidrop.tui.actions import Actions, Parts
 from multidrop.tui.assist import Assist
+from multidrop.tui.boundary import Boundary
 from multidrop.tui.frame_scheduler import AGEING, Frames
 from multidrop.tui.key_table import bound
 from multidrop.tui.keymap import FunctionKeys, keymap
+from multidrop.tui.leaving import Leaving
 from multidrop.tui.outbox import Outbox
 from multidrop.tui.panels.view import figures_at, name_at
 from multidrop.tui.polling import Polling
@@ -91,9 +98,11 @@ class MultidropApp(Dressed):
         self.session, self.urls, self.assist = session, list(urls), assist
         figures, named = partial(figures_at, session), partial(name_at, session)
         self.model = model or ScreenModel(lambda: session.selected_bus, lambda: session.buses, figures, named)
+        self.boundary = Boundary(session.settings.state, self._tell_defect)
+        self._end_boundary: Callable[[], None] = lambda: None
         self.polling, self.macros = Polling(), FunctionKeys()
         self.keymap = keymap(bindings(), look.keys)
-        self.presenter = Presenter(session, self.model, self.polling, self.macros, self.keymap)
+        self.presenter = Presenter(session, self.model, self.polling, self.macros, self.keymap, self.boundary)
         self.main = MainScreen(
             self.assist.complete,
             self.assist.history,
@@ -115,9 +124,14 @@ class MultidropApp(Dressed):
             session, self.main, self.assist, self.outbox, self.selection, self.unsent, self.keyboard, self.questions
         )
         self.texts = Texts(self.assist.drafts())
+        self.leaving = Leaving(
+            self, session, self.keyboard, self.outbox, self.questions, self.stop_all, self._unsaved, self._warn
+        )
         self._inbox: list[SessionEvent] = []
         self._unsubscribe = session.subscribe(self._receive)
         self._stops = session.stops
+        self.stops_to_the_end = False
+        """The reading of the terminal goes on after the app, until `release`: the stop key works until then."""
         self._own_task: asyncio.Task[Any] | None = None
         self._is_composed = False
         """The main screen has its parts: they can be painted."""
@@ -152,6 +166,7 @@ class MultidropApp(Dressed):
             self.opener,
             self.tour,
             self.signs,
+            self.leaving,
         )
         self.act = Actions(parts)
         self._action_targets |= {"act"}
@@ -232,7 +247,9 @@ class MultidropApp(Dressed):
     # Life
 
     def on_mount(self) -> None:
+        self._end_boundary = self.boundary.look_at(asyncio.get_running_loop())
         self.set_interval(AGEING, self.frames.age)
+        self.set_interval(AGEING, self._try_again)
 
     async def on_ready(self) -> None:
         """Open what was named, or ask. The main screen exists: keys that were typed before count from here on."""
@@ -266,11 +283,57 @@ class MultidropApp(Dressed):
         self.texts.flush()
         self._unsubscribe()
         self.polling.end()
+        self._end_boundary()
+
+    def release(self) -> list[str]:
+        """Give the terminal back, at the end of the process. Name what was typed and not sent, in lines for it."""
+        release = getattr(self._driver, "release", None)
+        if release is not None:
+            release()
+        return self.leaving.named()
 
     def interrupted(self) -> None:
         """Stop what automation moves, and end: a signal came, or the terminal is gone."""
         self.session.interrupt()
+        self.leaving.accept()
         self.exit(INTERRUPTED)
+
+    # Defects
+
+    async def _dispatch_message(self, message: Message) -> None:
+        """Handle a message of the app's own queue, which goes on whatever a handler raises."""
+        if not self._is_composed:
+            await super()._dispatch_message(message)
+            return
+        with self.boundary.at(f"the screen, {type(message).__name__}"):
+            await super()._dispatch_message(message)
+
+    def _register_child(self, parent: DOMNode, child: Widget, before: int | None, after: int | None) -> None:
+        self.boundary.guard(child)
+        super()._register_child(parent, child, before, after)
+
+    def _handle_exception(self, error: Exception) -> None:
+        """Take a defect that Textual reports: of a timer, a worker, a composition, a layout. See `tui.boundary`."""
+        if boundary.RAISES or not self._is_composed:
+            super()._handle_exception(error)
+            return
+        widget = active_message_pump.get(None)
+        text = self.boundary.caught(f"{type(widget).__name__}, {getattr(widget, 'id', None) or 'a part'}", error)
+        if isinstance(widget, Widget) and widget.is_attached and not widget.children and isinstance(widget, Screen):
+            widget.mount(Static(text, markup=False))  # it could not be composed
+
+    def _tell_defect(self, text: str) -> None:
+        self.show_line(text, "x")
+        if self.screen_stack and isinstance(self.screen, Over):
+            self.screen.tell(text)
+
+    def _try_again(self) -> None:
+        """Render widgets again that could not be rendered: the cause may be gone."""
+        if self.boundary.failing:
+            for screen in self.screen_stack:
+                screen.refresh()
+                for widget in screen.query("*"):
+                    widget.refresh()
 
     # Frames
 
@@ -287,14 +350,18 @@ class MultidropApp(Dressed):
         if show is None or self._batch_count or not isinstance(renderable, ChopsUpdate | LayoutUpdate):
             super()._display(screen, renderable)
             return
-        if self._running and not self._closed and self._driver is not None:
-            cursor = self.screen.outer_size.clamp_offset(self.cursor_position)
-            if drawn := show(renderable, self.size, cursor):
-                self._begin_update()
-                self._driver.write(drawn)
-                self._end_update()
-                self._driver.flush()
-        self.post_display_hook()
+        with self.boundary.at("what is drawn") as attempt:
+            if self._running and not self._closed and self._driver is not None:
+                cursor = self.screen.outer_size.clamp_offset(self.cursor_position)
+                if drawn := show(renderable, self.size, cursor):
+                    self._begin_update()
+                    self._driver.write(drawn)
+                    self._end_update()
+                    self._driver.flush()
+        if attempt.trouble:
+            super()._display(screen, renderable)  # without the canvas: slower, and shown all the same
+        else:
+            self.post_display_hook()
 
     def terminal_ready(self) -> None:
         """Paint what waits for the terminal, which has swallowed the last frame."""
@@ -308,30 +375,37 @@ class MultidropApp(Dressed):
         """Paint new records, and all else if `panels`; return whether the terminal takes it."""
         inbox, self._inbox[:] = self._inbox[:], []
         for event in inbox:
-            self.model.take(event)
+            with self.boundary.at("what has happened"):
+                self.model.take(event)
         if not self._is_composed:
             return False
         if self.model.changed:
             self.model.changed = False
-            self._look_again()
+            with self.boundary.at("what is open"):
+                self._look_again()
         elif panels:
             self._poll()
-        self.presenter.take_records(self.main)
+        with self.boundary.at("the transcripts"):
+            self.presenter.take_records(self.main)
         ready = getattr(self._driver, "ready", None)
         if ready is not None and not ready():
             return False
         page = next((each for each in self.screen_stack if isinstance(each, Page) and each.is_running), None)
         self.presenter.paint(self.main, self.session.now(), panels, page)
         if panels:
-            show_rows(self.main.lines("tour"), self.tour.rows(self.size.width) if self.tour.on else [])
-            self.typist.show_hint()
+            with self.boundary.at("the tour"):
+                show_rows(self.main.lines("tour"), self.tour.rows(self.size.width) if self.tour.on else [])
+            with self.boundary.at("the hint"):
+                self.typist.show_hint()
             self._raise_banner()
         return True
 
     def _look_again(self) -> None:
         """Read buses, drives, selection, macros and the latch again: any may have changed."""
         if self.session.quitting:
-            self.exit(0)
+            if not self.leaving.over:
+                self.leaving.accept()
+                self.exit(0)
             return
         self.selection.catch_up()
         if self.session.selected_bus not in self.main.pages:
@@ -347,10 +421,13 @@ class MultidropApp(Dressed):
 
     def _poll(self) -> None:
         page = next((each for each in self.screen_stack if isinstance(each, Page)), None)
-        self.polling.update(self.session, self.model, self.main.wants() if page is None else page.WANTS)
+        with self.boundary.at("the polls"):
+            self.polling.update(self.session, self.model, self.main.wants() if page is None else page.WANTS)
 
     def _raise_banner(self) -> None:
-        row = self.presenter.banner(self.size.width)
+        row = self.boundary.do(
+            "the banner", lambda: self.presenter.banner(self.size.width), lambda text: ((f" {text}", "error"),)
+        )
         for screen in self.screen_stack:
             for part in screen.children:
                 if isinstance(part, Banner):
@@ -412,8 +489,10 @@ class MultidropApp(Dressed):
         self.stop_all()
 
     async def action_quit(self) -> None:
-        unsaved = [text.name for text in self.texts.unsaved()]
-        await self.questions.quit(lambda: self.outbox.waiting, self.stop_all, unsaved)
+        await self.leaving.key()
+
+    def _unsaved(self) -> list[str]:
+        return [text.name for text in self.texts.unsaved()]
 
 
 def bindings() -> list[BindingType]:

@@ -64,10 +64,12 @@ def join(where: str) -> int:
             from multidrop.tui.watching import watch
 
             app = watch(connection, name, early, settings, driver())
+            app.stops_to_the_end = True
             try:
                 return await show(app)
             finally:
                 await app.session.close()
+                _release(app)
 
         try:
             return asyncio.run(body())
@@ -83,9 +85,11 @@ async def _run(urls: Sequence[str], settings: Settings, reconnect: bool, raw: bo
 
     session = Session(settings, reconnect=reconnect, raw=raw)
     session.twins.wanted = twin
+    app: MultidropApp | None = None
     try:
         with collected_at_rest(partial(at_rest, session)):
             app = MultidropApp(session, urls, Assist(session, settings), driver(), settings.look)
+            app.stops_to_the_end = True
             begin(session)
             if swallows():
                 session.doubted = stop_key_trial(session)
@@ -94,6 +98,8 @@ async def _run(urls: Sequence[str], settings: Settings, reconnect: bool, raw: bo
     finally:
         await _leave(session)
         await session.close()
+        if app is not None:
+            _release(app)
 
 
 def _sharing(app: MultidropApp, settings: Settings) -> AbstractContextManager[object]:
@@ -118,7 +124,7 @@ async def _leave(session: Session) -> None:
     if not session.automations.was_interrupted:
         session.interrupt()
     await session.automations.over(lambda text: write(sys.stderr, text))
-    halts = session.automations.interrupted
+    halts, stops = session.automations.interrupted, session.stops
     if halts or session.latched or session.busy:
         await settled(session)
     with nonblocking() as streams:
@@ -127,6 +133,19 @@ async def _leave(session: Session) -> None:
         if session.latched:
             write(sys.stderr, f"stop: {stop_report.words(session.tally())}")
         await finish(streams, lambda: True)
+        while stops != session.stops:  # the key came after the screen was gone
+            stops = session.stops
+            await settled(session)
+            write(sys.stderr, f"stop: {stop_report.words(session.tally())}")
+            await finish(streams, lambda: True)
+
+
+def _release(app: MultidropApp) -> None:
+    """Give the terminal back, at the very end: until then the stop key works. Name what was typed and not sent."""
+    from multidrop.shell.streams.stdout import write
+
+    for line in app.release():
+        write(sys.stderr, line)
 
 
 async def show(app: MultidropApp) -> int:
@@ -138,7 +157,10 @@ async def show(app: MultidropApp) -> int:
     if sys.platform != "win32":
         loop.add_signal_handler(signal.SIGHUP, _hung_up, app)
     await app.run_async()
-    return 1 if app.return_value is None else app.return_value
+    if app.return_value is None:
+        app.boundary.end()
+        return 1
+    return app.return_value
 
 
 def driver() -> type[Driver]:

@@ -19,7 +19,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 from multidrop.shell.line_syntax import Place, pinned
-from multidrop.shell.prompt.line_queue import BURST, LEAVING, Line
+from multidrop.shell.prompt.line_queue import BURST, Line
 from multidrop.shell.session import Session
 from multidrop.tui.panels.view import name_at
 
@@ -52,6 +52,9 @@ class Outbox:
         self._last = 0.0
         self._unsent: list[Line] = []
         """The lines that were last reported as not sent."""
+        self._paused = self._closed = False
+        self.left: list[str] = []
+        """The lines that were not sent as the screen ended."""
 
     @property
     def idle(self) -> bool:
@@ -64,7 +67,7 @@ class Outbox:
 
     def type(self, text: str) -> None:
         line, now = self._line(text), asyncio.get_running_loop().time()
-        if line.verb in LEAVING:
+        if line.leaves(self._session) and not self._closed:
             self._session.start(text, since=line.since)
             return
         burst = self._latest if now - self._last < BURST else None
@@ -86,6 +89,25 @@ class Outbox:
         """Take lines that were not sent, and that a person agreed to send now."""
         self._unsent = []
         self.paste(texts)
+
+    def pause(self) -> None:
+        """Start no line that waits for the one before it: a quit is being decided."""
+        self._paused = True
+
+    def go_on(self) -> None:
+        """Start the lines that have waited for that."""
+        self._paused = False
+        for lane in [*self._lanes]:
+            if lane.running is None and lane.waiting and not lane.failed:
+                self._begin(lane)
+
+    def close(self) -> None:
+        """Send no line from now on; `left` has those that wait, and those that come."""
+        self._closed = True
+        for lane in self._lanes:
+            self.left += [line.text for line in [*lane.held, *lane.waiting]]
+            lane.waiting.clear()
+            lane.held.clear()
 
     def using(self, place: Place) -> bool:
         """True if a `/use` runs that was typed while that drive was selected."""
@@ -114,20 +136,32 @@ class Outbox:
         return lane
 
     def _add(self, lane: Lane, lines: Sequence[Line]) -> None:
+        if self._closed:
+            self.left += [line.text for line in lines]
+            return
         if lane not in self._lanes:
             self._lanes.append(lane)
         lane.waiting.extend(lines)
         if lane.failed:
             self._hold(lane, lane.failed)
-        elif lane.running is None and (task := self._next(lane)) is not None:
+        elif lane.running is None and not self._paused:
+            self._begin(lane)
+
+    def _begin(self, lane: Lane) -> None:
+        """Start the first line that waits in a lane, and then the others in turn."""
+        if (task := self._next(lane)) is not None:
             loop = asyncio.get_running_loop()
             loop.call_soon(lambda: self._watch(self._send(lane, task)))  # after the line is written: it costs 60 us
 
     async def _send(self, lane: Lane, task: asyncio.Task[bool] | None) -> None:
-        """Send the lines that wait in a lane; its first line runs already."""
+        """Send the lines that wait in a lane; its first line runs already. Raises a defect of a line, which failed."""
         while task is not None:
             await asyncio.wait([task])
-            task = self._ended(lane, done=not task.cancelled() and task.result())
+            defect = None if task.cancelled() else task.exception()
+            done = not task.cancelled() and defect is None and task.result()
+            task = self._ended(lane, done)
+            if defect is not None:
+                raise defect
 
     def _next(self, lane: Lane) -> asyncio.Task[bool] | None:
         """Start the next line of a lane; None if it may not be sent."""
@@ -154,7 +188,7 @@ class Outbox:
                 replace(each, place=now) if each.place == line.place else each for each in lane.waiting
             )
         if lane.waiting:
-            return self._next(lane)
+            return None if self._paused else self._next(lane)
         if lane in self._lanes:
             self._lanes.remove(lane)
         return None

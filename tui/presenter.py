@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import partial
 
 from multidrop.drives.bus import Bus
 from multidrop.shell.session import Session
+from multidrop.tui.boundary import Boundary
 from multidrop.tui.key_table import footer
 from multidrop.tui.keymap import FunctionKeys, Keymap
 from multidrop.tui.panels.drive import trouble_of
@@ -30,8 +32,15 @@ class Presenter:
     """Computes the rows of the main screen, and puts them there."""
 
     def __init__(
-        self, session: Session, model: ScreenModel, polling: Polling, macros: FunctionKeys, keys: Keymap
+        self,
+        session: Session,
+        model: ScreenModel,
+        polling: Polling,
+        macros: FunctionKeys,
+        keys: Keymap,
+        boundary: Boundary,
     ) -> None:
+        self.boundary = boundary
         self.session, self.model, self.polling, self.macros, self.keymap = session, model, polling, macros, keys
         self._shown_at = float("-inf")
         self._flooded = False
@@ -45,12 +54,21 @@ class Presenter:
     def view(self, now: float) -> View:
         bus = self.session.buses.get(self.session.selected_bus)
         glances = [] if bus is None else glances_of(self.session, self.model, bus)
-        return View(self.session, self.model, glances, now, self.polling.on, keys=self.keymap, macros=self.macros)
+        return View(
+            self.session,
+            self.model,
+            glances,
+            now,
+            self.polling.on,
+            keys=self.keymap,
+            macros=self.macros,
+            boundary=self.boundary,
+        )
 
     def tabs(self, now: float) -> list[Tab]:
         tabs: list[Tab] = []
-        for number, bus in enumerate(self.session.buses.values(), 1):
-            facts, drives, lost = self.model.buses.get(bus.name), list(bus.drives), bus.lost is not None
+        for number, bus in enumerate(self.session.shown, 1):
+            facts, drives, lost = self.model.buses.get(bus.name), list(bus.drives), self.session.missing(bus)
             state = State.SILENT if bus.silent and not lost else bus_state(facts, drives, lost)
             selected, old = bus.name == self.session.selected_bus, bus_old(facts, drives, now)
             tabs.append(Tab(number, bus.name, state, selected, old, trouble_mark(facts, drives, lost)))
@@ -61,17 +79,22 @@ class Presenter:
 
         `page`: the page that is shown in front of the main screen.
         """
-        self._show_records(main, now)
-        if panels:
-            view = self.view(now)
-            self._paint_frame(main, now)
-            if page is not None:
-                self._paint_frame(page, now)
-                page.show(view)
-                return
-            main.set_label(self.label())
+        with self.boundary.at("the transcript"):
+            self._show_records(main, now)
+        if not panels:
+            return
+        view = self.view(now)
+        self._paint_frame(main, now)
+        if page is not None:
+            self._paint_frame(page, now)
+            page.show_guarded(view)
+            return
+        main.set_label(self.boundary.do("the label", self.label, lambda _: ((" ▸ ", "error"),)))
+        with self.boundary.at("the heading of the other half"):
             main.beside.name_it(self.keymap.shown("split"))
+        with self.boundary.at("the search in the transcript"):
             main.reader.tell()
+        with self.boundary.at("the panels"):
             self._paint_panels(main, view)
 
     def take_records(self, main: MainScreen) -> None:
@@ -81,7 +104,8 @@ class Presenter:
             if facts.fresh and (main.current or not name):  # else the page of no bus is about to become its page
                 main.page(name).take(facts.fresh)
                 main.beside.take(name, facts.fresh)
-                self.on_records(name, facts.fresh)
+                with self.boundary.at("what is sent to watchers"):
+                    self.on_records(name, facts.fresh)
                 facts.fresh.clear()
 
     def _show_records(self, main: MainScreen, now: float) -> None:
@@ -100,22 +124,29 @@ class Presenter:
         bus = self.session.buses.get(self.session.selected_bus)
         lost = self.loss(bus) if bus is not None else ""
         if self.session.latched and not lost:
-            lost = next(filter(None, map(self.loss, self.session.buses.values())), "")
+            lost = next(filter(None, map(self.loss, self.session.shown)), "")
         return banner_row(self.session.tally() if self.session.latched else None, lost, width)
 
     def loss(self, bus: Bus) -> str:
         """The reason of a loss, and whether the bus is being tried again; empty while it is not lost."""
-        if bus.lost is None:
+        if not self.session.missing(bus):
             return ""
         return f"{bus.lost}{TRYING}" if bus.name in self.session.reconnections.trying else str(bus.lost)
 
     def _paint_frame(self, screen: Framed, now: float) -> None:
-        width = screen.size.width
+        top, footer_ = partial(self._top_row, screen, now), partial(self._footer_row, screen)
+        screen.lines("top").put([self.boundary.do("the top line", top, _trouble_row)])
+        screen.lines("footer").put([self.boundary.do("the footer", footer_, _trouble_row)])
+
+    def _top_row(self, screen: Framed, now: float) -> Row:
         clock = f"{self.session.wall(now):%H:%M:%S}"
         playing = " ".join(each.short for each in self.session.playing)
         log = self.session.log is not None
-        row = top_row(self.tabs(now), self.session.recording, clock, width, log, playing, self.watchers)
-        screen.lines("top").put([row])
+        tabs = self.tabs(now)
+        return top_row(tabs, self.session.recording, clock, screen.size.width, log, playing, self.watchers)
+
+    def _footer_row(self, screen: Framed) -> Row:
+        width = screen.size.width
         keys = footer(screen.SHEET)
         shown = [(self.keymap.shown(key.name) if key.name else key.shown, key.word) for key in keys]
         first = [(self.keymap.shown("help"), "help")]
@@ -125,7 +156,7 @@ class Presenter:
         for key, name in self.macros.shown if plays else ():  # a person may have given it another key
             first.append((self.keymap.shown(f"play-{key.lower()}") or key, name))
         recording, latched = bool(self.session.recording), self.session.latched and not self.session.watching
-        screen.lines("footer").put([footer_row([*first, *shown], recording, latched, width, self.model.progress)])
+        return footer_row([*first, *shown], recording, latched, width, self.model.progress)
 
     def label(self) -> Row:
         """The row before the input line: the drive that the line goes to, with its bus if several are open.
@@ -137,7 +168,7 @@ class Presenter:
         if self.session.selected_bus in self.session.raw:
             return ((f" {self.session.selected_bus} raw, /raw off ends ▸ ", "motion"),)
         drive = self.session.selected
-        bus = self.session.selected_bus if len(self.session.buses) > 1 else ""
+        bus = self.session.selected_bus if len(self.session.shown) > 1 else ""
         where = ":".join(filter(None, (bus, drive.label or drive.address if drive is not None else "")))
         if drive is not None and drive.programming:
             return ((f" {where} ◆ stores ▸ ", "motion"),)
@@ -149,14 +180,22 @@ class Presenter:
         for name, places in main.columns():
             size = main.size_of(name)
             rows = column_rows(places, view, size.width, size.height, border=name != "panel")
-            for y in joined if name != "panel" else ():  # titles at the left join the border
+            # Titles at the left join the border; while the terminal is resized the parts may not fit each other.
+            for y in (y for y in joined if name != "panel" and 0 <= y < len(rows)):
                 (edge, role), *rest = rows[y]
                 rows[y] = (("┤" if edge == "│" else "┼", role), *rest)
             top = main.size_of("side").height - size.height
             joined = [y + top for y, row in enumerate(rows) if row[:1] and row[0][0] in ("─", "├", "┼")]
             main.lines(name).put(rows)
         if not main.wide:
-            main.lines("status").put_all(narrow_rows(view, main.size.width))
+            status = self.boundary.do(
+                "the status", lambda: narrow_rows(view, main.size.width), lambda text: [_trouble_row(text)]
+            )
+            main.lines("status").put_all(status)
+
+
+def _trouble_row(text: str) -> Row:
+    return ((f" {text}", "error"),)
 
 
 def trouble_mark(facts: BusFacts | None, addresses: Sequence[str], lost: bool) -> str:

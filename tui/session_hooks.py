@@ -25,7 +25,7 @@ class Hooks:
         parts.session.front = Front(
             self._go_on,
             parts.questions.fill,
-            before_quit=self._before_quit,
+            before_quit=parts.leaving.ask,
             renamed=parts.selection.rename,
             edit=self._edit,
             unsaved=lambda: {str(text.file.path.absolute()) for text in parts.texts.unsaved()},
@@ -55,11 +55,6 @@ class Hooks:
         """Show a file in the editor. Raises Diagnostic."""
         self._parts.texts.open(path)
         await self._actions.action_page("program")
-
-    async def _before_quit(self) -> bool:
-        """Take `/quit` as Ctrl+Q, which ends the app by itself."""
-        self._parts.app.call_later(self._parts.app.action_quit)
-        return False
 
     # Transcripts
 

@@ -363,7 +363,7 @@ class Scanning:
         self._tried[stage] = None
         self._first = self._first or bus
         bus.roster.probing = stage.scan.names
-        self._workspace.adopt(opened, PLACE)
+        self._workspace.adopt(opened, PLACE).probe = True
         if opened.limits and opened.limits not in self._said:
             self._said.add(opened.limits)
             self._warn(self.port, [opened.limits])

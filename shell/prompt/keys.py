@@ -15,7 +15,7 @@ from collections.abc import Callable, Iterator
 from prompt_toolkit.application import Application
 from prompt_toolkit.filters import Condition
 from prompt_toolkit.input import Input
-from prompt_toolkit.input.typeahead import clear_typeahead
+from prompt_toolkit.input.typeahead import clear_typeahead, get_typeahead
 from prompt_toolkit.input.vt100_parser import Vt100Parser
 from prompt_toolkit.key_binding import KeyBindings, KeyPress
 from prompt_toolkit.key_binding.bindings.cpr import load_cpr_bindings
@@ -136,6 +136,13 @@ class KeyboardInput(Input):
         self._old = self._pasted is not None
         self._watch()
         return before + left
+
+    def drop_typed(self) -> str:
+        """Drop the text that was typed and not taken yet, and return it. A paste without its end goes on."""
+        ahead, typed = "".join(press.data for press in get_typeahead(self)), self.keyboard.typed
+        self.keyboard.forget()
+        self._follow(typed)
+        return ahead + typed
 
     def raw_mode(self) -> contextlib.AbstractContextManager[None]:
         """Do nothing: the terminal is raw throughout, so Ctrl+S never stops the output between two lines."""

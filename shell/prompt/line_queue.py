@@ -32,7 +32,8 @@ if sys.platform == "win32":
 else:
     import fcntl
 
-from multidrop.shell.session import Session
+from multidrop.shell.quitting import ENDING
+from multidrop.shell.session import BARE_WORDS, Session
 
 KEPT = 5000
 """The number of lines read back; a file of twice as many is cut to that number."""
@@ -172,8 +173,7 @@ BURST = 0.5
 SHOWN = 10
 """The number of unsent lines that are shown one by one."""
 LEAVING = ("/quit", "/exit")
-AHEAD = ("/stop", *LEAVING)
-"""Verbs that run at once, whatever waits or failed."""
+"""The verbs of a quit: they run at once, as `/stop` does, whatever waits or failed."""
 
 
 @dataclass(frozen=True)
@@ -183,7 +183,7 @@ class Line:
     text: str
     since: int
     place: Place = NOWHERE
-    """The selected drive; empty where that does not matter."""
+    """The selected drive; empty where none was."""
     parsed: TypedLine | None = None
     """None: it cannot be parsed, which the session reports at its turn."""
 
@@ -209,13 +209,22 @@ class Line:
         """The line in the form that the session takes."""
         return self.parsed or self.text
 
+    def leaves(self, session: Session) -> bool:
+        """True if it asks for the end: the verb, or the bare word where no drive would store it and no port take it."""
+        if BARE_WORDS.get(self.text.strip().lower()) not in LEAVING:
+            return self.verb in LEAVING
+        storing = session.selected is not None and session.selected.programming
+        return not storing and session.selected_bus not in session.raw
+
 
 class LineQueue:
     """The lines that wait for their turn in one session."""
 
     def __init__(self, session: Session) -> None:
         self._session = session
-        self._waiting: asyncio.Queue[Line] = asyncio.Queue()
+        self._waiting: asyncio.Queue[tuple[int, Line]] = asyncio.Queue()
+        """Lines with their numbers."""
+        self._entered_lines = 0
         self._entered = 0.0
         """The time of the last Enter."""
         self._held = ""
@@ -229,6 +238,13 @@ class LineQueue:
         """The line that runs now."""
         self.count = 0
         """The number of lines entered, without those that end it."""
+        self._typed_after: list[str] | None = None
+        """The lines entered since a quit that is not decided yet; None: there is none."""
+        self._free = asyncio.Event()
+        self._free.set()
+        """No quit is being decided: the next line may be sent."""
+        self._meant = (0, NOWHERE)
+        """After a `/use`: the number of lines entered by then, which are for the drive that it selected."""
 
     def enter(self, text: str) -> None:
         """Take the lines of one Enter. They count as typed now, whenever their turn comes."""
@@ -242,12 +258,23 @@ class LineQueue:
             self._session.notify(f"{problem}; nothing was sent", warning=True)
             return
         for line in lines:
-            self._take(Line.entered(line, self._session.stops))
+            self._take(Line.entered(line, self._session.stops, self._session.place), alone=len(lines) == 1)
 
-    def _take(self, line: Line) -> None:
-        concurrent = _concurrent(line)
-        self.count += bool(line.text.strip()) and line.verb not in LEAVING
-        if line.verb in AHEAD:
+    def _take(self, line: Line, alone: bool) -> None:
+        """Take a line. A quit goes ahead, unless it is one of several lines that were entered together (a paste)."""
+        concurrent, leaves = _concurrent(line), line.leaves(self._session)
+        if line.verb == "/stop":
+            self.count += 1
+            self._session.start(line.sent, since=line.since)
+            return
+        if self._typed_after is not None:
+            self._typed_after.append(line.text)
+            return
+        if self._session.quitting:
+            self.show_unsent(ENDING, [line.text])
+            return
+        self.count += bool(line.text.strip()) and not leaves
+        if leaves and alone:
             self._session.start(line.sent, since=line.since)
         elif self._held:
             self.show_unsent(self._held, [line.text])
@@ -255,14 +282,19 @@ class LineQueue:
             self._session.start(line.sent, since=line.since)
         elif line.text.strip():
             self._queued = True
-            self._waiting.put_nowait(line)
+            self._entered_lines += 1
+            self._waiting.put_nowait((self._entered_lines, line))
 
     async def run(self) -> None:
         """Run the lines in turn, until `close` and a cancellation."""
         while not self._closed:
             self.running = ""
             self._queued = self._queued and not self._waiting.empty()
-            line = await self._waiting.get()
+            number, line = await self._waiting.get()
+            await self._free.wait()
+            if why := self._not_now(number, line):
+                self.show_unsent(why, [line.text])
+                continue
             if _concurrent(line):
                 self._session.start(line.sent, since=line.since)
                 continue
@@ -273,6 +305,31 @@ class LineQueue:
                 if line.since == self._session.stops:  # else the waiting lines were typed after the stop of this one
                     self._held = f"'{self.running.strip()}' failed"
                     self.drop(self._held)
+            if line.verb in ("/use", "/rename"):
+                self._meant = self._entered_lines, self._session.place
+
+    def _not_now(self, number: int, line: Line) -> str:
+        """Why a line is not sent at its turn; empty: it is. After `/close` nothing goes to another bus by itself."""
+        if line.since != self._session.stops:
+            return ""  # the session says so
+        if self._session.quitting:
+            return ENDING
+        entered, place = self._meant
+        bus = (place if number <= entered else line.place).bus
+        plain = isinstance(line.parsed, DriveLine) and not line.parsed.bus
+        return f"{bus} was closed" if plain and bus and bus not in self._session.buses else ""
+
+    @contextlib.contextmanager
+    def deciding(self) -> Iterator[None]:
+        """Send nothing while a quit is being decided; what is entered meanwhile was typed after it, and never sent."""
+        self._typed_after = []
+        self._free.clear()
+        try:
+            yield
+        finally:
+            typed, self._typed_after = self._typed_after, None
+            self.show_unsent("it was typed after a quit", typed)
+            self._free.set()
 
     def stopped(self) -> None:
         """Drop the waiting lines after a stop; take new ones."""
@@ -280,7 +337,7 @@ class LineQueue:
         self.drop("a stop came")
 
     def drop(self, why: str) -> None:
-        self.show_unsent(why, [self._waiting.get_nowait().text for _ in range(self._waiting.qsize())])
+        self.show_unsent(why, [self._waiting.get_nowait()[1].text for _ in range(self._waiting.qsize())])
 
     def close(self) -> None:
         """Run no further line: a stop may have replaced the cancellation of `run`."""

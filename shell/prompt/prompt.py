@@ -12,6 +12,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import os
+import re
 import sys
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
@@ -34,7 +35,7 @@ from prompt_toolkit.utils import is_dumb_terminal
 
 from multidrop.dialects import Diagnostic
 from multidrop.dialects.files import lines_of
-from multidrop.shell import configuration
+from multidrop.shell import configuration, stop_report
 from multidrop.shell.automation import outcome, settled, stop_key_trial
 from multidrop.shell.channel import Front
 from multidrop.shell.console import swallows
@@ -47,6 +48,7 @@ from multidrop.shell.prompt.keys import KeyboardInput, PromptQuestion
 from multidrop.shell.prompt.line_queue import History, LineQueue, shown
 from multidrop.shell.prompt.terminal_input import filled
 from multidrop.shell.prompt.view import LinesAbove, Pager, PlainOutput, SessionCompleter, SharedHistory, Toolbar
+from multidrop.shell.quitting import ENDING
 from multidrop.shell.session import Session
 from multidrop.shell.signals import early_ends
 from multidrop.shell.streams.event_printer import Printer
@@ -58,6 +60,8 @@ STYLE = Style.from_dict(
 """Colours among the terminal's own sixteen; NO_COLOR and a dumb terminal have none."""
 TICK = 1.0
 """The time between two updates of the seconds that a line has run, s."""
+MARKS = re.compile("\x1b\\[[0-9;]*[A-Za-z~]")
+"""The sequences of keys that are no text, and the marks of a paste."""
 FIRST_FRAME = 0.05
 """The longest wait for the first frame, s."""
 
@@ -107,6 +111,7 @@ async def _run(make: Callable[[], Session], urls: Sequence[str], agreed: bool, b
         try:
             return await prompt.run(urls)
         finally:
+            await prompt.stopped_late()
             await session.close()
             await finish(streams, lambda: True)
 
@@ -124,8 +129,10 @@ class Prompt:
         self._session = session
         self._input = input_
         self._lines = LineQueue(session)
-        self._stops = session.stops
+        self._stops = self._stops_reported = session.stops
         self._interrupted = False
+        self._half = ""
+        """The text of the line when the prompt was ended."""
         self._asked = (-1, -1)
         """The stops and lines at the last question whether to end."""
         self._opening: asyncio.Task[None] | None = None
@@ -226,6 +233,7 @@ class Prompt:
             if self._opening is not None:
                 self._opening.cancel()
             self._lines.drop("the prompt has ended")
+            self._drop_typed(ENDING)
             await self._leave()
             self._lines.close()
             others = [ticking, self._naming] if self._naming is not None else [ticking]
@@ -255,15 +263,28 @@ class Prompt:
         if self._asked == now:
             return True
         self._asked = now
-        moving = await self._session.in_motion()
-        for text in moving:
-            self._session.notify(text, warning=True)
-        if moving:
-            self._session.notify("/quit again leaves them moving; Ctrl+X stops all drives", warning=True)
+        with self._lines.deciding():
+            moving = await self._session.in_motion()
+            for text in moving:
+                self._session.notify(text, warning=True)
+            if moving:
+                self._session.notify("/quit again leaves them moving; Ctrl+X stops all drives", warning=True)
+                self._drop_typed("it was typed after a quit")
         return not moving
+
+    def _drop_typed(self, why: str) -> None:
+        """Drop and name the text that no Enter has entered yet."""
+        typed, self._half = self._half + self._typing(), ""
+        if self._input is not None:
+            typed += self._input.drop_typed()
+        lines = ["".join(filter(str.isprintable, line)) for line in re.split(r"\r\n|\r|\n", MARKS.sub("", typed))]
+        self._lines.show_unsent(why, lines)
+        if typed and self._prompt.app.is_running:
+            self._prompt.default_buffer.reset()
 
     async def _leave(self) -> None:
         """Stop what automation started, and write the outcome of that stop and of the last one."""
+        self._stops_reported = self._session.stops
         if not self._session.automations.was_interrupted:
             self._session.interrupt()
         await self._session.automations.over(lambda text: write(sys.stderr, text))
@@ -272,6 +293,15 @@ class Prompt:
             await settled(self._session)
         for line in outcome(self._session, halts):
             write(sys.stderr, line)
+        await self.stopped_late()
+
+    async def stopped_late(self) -> None:
+        """Name what was typed since the end of the prompt, and write the outcome of the stops since."""
+        self._drop_typed(ENDING)
+        while self._stops_reported != self._session.stops:
+            self._stops_reported = self._session.stops
+            await settled(self._session)
+            write(sys.stderr, f"stop: {stop_report.words(self._session.tally())}")
 
     def _echo(self, typed: str) -> None:
         if isinstance(plain := self._prompt.app.output, PlainOutput):
@@ -314,6 +344,7 @@ class Prompt:
     def _end(self) -> None:
         app = self._prompt.app
         if app.is_running and app.future is not None and not app.future.done():
+            self._half = self._typing()
             app.exit(exception=EOFError)
 
     def interrupt(self) -> None:

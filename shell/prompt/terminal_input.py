@@ -9,6 +9,7 @@ import asyncio
 import os
 import sys
 import threading
+from collections import deque
 from collections.abc import AsyncIterator, Awaitable, Callable, Iterable, Sequence
 from functools import partial
 
@@ -18,6 +19,7 @@ from multidrop.dialects.files import LARGEST, check_line, split_lines
 from multidrop.dialects.text import visible
 from multidrop.shell.channel import Ask, Field
 from multidrop.shell.prompt.keyboard import Keyboard, on_stop_key
+from multidrop.shell.quitting import say_unsent
 from multidrop.shell.session import Session
 from multidrop.shell.streams.stdout import write
 
@@ -30,12 +32,14 @@ AHEAD = 4
 
 async def run_lines(session: Session, lines: Iterable[str]) -> None:
     """Run lines from the command line in turn. Raises the first failure, and the loss of a bus that they went to."""
-    for line in lines:
-        await session.run(line)
+    left = deque(lines)
+    while left:
+        await session.run(left.popleft())
         for name in sorted({bus for bus, _ in session.addressed} & session.buses.keys()):
             if (loss := session.buses[name].link.lost) is not None:  # while no line used it: in a /sleep
                 raise loss.again()
         if session.quitting:
+            say_unsent(session, left)
             return
 
 
@@ -44,16 +48,20 @@ async def run_stream(session: Session, descriptor: int) -> None:
 
     In raw mode it ends once the port has been quiet for a while: nothing else says that a reply is whole.
     """
-    async for line in stream_lines(descriptor):
+    behind: deque[str] = deque()
+    async for line in stream_lines(descriptor, behind):
         await session.run(uncommented(line))
         if session.quitting:
+            say_unsent(session, map(uncommented, behind))
             return
     while (left := max((raw.last + QUIET - session.now() for raw in session.raw.values()), default=0.0)) > 0:
         await asyncio.sleep(left)
 
 
-async def stream_lines(descriptor: int) -> AsyncIterator[str]:
+async def stream_lines(descriptor: int, left: deque[str] | None = None) -> AsyncIterator[str]:
     """Yield the lines of a descriptor (file, pipe), read by a daemon thread with bounded read-ahead.
+
+    `left` holds the lines that were read in the same piece as the one that is yielded, and follow it.
 
     Raises Diagnostic for a character that no line may have, and for a line without an end.
     """
@@ -75,20 +83,24 @@ async def stream_lines(descriptor: int) -> AsyncIterator[str]:
 
     threading.Thread(target=read, daemon=True, name="standard input").start()
     rest, number = b"", 0
+    left = deque() if left is None else left
     while data := await queue.get():
         *whole, rest = (rest + data).split(b"\n")
         if len(rest) > LARGEST:
             raise Diagnostic(f"a line is larger than {LARGEST // 1024**2} MB", f"{INPUT}:{number + len(whole) + 1}")
-        for line in whole:
+        left.extend(line.removesuffix(b"\r").decode("utf-8", "replace") for line in whole)
+        while left:
             number += 1
-            text = line.removesuffix(b"\r").decode("utf-8", "replace")
+            text = left.popleft()
             text = text.removeprefix("\ufeff") if number == 1 else text
             check_line(text, INPUT, number)
             yield text
         room.release()
     last = rest.decode("utf-8", "replace").removesuffix("\x1a")
-    for text in [last] if number else split_lines(last):
+    left.extend([last] if number else split_lines(last))
+    while left:
         number += 1
+        text = left.popleft()
         check_line(text, INPUT, number)
         if text:
             yield text

@@ -280,6 +280,8 @@ class Execution:
             if place is not None:
                 place.passed(reported.sent)
             frame.names.update((words.OUTCOME, word) for word in outcome)
+        if self._quits and line.where:
+            self.session.notify(f"{line.where}: it quits here, and nothing after this line is executed", warning=True)
 
     async def _own(self, line: ScriptLine, frame: Frame, work: Work[T], counts: bool = False) -> T:
         """Execute a verb of scripts. One that only steers has a result only where it fails; any other one `counts`."""

@@ -20,6 +20,7 @@ from multidrop.macros import Macro
 from multidrop.shell.automation import Claim, outcome, settled
 from multidrop.shell.events import FAILURES, By, OnBus, SessionEvent
 from multidrop.shell.playing import NO_ROLES, cast
+from multidrop.shell.quitting import say_unsent
 from multidrop.shell.scripts.captured_prints import hearing
 from multidrop.shell.scripts.execution import CUT, Execution, Frame, Unfinished
 from multidrop.shell.scripts.model import Ended, Ending, Executed, MacroScript, Result, Script, ScriptLine
@@ -104,6 +105,7 @@ async def run_typed(session: Session, lines: Sequence[str], executed: Executed) 
         for count, text in enumerate(lines, 1):
             await execution.line(ScriptLine("", count, text), Frame(None, By.OPERATOR))
             if session.quitting:
+                say_unsent(session, lines[count:])
                 return
 
 

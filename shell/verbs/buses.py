@@ -39,9 +39,17 @@ async def open_(call: Call) -> None:
 
 async def close(call: Call) -> None:
     (name,) = call.words()
-    await call.session.forget(call.session.bus(name))
-    call.session.changed()
-    call.session.notify(f"{name} is closed")
+    bus, session = call.session.bus(name), call.session
+    selected = session.selected_bus == bus.name
+    if selected:  # what follows was written for this bus, and never goes to another one
+        session.selected_bus = ""
+    try:
+        await session.forget(bus)
+    finally:
+        if selected and session.front.before_quit is not None and session.buses:  # a person sees which one is next
+            session.select("", next(iter(session.buses)))
+        session.changed()
+    session.notify(f"{name} is closed")
 
 
 async def use(call: Call) -> None:

@@ -21,6 +21,7 @@ from multidrop.shell.operations.conditions import ON_SCREEN
 from multidrop.shell.operations.operation import Operation
 from multidrop.shell.operations.table import VERB_GROUPS, VERBS
 from multidrop.shell.operations.usage import split
+from multidrop.shell.quitting import GOES_ON
 from multidrop.shell.roles import EVERYTHING, TIMES, Filter, Transcripts
 from multidrop.shell.verbs.call import Call, words
 
@@ -66,8 +67,9 @@ async def log(call: Call) -> None:
 async def quit_(call: Call) -> None:
     call.words()
     ask = call.session.front.before_quit
-    if ask is None or await ask():
-        call.session.quit()
+    if ask is not None and not await ask():
+        raise Diagnostic(GOES_ON, call.verb.name)  # lines that were to follow, as of a paste or a macro, are held back
+    call.session.quit()
 
 
 async def clear(call: Call) -> None:

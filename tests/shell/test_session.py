@@ -163,11 +163,50 @@ async def test_buses_of_the_same_name_are_told_apart(press):
         await press.session.open(press.url, "press")
 
 
-async def test_closing_the_selected_bus_selects_another(both):
+async def test_for_a_person_closing_the_selected_bus_selects_another(both):
+    both.session.front = Front(before_quit=agreed)
     await both.run("/close press")
     assert both.session.selected_bus == "eth" and list(both.session.buses) == ["eth"]
     await both.run("/close eth")
     assert both.session.selected is None
+
+
+async def test_a_line_after_the_close_of_the_selected_bus_goes_to_no_other_one(both):
+    await both.run("/close press")
+    with pytest.raises(Diagnostic, match="no bus is selected since the selected one was closed; /use selects one: eth"):
+        await both.run("SL 200000")
+    assert both.written("eth") == b""
+    await both.run("/use eth")
+    await both.run("PR P")
+    assert both.written("eth")
+
+
+async def test_closing_another_bus_leaves_the_selection(both):
+    await both.run("/close eth")
+    await both.run("PR P")
+    assert both.session.selected_bus == "press" and both.written("press")
+
+
+async def test_after_an_accepted_quit_a_line_of_a_person_is_refused_and_a_macro_ends_its_work(press):
+    await press.run("/quit")
+    for line in ("SL 200000", "@b SL 5", "/open sim:", "/play m"):
+        with pytest.raises(Diagnostic, match=f"multidrop is ending, so '{line}' was not sent"):
+            await press.session.run(line)
+    assert press.written("press") == b""
+    await press.session.run("PR P", By.MACRO)  # of its `on_early_end`
+    await press.session.run("/stop")
+    assert press.session.stops == 1
+
+
+async def test_a_quit_that_is_declined_fails_its_line_and_changes_nothing(press):
+    async def declined():
+        return False
+
+    press.session.front = Front(before_quit=declined)
+    with pytest.raises(Diagnostic, match="multidrop goes on"):
+        await press.session.run("/quit")
+    await press.session.run("PR P")
+    assert not press.session.quitting
 
 
 async def test_a_lost_bus_is_told_once(press):

@@ -215,6 +215,13 @@ class FakeSession:
         selected = self.selected
         return Place(self.selected_bus, selected.address if selected is not None else "")
 
+    @property
+    def shown(self) -> list[FakeBus]:
+        return list(self.buses.values())
+
+    def missing(self, bus: FakeBus) -> bool:
+        return bus.lost is not None
+
     def of_demo(self, bus: str) -> str:
         return bus if bus in self.buses else ""
 
@@ -308,6 +315,10 @@ class FakeSession:
 
     async def in_motion(self) -> list[str]:
         return self.moves
+
+    def quit(self) -> None:
+        self.quitting = True
+        self.emit(StateChanged(self.time))
 
     def resume(self) -> None:
         self.latched = False

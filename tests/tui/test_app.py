@@ -1,5 +1,7 @@
 """The app's handling of keys, lines, buses and the loss of a bus."""
 
+import asyncio
+
 import pytest
 from textual import events
 from textual.pilot import Pilot
@@ -355,6 +357,13 @@ async def test_ctrl_c_explains_and_ctrl_q_quits() -> None:
     assert app.return_value == 0
 
 
+@pytest.fixture
+def heard_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Keys count without a pause after a question has come."""
+    monkeypatch.setattr("multidrop.tui.terminal.keyboard.PAUSE", 0.0)
+
+
+@pytest.mark.usefixtures("heard_at_once")
 async def test_quitting_asks_while_automation_runs_or_a_drive_moves() -> None:
     session = demo_session()
     session.busy = True
@@ -375,6 +384,7 @@ async def test_quitting_asks_while_automation_runs_or_a_drive_moves() -> None:
     assert (session.stops, app.return_value) == (1, 0)
 
 
+@pytest.mark.usefixtures("heard_at_once")
 async def test_quitting_asks_in_a_small_terminal_too_and_only_once() -> None:
     session = demo_session()
     session.busy = True
@@ -393,15 +403,17 @@ async def test_quit_as_a_line_ends_the_app_too() -> None:
     assert app.return_value == 0
 
 
+@pytest.mark.usefixtures("heard_at_once")
 async def test_quit_as_a_line_asks_like_the_key() -> None:
     session = demo_session()
     session.moves = ["press:a moves at 5 a second"]
     async with on_screen(session) as (pilot, app, _):
-        assert session.front.before_quit is not None and await session.front.before_quit() is False
+        assert session.front.before_quit is not None
+        asked = asyncio.ensure_future(session.front.before_quit())
         await pilot.pause()
         assert app.screen.lines == session.moves  # type: ignore[attr-defined]
         await pilot.press("down", "enter")
-        await pilot.pause()
+        assert await asked
     assert (session.stops, app.return_value) == (0, 0)
 
 

@@ -1,12 +1,14 @@
 """What is painted between two frames: the reply to a typed line, at once or as soon as the terminal takes it."""
 
 import asyncio
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
 import pytest
 
 from multidrop.shell.events import Printed
+from multidrop.tui.boundary import Boundary
 from multidrop.tui.frame_scheduler import FRAMES, Frames
 from multidrop.tui.presenter import FLOOD, FLOOD_PERIOD, Presenter
 from tests.support.fake_session import demo_session, driver_of, make_app
@@ -64,7 +66,7 @@ def paints(*lines: int) -> list[int]:
     main: Any = SimpleNamespace(pages={"press": page}, current="press", page=lambda name: page, beside=beside)
     anything: Any = None
     model: Any = SimpleNamespace(buses={"press": facts})
-    presenter = Presenter(anything, model, anything, anything, anything)
+    presenter = Presenter(anything, model, anything, anything, anything, Boundary(Path()))
     for n, count in enumerate(lines):  # noqa: B007
         facts.fresh += ["x"] * count
         presenter.take_records(main)

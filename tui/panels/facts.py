@@ -85,7 +85,7 @@ def cards_rows(view: View, width: int, height: int) -> list[Row]:
     """Every line with its URL, and a card for each of its drives but the selected one, which has a panel."""
     rows: list[Row] = []
     session = view.session
-    buses = sorted(session.buses.values(), key=lambda bus: bus.name != session.selected_bus)
+    buses = sorted(session.shown, key=lambda bus: bus.name != session.selected_bus)
     for number, bus in enumerate(buses):
         if len(rows) >= height:
             rows[height - 1 :] = [((f" {len(buses) - number} more lines; ^A shows all drives", "dim"),)]
@@ -93,7 +93,11 @@ def cards_rows(view: View, width: int, height: int) -> list[Row]:
         drives = f"{len(bus.drives)} drives " if len(bus.drives) != 1 else "1 drive "
         url = "" if session.watching else url_without_secrets(session.openings.url_of(bus))
         left: Row = ((f" {bus.name} ", "accent"), (url, "text"))
-        rows.append(spread(left, [(f"✗ lost: {bus.lost} " if bus.lost is not None else drives, "dim")], width))
+        if session.missing(bus):
+            drives = f"✗ lost: {bus.lost} "
+        elif bus.lost is not None:
+            drives = "being searched for drives "
+        rows.append(spread(left, [(drives, "dim")], width))
         for glance in glances_of(session, view.model, bus):
             if not glance.selected:
                 rows += card_rows(view, bus, glance, width)

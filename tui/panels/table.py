@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from datetime import datetime
+from functools import partial
 from typing import NamedTuple
 
 from rich.cells import cell_len
@@ -25,7 +26,7 @@ from multidrop.tui.panels.plotted import plot_shows
 from multidrop.tui.panels.program import program_rows, program_shows, program_title
 from multidrop.tui.panels.view import View, names_on
 from multidrop.tui.screen_model import Piece
-from multidrop.tui.text import fit, visible
+from multidrop.tui.text import at_words, fit, visible
 from multidrop.tui.widgets.lines import Row, width_of
 
 OUT, IN = "↑", "↓"
@@ -254,13 +255,33 @@ def column_rows(places: Sequence[Place], view: View, width: int, height: int, bo
 def _place_rows(place: Place, view: View, width: int, height: int, side: Row) -> list[Row]:
     """The rows of a place: its panels that have something to show, each in the rows that those before it leave."""
     rows: list[Row] = []
-    for each in [panel for panel in place if panel.shows(view)] or place[:1]:
+    for each in [panel for panel in place if _shows(panel, view)] or place[:1]:
         room = height - len(rows) - HEAD
         if room < (each.least if rows else 0):
             break
-        rows.append(title_row(each, view, width, "├" if side else "─"))
-        rows += [(*side, *row) for row in each.rows(view, width - len(side), room)[:room]]
+        inside = width - len(side)
+        title, content = view.boundary.do(
+            f"the panel {each.name}",
+            partial(_panel_rows, each, view, width, inside, room, "├" if side else "─"),
+            partial(_defect_rows, each, width, inside, "├" if side else "─"),
+        )
+        rows.append(title)
+        rows += [(*side, *row) for row in content[:room]]
     return [*rows, *[side] * (height - len(rows))]
+
+
+def _shows(panel: Panel, view: View) -> bool:
+    return view.boundary.do(f"the panel {panel.name}, whether it is shown", lambda: panel.shows(view), lambda _: True)
+
+
+def _panel_rows(panel: Panel, view: View, width: int, inside: int, room: int, edge: str) -> tuple[Row, list[Row]]:
+    return title_row(panel, view, width, edge), panel.rows(view, inside, room)
+
+
+def _defect_rows(panel: Panel, width: int, inside: int, edge: str, trouble: str) -> tuple[Row, list[Row]]:
+    title = ((edge, "rule"), (f" {panel.name} ", "strong"))
+    rows: list[Row] = [((f" {row}", "error"),) for row in at_words(trouble, inside - 1)]
+    return (*title, ("─" * max(0, width - width_of(title)), "rule")), rows
 
 
 def title_row(panel: Panel, view: View, width: int, edge: str) -> Row:

@@ -5,10 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import partial
+from pathlib import Path
 
 from multidrop.drives.bus import Bus
 from multidrop.shell.roles import Series
 from multidrop.shell.session import Session
+from multidrop.tui.boundary import Boundary
 from multidrop.tui.figures import NATIVE, Figures, figures_of
 from multidrop.tui.keymap import FunctionKeys, Keymap
 from multidrop.tui.readout import READ, Readout, State
@@ -96,7 +98,7 @@ def glances_of(session: Session, model: ScreenModel, bus: Bus) -> list[Glance]:
             readout=facts.readout(address),
             selected=chosen is not None and drive.address == chosen.address,
             storing=drive.programming,
-            lost=bus.lost is not None,
+            lost=session.missing(bus),
             unreferenced=drive.state.unreferenced,
             stranger=drive.state.stranger,
         )
@@ -139,6 +141,7 @@ class View:
     """The series that are plotted in place of those that the person chose."""
     keys: Keymap = field(default_factory=Keymap)
     macros: FunctionKeys = field(default_factory=FunctionKeys)
+    boundary: Boundary = field(default_factory=lambda: Boundary(Path()))
 
     @property
     def chosen(self) -> Glance | None:

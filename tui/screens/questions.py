@@ -9,7 +9,6 @@ from typing import TypeVar
 from rich.text import Text
 from textual.app import App
 
-from multidrop.dialects.text import counted
 from multidrop.drives.bus import Bus
 from multidrop.shell.channel import Field
 from multidrop.shell.session import Session
@@ -77,8 +76,8 @@ class Questions:
         """Ask for values; return them by name, None if the form was closed. A cancellation closes it."""
         return await self._answer(Form(title, fields))
 
-    async def _answer(self, screen: Dialog[T]) -> T | None:
-        """Ask what nobody opened with a key; keys that were typed before it is shown are not for it."""
+    async def _answer(self, screen: Dialog[T], shown: Callable[[], None] = lambda: None) -> T | None:
+        """Ask, and return the answer; keys that were typed before the question is shown are not for it."""
         app = self._app
         self._keyboard.turn_deaf()
         screen.told = self._keyboard.early
@@ -91,36 +90,18 @@ class Questions:
         if isinstance(app.screen, TooSmall):
             app.pop_screen()
         await app.push_screen(screen, answered)
+        shown()
         try:
             return await given
         finally:
-            if app.screen is screen:
+            if app.screen_stack[-1:] == [screen]:  # the app may have ended meanwhile
                 screen.dismiss(None)
-            self._closed()
+            if app.screen_stack:
+                self._closed()
 
-    async def quit(self, waiting: Callable[[], int], stop: Callable[[], None], unsaved: Sequence[str] = ()) -> None:
-        """Quit; ask first if that leaves something unfinished.
-
-        `waiting` counts the lines that were not sent; `unsaved` are files with a text that was not saved.
-        """
-        app = self._app
-        if isinstance(app.screen, Confirm):
-            return
-        lines, answers = leaving(self._session, await self._session.in_motion(), waiting(), unsaved)
-        if not lines:
-            app.exit(0)
-            return
-
-        def answered(answer: str | None) -> None:
-            if answer == "stop":
-                stop()
-            if answer in ("stop", "leave"):
-                app.exit(0)
-            self._closed()
-
-        if isinstance(app.screen, TooSmall):
-            app.pop_screen()
-        await app.push_screen(Confirm("Quit?", lines, answers), answered)
+    async def quit(self, question: Confirm, shown: Callable[[], None]) -> str | None:
+        """Ask whether to quit; `shown` is called once the question has the focus. Return the answer, None for none."""
+        return await self._answer(question, shown)
 
 
 def place_of(key: str) -> tuple[str, str]:
@@ -134,7 +115,7 @@ def drive_choices(session: Session, glances: Callable[[Bus], list[Glance]]) -> t
     now = session.now()
     options: list[Offer] = []
     current = ""
-    for bus in sorted(session.buses.values(), key=lambda bus: bus.name != session.selected_bus):
+    for bus in sorted(session.shown, key=lambda bus: bus.name != session.selected_bus):
         for glance in glances(bus):
             key = f"{bus.name}\n{glance.address}"
             current = key if glance.selected else current
@@ -142,27 +123,6 @@ def drive_choices(session: Session, glances: Callable[[Bus], list[Glance]]) -> t
             text = f" {bus.name:<8} {glance.address:<3} {glance.label:<12} {sign} {glance.product}"
             options.append(Offer(key, text, f"{bus.name} {glance.address} {glance.label}"))
     return options, current
-
-
-def leaving(
-    session: Session, moving: Sequence[str], waiting: int, unsaved: Sequence[str] = ()
-) -> tuple[list[str], Answers]:
-    """The work that quitting would leave unfinished (empty: no need to ask), and the possible answers.
-
-    `moving` has a line for each drive that moves, or may; `waiting` is the number of typed lines that were not sent.
-    """
-    lines = list(moving[:PREVIEW])
-    if len(moving) > PREVIEW:
-        lines.append(f"… and {len(moving) - PREVIEW} more")
-    if waiting:
-        lines.insert(0, f"{counted(waiting, 'line waits', 'lines wait')} and would not be sent")
-    lines += [f"{visible(file)} is not saved; a copy is offered when it is opened again" for file in unsaved]
-    answers = [("stop", "Stop all and quit"), ("stay", "Stay")]
-    if session.busy:
-        lines.insert(0, "a macro, a script or a transfer runs")
-    else:
-        answers.insert(1, ("leave", "Quit, drives go on"))
-    return lines, answers
 
 
 def lines_like(lines: Sequence[str], typed: str) -> list[Match]:

@@ -19,6 +19,7 @@ import re
 import select
 import selectors
 import shutil
+import signal
 import struct
 import sys
 import time
@@ -114,9 +115,34 @@ class Terminal(PlatformDriver):
         else:
             super().start_application_mode()  # type: ignore[no-untyped-call]
 
+    @property
+    def _reads_on(self) -> bool:
+        """The app has ended, and the keys are read until `release`."""
+        return bool(getattr(self._app, "stops_to_the_end", False)) and self._app._exit
+
     def stop_application_mode(self) -> None:
         self._leaving = True
+        if sys.platform != "win32" and self._reads_on:
+            self._attributes, self.attrs_before = self.attrs_before, None
         super().stop_application_mode()
+
+    def release(self) -> None:
+        """End the reading, once nothing is left that a stop could stop, and give the terminal back."""
+        if not self._reads_on:
+            return
+        if sys.platform == "win32":
+            self._console.end()
+            self._console.__exit__(None, None, None)
+        else:
+            self.exit_event.set()
+            if self._key_thread is not None:
+                self._key_thread.join()
+            while self._more() and (data := self._read()):
+                self._take(data)
+            self.keys.finish()
+            if self._attributes is not None:
+                with suppress(termios.error):  # it has hung up
+                    termios.tcsetattr(self.fileno, termios.TCSANOW, self._attributes)
 
     def close(self) -> None:
         super().close()
@@ -124,7 +150,7 @@ class Terminal(PlatformDriver):
         while not self._out.idle and time.monotonic() < until:
             time.sleep(0.005)
         self._out.give_up()
-        if sys.platform == "win32":
+        if sys.platform == "win32" and not self._reads_on:
             self._console.__exit__(None, None, None)
 
     def write(self, data: str) -> None:
@@ -197,7 +223,8 @@ class Terminal(PlatformDriver):
             """End the reading thread."""
             self._disable_mouse_support()
             self._enable_line_wrap()
-            self._console.end()
+            if not self._reads_on:
+                self._console.end()
 
         def _enable_line_wrap(self) -> None:
             self.write("\x1b[?7h")
@@ -223,6 +250,16 @@ class Terminal(PlatformDriver):
             return self._console.more()
 
     else:
+        _attributes: list[Any] | None = None
+        """The terminal's own settings, while the keys are read after the end of the app."""
+
+        def disable_input(self) -> None:
+            """End the reading thread, unless it reads on."""
+            if self._reads_on:
+                signal.signal(signal.SIGWINCH, signal.SIG_DFL)
+                self._disable_mouse_support()
+            else:
+                super().disable_input()
 
         def _sigcont_application(self, *_: object) -> None:
             """Handle SIGCONT in the loop: a signal handler may run while the writer's lock is held."""
@@ -261,16 +298,19 @@ class Terminal(PlatformDriver):
                 while not self.exit_event.is_set():
                     if not selector.select(0.1):
                         continue
-                    try:
-                        data = os.read(self.fileno, 4096)
-                    except OSError:
-                        data = b""
-                    if not data:
-                        self._loop.call_soon_threadsafe(app.interrupted)
-                        return
+                    data = self._read()
                     if STOP in data:
                         app.stop_ahead()
-                    self._loop.call_soon_threadsafe(self._take, data)
+                    self._loop.call_soon_threadsafe(*((self._take, data) if data else (app.interrupted,)))
+                    if not data:
+                        return
+
+        def _read(self) -> bytes:
+            """Read what the terminal has sent; nothing if it is gone."""
+            try:
+                return os.read(self.fileno, 4096)
+            except OSError:
+                return b""
 
         def _more(self) -> bool:
             """True if the terminal has sent bytes that were not read yet."""
@@ -292,6 +332,8 @@ class Terminal(PlatformDriver):
     def process_message(self, message: Message) -> None:
         """Keep the answers to our cursor queries; hand all other messages to the app."""
         if isinstance(message, events.CursorPosition):
+            if self._reads_on:
+                return
             self.pace.answered()
             cast(Owner, self._app).terminal_ready()
         else:

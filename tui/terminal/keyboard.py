@@ -34,6 +34,8 @@ PAUSE = 0.5
 PATIENCE = 0.25
 """Greatest time in seconds that a widget gets to handle a click."""
 EARLY = "the screen changed while you typed: these keys were dropped; keys count again after a pause"
+MOST_DROPPED = 1 << 16
+"""Greatest number of characters that are kept of what was dropped."""
 IMMEDIATE = frozenset({"ctrl+q", "ctrl+c", "escape"})
 """Keys that do not wait while keys are held; what was typed before them is dropped."""
 Typed = events.Key | events.Paste | events.MouseDown | events.MouseUp
@@ -50,6 +52,9 @@ class Keyboard:
         self._held = set[object]()
         self._deaf_until = 0.0
         self._deaf = 0
+        self._closed = False
+        self._dropped = ""
+        """The text of keys and pastes that were dropped, with a NUL for each key that is not text."""
 
     @property
     def idle(self) -> bool:
@@ -59,7 +64,11 @@ class Keyboard:
         """Take a key, a paste or a mouse button; return False for any other message."""
         if not isinstance(event, Typed) or event.is_forwarded:
             return False
+        if self._closed:
+            self._drop(event)
+            return True
         if isinstance(event, events.Key | events.Paste) and self._not_heard():
+            self._drop(event)
             return True
         self._waiting.append(event)
         self._wake()
@@ -77,8 +86,35 @@ class Keyboard:
         self._waiting.clear()
         return text
 
+    def drop(self) -> None:
+        """Drop what waits; `take_dropped` has its text."""
+        while self._waiting:
+            self._drop(self._waiting.popleft())
+
+    def _drop(self, event: Typed) -> None:
+        if isinstance(event, events.Paste):
+            self._dropped += f"{event.text}\r"
+        elif isinstance(event, events.Key):
+            self._dropped += "\r" if event.key == "enter" else event.character or "\0"
+        self._dropped = self._dropped[-MOST_DROPPED:]
+
+    def take_dropped(self) -> str:
+        """Return the text that was dropped while keys were held, or since the screen changed, and forget it.
+
+        It has a NUL for each key that is not text.
+        """
+        text, self._dropped = self._dropped, ""
+        return text
+
+    def close(self) -> None:
+        """Drop what waits and all that comes: the app ends."""
+        self._closed = True
+        self.drop()
+
     def hold(self, by: object) -> None:
         """Make keys wait until their meaning is known: until each who holds them has released them."""
+        if not self._held:
+            self._dropped = ""
         self._held.add(by)
 
     def release(self, by: object) -> None:
@@ -88,8 +124,12 @@ class Keyboard:
     def turn_deaf(self) -> None:
         """Discard keys until a pause: the screen changed by itself, and the person has not seen it yet."""
         self._deaf_until, self._deaf = time.monotonic() + PAUSE, 0
+        if not self._held:
+            self._dropped = ""
         waited = list(self._waiting)
         self._waiting = deque(event for event in waited if isinstance(event, events.MouseDown | events.MouseUp))
+        for event in waited:
+            self._drop(event)
         if len(self._waiting) < len(waited):
             self._not_heard()
 
@@ -125,7 +165,7 @@ class Keyboard:
         if urgent is None:
             return None
         for _ in range(urgent):
-            self._waiting.popleft()
+            self._drop(self._waiting.popleft())
         return self._waiting.popleft()
 
     async def _turn(self) -> None:

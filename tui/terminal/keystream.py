@@ -296,6 +296,11 @@ class KeyStream:
                 return
         self._wait_for_more()
 
+    def finish(self) -> None:
+        """Parse all that has come, at the end."""
+        while (event := self._next()) is not None:
+            self._emit(event)
+
     def _wait_for_more(self) -> None:
         if self._escape is not None:
             self._escape.cancel()

@@ -1,6 +1,7 @@
 """Ending with drives in motion: a terminal asks once and names them, a pipe does not."""
 
 import asyncio
+import re
 import signal
 
 import pytest
@@ -95,6 +96,72 @@ def test_a_pipe_is_not_asked(shop):
     piped = Running("shell", "press", folder=shop.folder)
     piped.say("SL 5000", "/quit")
     assert piped.end() == 0 and piped.errors == [] and shop.velocity() == 5000
+
+
+@pytest.mark.parametrize("lines", [("/quit", "SL 5000"), ("/exit", "", "  ", "SL 5000")])
+def test_lines_that_follow_a_quit_are_named_in_a_pipe_and_by_send(shop, lines):
+    piped = Running("shell", "press", folder=shop.folder)
+    piped.process.stdin.write("".join(f"{line}\n" for line in lines))
+    assert piped.end() == 0 and piped.errors == ["not sent, as it follows a /quit: SL 5000"]
+    sent = Running("send", "press", *lines, folder=shop.folder)
+    assert sent.end() == 0 and sent.errors == ["not sent, as it follows a /quit: SL 5000"]
+    assert shop.velocity() == 0
+
+
+@pytest.mark.pty
+@pytest.mark.parametrize("end", ["/quit\r", "\x04", "exit\r", "\x1b[200~/quit\nSL 5000\x1b[201~\r"])
+def test_what_is_typed_after_the_end_of_a_prompt_is_not_sent_and_named(shop, end):
+    child = shop.terminal("shell", "press")
+    child.expect("b>")
+    child.send(f"{end}SL 5000\r")
+    assert read_to_end(child) == 0 and shop.velocity() == 0
+    assert re.search(r"not sent, as .*: SL 5000", child.before)
+
+
+@pytest.mark.pty
+@pytest.mark.parametrize("end", ["/quit\r", "\x04"])
+def test_a_second_quit_that_was_typed_before_the_question_ends_no_prompt(shop, end):
+    child = shop.terminal("shell", "press")
+    child.expect("b>")
+    child.send("SL 5000\r")
+    child.expect("b>")
+    child.send(f"{end}{end}SL 9\r")
+    child.expect("/quit again leaves them moving")
+    child.expect("not sent, as it was typed after a quit: SL 9")
+    child.send("PR 6*1\r")
+    child.expect("b>")
+    assert child.isalive() and shop.velocity() == 5000
+
+
+@pytest.mark.pty
+def test_the_screen_names_what_it_dropped_on_the_terminal(shop):
+    child = shop.terminal("tui", "press")
+    child.expect("polls")
+    child.send("\x11SL 5000\r")
+    assert read_to_end(child) == 0 and shop.velocity() == 0
+    assert "not sent, as multidrop is ending: SL 5000" in child.before.rpartition("\x1b[?1049l")[2]
+
+
+@pytest.mark.pty
+@pytest.mark.parametrize("front", ["tui", "shell"])
+def test_the_stop_key_works_until_the_process_ends(shop, front):
+    macros = shop.folder / "conf" / "macros"
+    macros.mkdir(exist_ok=True)
+    steps = '[[step]]\nline = \'PR "at wo","rk"\'\n[[step]]\nline = "/sleep 1000"\n'
+    (macros / "go.toml").write_text(f'name = "go"\non_early_end = ["/sleep 9"]\n{steps}')
+    child = shop.terminal(front, "press")
+    child.expect("b>" if front == "shell" else "polls")
+    child.send("SL 5000\r")
+    until(lambda: shop.velocity() == 5000, "it does not move")
+    child.send("/play go\r")
+    child.expect("at work")
+    child.kill(signal.SIGTERM)
+    child.expect("waiting 10 s at most")  # the screen is gone, the process is not
+    child.send("MR 7\r\x18")
+    until(lambda: shop.velocity() == 0, "the key did not stop it")
+    child.send("SL 77\r")
+    assert read_to_end(child) == 130 and shop.velocity() == 0
+    assert "stop: " in child.before and "SL 77" in child.before
 
 
 @pytest.mark.pty

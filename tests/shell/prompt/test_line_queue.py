@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 
 from multidrop.dialects import Refused
-from multidrop.shell.line_syntax import TypedLine
+from multidrop.shell.line_syntax import Place, TypedLine
 from multidrop.shell.prompt.line_queue import BURST, SHOWN, LineQueue
 
 pytestmark = pytest.mark.virtual
@@ -17,6 +17,7 @@ class FakeSession:
 
     def __init__(self) -> None:
         self.stops = 0
+        self.place, self.buses, self.quitting = Place("", ""), dict[str, object](), False
         self.done: list[str] = []
         self.started: list[str] = []
         self.notices: list[str] = []
@@ -29,6 +30,14 @@ class FakeSession:
         if line.typed == "bad":
             raise Refused("bad")
         self.done.append(line.typed)
+
+        if line.typed == "/use eth":
+            self.place = Place("eth", "")
+        if line.typed == "/close press":
+            del self.buses["press"]
+            self.place = Place("eth", "")
+        if line.typed == "/quit":
+            self.quitting = True
 
     def start(self, line: TypedLine, since: int) -> None:
         self.started.append(line.typed)
@@ -115,7 +124,8 @@ async def test_a_line_that_a_stop_ended_holds_back_nothing_typed_after_that_stop
 
 
 async def test_stop_and_quit_wait_for_no_line_and_a_macro_for_those_of_its_burst_only(typist):
-    typist.queue.enter("MR 1\n/play m\n/stop\n/quit")
+    for line in ("MR 1", "/play m", "/stop", "/quit"):
+        typist.queue.enter(line)
     assert typist.session.started == ["/stop", "/quit"]
     assert typist.queue.count == 3  # /quit does not count
     await asyncio.sleep(0.9)
@@ -134,8 +144,60 @@ async def test_of_many_lines_the_first_are_shown_and_the_rest_counted():
 
 async def test_what_is_entered_while_buses_open_waits_for_them_but_stop_and_quit(typist):
     typist.queue.opening = True
-    typist.queue.enter("/play m\n/stop\n/quit")
+    for line in ("/play m", "/stop", "/quit"):
+        typist.queue.enter(line)
     assert typist.session.started == ["/stop", "/quit"]
     typist.queue.opening = False
     await asyncio.sleep(0.01)
     assert typist.session.started == ["/stop", "/quit", "/play m"]
+
+
+def two_buses(typist):
+    typist.session.place = Place("press", "a")
+    typist.session.buses = {"press": object(), "eth": object()}
+
+
+@pytest.mark.parametrize("together", [True, False], ids=["one paste", "a burst"])
+async def test_a_line_entered_before_a_bus_was_closed_goes_to_no_other_bus(typist, together):
+    two_buses(typist)
+    lines = ["/close press", "SL 200000", "@a MR 5", "@eth: PR P"]
+    for text in ["\n".join(lines)] if together else lines:
+        typist.queue.enter(text)
+    await asyncio.sleep(5.0)
+    assert typist.session.done == ["/close press", "@eth: PR P"]
+    assert typist.session.notices == [f"not sent, as press was closed: {line}" for line in ("SL 200000", "@a MR 5")]
+    typist.queue.enter("PR V")
+    await asyncio.sleep(2.0)
+    assert typist.session.done[-1] == "PR V", "typed for the bus that is selected now"
+
+
+async def test_a_line_behind_a_use_is_for_what_it_selects_also_once_the_bus_before_is_closed(typist):
+    two_buses(typist)
+    typist.queue.enter("/use eth\n/close press\nPR P")
+    await asyncio.sleep(5.0)
+    assert typist.session.done == ["/use eth", "/close press", "PR P"] and typist.session.notices == []
+
+
+async def test_a_paste_is_sent_as_far_as_its_quit_and_the_rest_is_named(typist):
+    typist.queue.enter("PR P\n/quit\nSL 200000\nMR 5")
+    await asyncio.sleep(5.0)
+    typist.queue.enter("MR 7")
+    assert (typist.session.done, typist.session.started) == (["PR P", "/quit"], [])
+    assert typist.session.notices == [
+        f"not sent, as multidrop is ending: {line}" for line in ("SL 200000", "MR 5", "MR 7")
+    ]
+
+
+async def test_while_a_quit_is_decided_nothing_is_sent_and_what_is_entered_is_named(typist):
+    typist.queue.enter("PR P")
+    await asyncio.sleep(0.6)
+    typist.queue.enter("MR 1")
+    with typist.queue.deciding():
+        await asyncio.sleep(3.0)
+        typist.queue.enter("SL 200000\n/stop\n/quit")
+    assert typist.session.done == ["PR P"] and typist.session.started == ["/stop"]
+    await asyncio.sleep(3.0)
+    assert typist.session.done == ["PR P", "MR 1"], "it was typed before the quit, which was declined"
+    assert typist.session.notices == [
+        f"not sent, as it was typed after a quit: {line}" for line in ("SL 200000", "/quit")
+    ]
