@@ -163,6 +163,8 @@ class Programs(Generic[S]):
     """Begins a remark in a file."""
     clearing: str = ""
     """The line that erases all programs; empty: there is none."""
+    begins: tuple[str, ...] = ()
+    """The words of lines that begin or end a program, or erase it with everything else."""
     names: Callable[[S], Procedure[Held]] | None = None
     """Read labels and variables without the program; None: the drives give none."""
     offered: Callable[[Held, str], Sequence[tuple[str, str]]] = lambda held, line: ()

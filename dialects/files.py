@@ -101,9 +101,16 @@ def encoded_program_of(path: str | Path) -> tuple[str, str]:
 def program_of(data: bytes, where: str) -> tuple[str, str]:
     """Decode a program file; see `encoded_program_of`. Raises Diagnostic."""
     text, encoding = _decoded(data, where)
+    check_program_text(text, where)
+    return text, encoding
+
+
+def check_program_text(text: str, where: str) -> None:
+    """Raise Diagnostic for a text that no program file holds. `where`: its file."""
+    if "\0" in text:
+        raise Diagnostic("is not a text file", where, "a program is plain text")
     if max(text.count("\n"), text.count("\r")) > MOST_LINES:
         raise Diagnostic(f"has more than {MOST_LINES} lines", where, "no drive holds such a program")
-    return text, encoding
 
 
 def _decoded(data: bytes, where: str) -> tuple[str, str]:

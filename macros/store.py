@@ -73,6 +73,10 @@ class MacroStore:
         return {name for name in found if not name.startswith(".")}
 
     def load(self, name: str) -> Macro:
+        return self._loaded(name)[0]
+
+    def _loaded(self, name: str) -> tuple[Macro, bytes]:
+        """A macro, and the bytes of its file that it was read from."""
         path = self.path(name)
         try:
             data = _bytes(path)
@@ -90,7 +94,7 @@ class MacroStore:
         if macro.name != name:
             what = f"name = {macro.name!r} in the file of {name!r}"
             raise Diagnostic(what, str(path), "make the name and the file's agree")
-        return macro
+        return macro, data
 
     def contents(self, name: str) -> bytes | None:
         """Read the bytes of a macro's file, for `save`; None without a file."""
@@ -154,19 +158,23 @@ class MacroStore:
 
     def set_key(self, name: str, key: str, page: str = FIRST_PAGE) -> None:
         """Change key (empty: none) and page in a macro's file, and nothing else. Raises Diagnostic as `save` does."""
-        macro = self.load(name)
+        macro, data = self._loaded(name)
         page = page if key else macro.page
         changes = {"key": key} if page == macro.page else {"key": key, "page": page}
-        self._change(replace(macro, key=key, page=page), changes)
+        self._change(replace(macro, key=key, page=page), changes, data)
 
     def describe(self, name: str, note: str) -> None:
         """Change the note in a macro's file, and nothing else."""
-        self._change(replace(self.load(name), note=note), {"note": note})
+        macro, data = self._loaded(name)
+        self._change(replace(macro, note=note), {"note": note}, data)
 
-    def _change(self, macro: Macro, changes: Mapping[str, str]) -> None:
+    def _change(self, macro: Macro, changes: Mapping[str, str], data: bytes) -> None:
+        """Change values in the file that was read as `data`. Raises Diagnostic if it holds something else by now."""
         path = self._checked_path(macro)
-        text = (self.contents(macro.name) or b"").decode("utf-8")
-        _write(path, with_values(text, changes, str(path)))
+        text = with_values(data.decode("utf-8"), changes, str(path))
+        if self.contents(macro.name) != data:
+            raise Diagnostic("the file has changed meanwhile", str(path), "it is as it is now; do it again")
+        _write(path, text)
 
     def copy(self, name: str, new: str, into: Path | None = None, keep_key: bool = False) -> Path:
         """Create a file of a new name with the same text, beside the old one or in another folder.
@@ -174,13 +182,12 @@ class MacroStore:
         Only one macro can have the key, so the copy has none unless `keep_key` is set.
         """
         check_name(new)
-        macro = self.load(name)
+        macro, data = self._loaded(name)
         old = self.path(name)
         path = (into or old.parent) / f"{new}.toml"
         changes = {"name": new, "key": macro.key if keep_key else ""}
         wanted = {key: value for key, value in changes.items() if getattr(macro, key) != value}
-        text = (self.contents(name) or b"").decode("utf-8")
-        _create(path, with_values(text, wanted, str(old)))
+        _create(path, with_values(data.decode("utf-8"), wanted, str(old)))
         return path
 
     def rename(self, name: str, new: str) -> Path:

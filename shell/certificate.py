@@ -108,12 +108,12 @@ def _write(session: Session, report: Report, file: str) -> None:
         raise
 
 
-async def compare(session: Session, drive: Drive, file: str) -> bool:
+async def compare(session: Session, drive: Drive, file: str, theirs: Report) -> bool:
     """Put the questions of a report to a drive, and print where its answers differ; whether they do.
 
-    An answer of the report that cannot be compared counts as a difference.
+    `theirs`: the report, as it was read from the file. An answer of it that cannot be compared counts as a difference.
     """
-    theirs, who = load(file), session.display_name(drive)
+    who = session.display_name(drive)
     if theirs.drive["family"] != drive.family.name:
         family = _shown([theirs.drive["family"]])
         raise Diagnostic(f"has answers of the family {family}; {who} is of {drive.family.name}", file)

@@ -203,6 +203,8 @@ class ProgramRead(NamedTuple):
     bus: str
     address: str
     lines: tuple[tuple[int, str], ...]
+    known: bool = True
+    """False: lines are sent that change it, and what was read before is not what it holds."""
 
 
 class SettingsRead(NamedTuple):

@@ -12,10 +12,13 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable
-from dataclasses import dataclass, field
-from typing import NamedTuple
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, NamedTuple
 
 from multidrop.dialects import Diagnostic
+
+if TYPE_CHECKING:
+    from multidrop.macros import Macro
 
 EVERYONE = ("*", "^")
 WAITS = ("/wait", "/sleep")
@@ -39,6 +42,11 @@ class VerbLine:
     rest: str
     typed: str = field(default="", compare=False)
     """The whole line."""
+    shown: str | Macro | None = field(default=None, compare=False)
+    """What a person was shown of the file that the line names: the text of a program, or a macro.
+
+    It is used instead of the file, which may have changed since. None: nothing was shown, and the file is read.
+    """
 
 
 @dataclass(frozen=True)
@@ -53,6 +61,12 @@ class DriveLine:
 
 
 TypedLine = VerbLine | DriveLine
+
+
+def showing(line: str, shown: str | Macro) -> TypedLine | None:
+    """Parse a line whose file a person was shown: a verb that is given what was shown. Raises Diagnostic."""
+    parsed = parse(line)
+    return replace(parsed, shown=shown) if isinstance(parsed, VerbLine) else parsed
 
 
 def parse(line: str) -> TypedLine | None:

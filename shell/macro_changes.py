@@ -8,6 +8,8 @@ import shutil
 import sys
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from pathlib import Path
+from typing import NamedTuple
 
 from multidrop.dialects import Diagnostic
 from multidrop.dialects.files import text_of
@@ -52,7 +54,24 @@ def copy(store: MacroStore, name: str, new: str, project: bool = False) -> list[
     return [f"macro {new}: a copy of {name} in {path}; it is on no key"]
 
 
-def delete(store: MacroStore, name: str) -> list[str]:
+class Deletion(NamedTuple):
+    """A macro that a person is asked about: the file that the question names, and what it holds."""
+
+    name: str
+    path: Path
+    data: bytes | None
+
+    @property
+    def what(self) -> str:
+        """The effect, for the question before it."""
+        return f"deletes macro {self.name}, the file {self.path}"
+
+
+def delete(store: MacroStore, agreed: Deletion) -> list[str]:
+    """Delete the macro that a person has agreed to. Raises Diagnostic if its file is another one by now."""
+    name = agreed.name
+    if (store.path(name), store.contents(name)) != (agreed.path, agreed.data):
+        raise Diagnostic("has changed since you were asked; nothing was deleted", str(agreed.path), "look at it again")
     path = store.delete(name)
     return [f"macro {name} is deleted, with {path}", *_callers(store, name)]
 
@@ -63,10 +82,10 @@ def check(store: MacroStore, name: str) -> None:
         store.load(name)
 
 
-def deletion(store: MacroStore, name: str) -> str:
-    """The effect of a deletion, for the question before it. Raises Diagnostic for an unknown macro."""
+def deletion(store: MacroStore, name: str) -> Deletion:
+    """What a deletion would delete, for the question before it. Raises Diagnostic for an unknown macro."""
     check(store, name)
-    return f"deletes macro {name}, the file {store.path(name)}"
+    return Deletion(name, store.path(name), store.contents(name))
 
 
 def set_key(store: MacroStore, key: str, name: str, page: str = FIRST_PAGE) -> tuple[str, list[str]]:

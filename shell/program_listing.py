@@ -73,6 +73,10 @@ class Sight:
     def read(self, listing: Listing) -> None:
         self._channel.publish(ProgramRead(*self._place(), listing.lines))
 
+    def changes(self) -> None:
+        """Publish that lines are sent that change the program: what was read of it is not what it holds."""
+        self._channel.publish(ProgramRead(*self._place(), (), known=False))
+
     def seen(self, line: int | None, phase: Phase = Phase.EXECUTES) -> None:
         """Publish where the program is; None: no program runs, or its place is not known."""
         self._last = line, phase

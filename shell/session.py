@@ -52,6 +52,7 @@ _published: ContextVar[list[BaseException] | None] = ContextVar("published", def
 """The failures published in this task's outermost `run`."""
 BARE_WORDS = {"exit": "/quit", "quit": "/quit", "help": "/help", "?": "/help"}
 TRAVEL = "multidrop.shell.travel:ask"
+SIGHT = "multidrop.shell.program_listing:Sight"
 
 
 def bare(word: str) -> Diagnostic:
@@ -260,7 +261,7 @@ class LinePath:
         session = self._session
         session.publish(Entered(session.now(), parsed.typed.strip(), by))
         verb = find(parsed.name)
-        call = imported(CALL)(session, verb, parsed.rest, by)
+        call = imported(CALL)(session, verb, parsed.rest, by, parsed.shown)
         self._allow(by)
         if verb.changes is not None and (not verb.changes or [*parsed.rest.split(), ""][0] in verb.changes):
             await self._undoubted([*session.buses.values()], by)
@@ -298,6 +299,8 @@ class LinePath:
         session.addressed.add((bus.name, drive.address))
         session.lately.begin()
         before, started = drive.commands, False
+        if _changes_program(drive, text):
+            imported(SIGHT)(session, drive).changes()
         try:
             started = starts and session.automations.starts(drive, only_ends(drive, text))
             printed = await drive.send(text, check)
@@ -387,6 +390,13 @@ class LinePath:
 def _only_reads(drive: Drive, text: str) -> bool:
     guards = drive.family.guards
     return guards is not None and not drive.stores and (guards.only_reads(text) or guards.only_ends(text))
+
+
+def _changes_program(drive: Drive, text: str) -> bool:
+    """Whether a line is stored in a program, begins or ends one, or erases all of them."""
+    programs = drive.family.programs
+    word = (text.split() or [""])[0].upper()
+    return programs is not None and bool(word) and (drive.programming or word in (programs.clearing, *programs.begins))
 
 
 def _raw_line(workspace: Workspace, line: str | TypedLine) -> DriveLine | None:

@@ -12,6 +12,8 @@ from functools import partial
 from textual.app import App
 from textual.widgets import Input, TextArea
 
+from multidrop.macros import Macro
+from multidrop.shell.line_syntax import showing
 from multidrop.tui.assist import Assist
 from multidrop.tui.keymap import Keymap
 from multidrop.tui.outbox import ended
@@ -162,12 +164,14 @@ class Actions:
 
     # Lines, the selection, pages and dialogs
 
-    async def action_run_line(self, line: str) -> None:
+    async def action_run_line(self, line: str, shown: Macro | None = None) -> None:
         """Run a line in the background. Its event reports a failure; a bug ends the app.
 
-        When this returns the line has taken its first step and has its drive.
+        `shown`: the macro that the line plays, as a person knows it. When this returns the line has taken its first
+        step and has its drive.
         """
-        self._parts.app.run_worker(ended(self._parts.session.start(line)))
+        typed = line if shown is None else showing(line, shown) or line
+        self._parts.app.run_worker(ended(self._parts.session.start(typed)))
         await asyncio.sleep(0)
         self._parts.selection.follow()
 
@@ -195,14 +199,19 @@ class Actions:
         macros, parts = self._parts.macros, self._parts
         if macros.held(key, self._parts.session.now()):
             return
+        before, shown = macros.keys.get(key), macros.shown_macros
         macros.read(self._parts.session.macros)
         if macros.trouble:
             parts.show_line(macros.trouble, "x")
         name = macros.keys.get(key)
         if clash := macros.clash(key):
             parts.show_line(clash, "x")
+        elif name is not None and (name != before or macros.shown_macros[name] != shown[name]):
+            what = f"{key} plays {name} now" if name != before else f"macro {name} has changed on the disk"
+            parts.show_line(f"{what}; nothing was sent, press {key} again to play it as it is now", "!")
+            parts.model.changed = True
         elif name is not None:
-            await self.action_run_line(f"/play {name}")
+            await self.action_run_line(f"/play {name}", macros.shown_macros[name])
         elif parts.session.recording:
             self._end_recording(key, parts.session.recording)
         else:

@@ -340,7 +340,8 @@ class MultidropApp(Dressed):
             if text := self.main.drop_page(name):
                 self.unsent.keep(text, self.main.current)
             self.model.forget(name)
-        self.macros.read(self.session.macros)
+        for name in self.macros.read(self.session.macros):
+            self._warn(f"macro {name} has changed: it is played as it is now")
         self._poll()
         self._raise_banner()
 

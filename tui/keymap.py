@@ -11,7 +11,7 @@ import difflib
 import math
 import re
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from textual.binding import Binding, BindingType
 from textual.keys import Keys
@@ -101,6 +101,11 @@ def _trouble(found: Keymap, name: str, text: str, spelled: list[str]) -> str:
     return ""
 
 
+def _alike(before: Macro, now: Macro) -> bool:
+    """Whether two macros play the same: key and note do not matter."""
+    return replace(before, key=now.key, page=now.page, note=now.note) == now
+
+
 HELD = 0.2
 """Seconds between two presses below which the second is the repetition of a held key."""
 
@@ -117,18 +122,24 @@ class FunctionKeys:
         """All pages, the first one always."""
         self.trouble = ""
         """The last read error in one line."""
+        self.shown_macros: dict[str, Macro] = {}
+        """The macros by name, as they were last read: what a key plays, and nothing else."""
         self._on: dict[str, dict[str, list[str]]] = {}
         """Names by page and key: a key with several plays none."""
         self._pressed = ("", -math.inf)
 
-    def read(self, store: MacroStore) -> None:
-        """Read the macros again; report a file that cannot be read, and leave it out."""
-        self.names, self._on, self.trouble = [], {}, ""
+    def read(self, store: MacroStore) -> list[str]:
+        """Read the macros again; report a file that cannot be read, and leave it out.
+
+        Returns the names of those that play other lines than when they were read before.
+        """
+        before = self.shown_macros
+        self.names, self._on, self.trouble, self.shown_macros = [], {}, "", {}
         try:
             names = store.names()
         except Diagnostic as failure:
             self.trouble = str(failure)
-            return
+            return []
         for name in names:
             try:
                 self._take(store.load(name))
@@ -137,9 +148,11 @@ class FunctionKeys:
         self.pages = sorted({FIRST_PAGE, *self._on}, key=page_order)
         if self.page not in self.pages:
             self.page = FIRST_PAGE
+        return [name for name, now in self.shown_macros.items() if name in before and not _alike(before[name], now)]
 
     def _take(self, macro: Macro) -> None:
         self.names.append((macro.name, visible(macro.note)))
+        self.shown_macros[macro.name] = macro
         if macro.key:
             self._on.setdefault(macro.page, {}).setdefault(macro.key, []).append(macro.name)
 

@@ -282,7 +282,7 @@ class ScreenModel:
                 self.progress = "" if event.over else event.text
             case events.ProgramRead():
                 program = self.bus(event.bus).readout(event.address).program
-                program.lines, program.read_at = event.lines, event.at
+                program.lines, program.read_at = event.lines, event.at if event.known else None
             case events.ProgramSeen():
                 program = self.bus(event.bus).readout(event.address).program
                 program.line, program.phase, program.seen_at = event.line, event.phase, event.at

@@ -21,6 +21,12 @@ class OpenText:
     cursor: tuple[int, int] = (0, 0)
     kept: str | None = None
     """The text of which a copy is kept; None: there is no copy."""
+    kept_over: bytes | None = None
+    """The content on the disk over which a person decided to keep this text; None: there was no such question."""
+
+    def take(self, now: EditedFile) -> None:
+        """Show the file as it is on the disk now."""
+        self.file, self.text, self.kept_over = now, now.text, None
 
     @property
     def name(self) -> str:
@@ -65,6 +71,10 @@ class Texts:
         found = self._drafts.find(text.name)
         return found if found is not None and found.text != real_text(text.text) else None
 
+    def overtaken(self, text: OpenText, draft: Copy) -> bool:
+        """True if the file has changed since the copy was made of it."""
+        return draft.base not in ("", text.file.digest)
+
     def unsaved(self) -> list[OpenText]:
         if self.take is not None:
             self.take()
@@ -80,7 +90,8 @@ class Texts:
             return
         now = text.text
         if text.changed:
-            self._drafts.keep(Copy(text.name, real_text(now), f"{datetime.now():%Y-%m-%d %H:%M}"))
+            at = f"{datetime.now():%Y-%m-%d %H:%M}"
+            self._drafts.keep(Copy(text.name, real_text(now), at, text.file.digest))
             text.kept = now
         else:
             self.drop_draft(text)

@@ -75,12 +75,11 @@ def list_(chosen: argparse.Namespace) -> int:
 
 def program_diff(chosen: argparse.Namespace) -> int:
     """Print the lines that differ; the exit code says whether any does."""
-    _check(chosen.file)
-    differ = False
+    text, differ = _checked(chosen.file), False
 
     async def compare(session: Session, drive: Drive) -> None:
         nonlocal differ
-        name, found = session.display_name(drive), await transfers.differences(session, drive, chosen.file)
+        name, found = session.display_name(drive), await transfers.differences(session, drive, chosen.file, text)
         for row in found:
             facts = {
                 "drive": address_of(session, drive),
@@ -111,25 +110,29 @@ def upload(chosen: argparse.Namespace) -> int:
 
 
 def download(chosen: argparse.Namespace) -> int:
-    """Send a file to the drive; report a wrong file before anything is opened."""
-    _check(chosen.file)
+    """Send a file to the drive; report a wrong file before anything is opened.
+
+    It is read once: each drive gets the text that was checked here, whatever becomes of the file.
+    """
+    text = _checked(chosen.file)
     later = is_several(chosen.drive)
     wanted = transfers.Wanted(not chosen.no_verify, chosen.save, chosen.only_changed, chosen.run, later)
 
     async def put(session: Session) -> None:
         drives = targets(session, chosen.drive, "programs")
-        await each(session, drives, lambda drive: transfers.download(session, drive, chosen.file, wanted))
+        await each(session, drives, lambda drive: transfers.download(session, drive, chosen.file, wanted, text))
         if later and chosen.run:
-            await each(session, drives, lambda drive: transfers.start(session, drive, chosen.file, wanted))
+            await each(session, drives, lambda drive: transfers.start(session, drive, chosen.file, wanted, text))
 
     return runner.run([chosen.url], put, agreed=chosen.yes, tried=chosen.drive.split(","))
 
 
-def _check(file: str) -> None:
-    """Raise Diagnostic for a file that is correct in no language: the error in the language of its name."""
+def _checked(file: str) -> str:
+    """Read a program file. Raises Diagnostic for one that is correct in no language, in the language of its name."""
     own, text = program_languages()[program_language_of(file)], program_text_of(file)
     if all(errors(source.language.check(text)) for source in program_languages().values() if source is not own):
         own.language.read(text, file)
+    return text
 
 
 def _with_drive(
@@ -157,8 +160,7 @@ def params_diff(chosen: argparse.Namespace) -> int:
     if sum((bool(chosen.file), bool(chosen.against or chosen.other), chosen.defaults)) != 1:
         valid = "FILE, --against URL or --other ADDR, or --defaults"
         raise Diagnostic("params diff compares with one thing", hint=valid)
-    if chosen.file and not work.is_several(chosen.drive):
-        files.load(chosen.file)
+    loaded = files.load(chosen.file) if chosen.file and not work.is_several(chosen.drive) else None
 
     async def compare(session: Session) -> int:
         other = None
@@ -167,7 +169,8 @@ def params_diff(chosen: argparse.Namespace) -> int:
             if chosen.against and chosen.against != chosen.url:
                 bus = (await session.open(chosen.against))[0].name
             other = session.drive(bus, address or None)
-        differs = await work.diff(session, chosen.drive, name=chosen.file, other=other, as_json=chosen.json)
+        given = {"name": chosen.file, "other": other, "as_json": chosen.json, "loaded": loaded}
+        differs = await work.diff(session, chosen.drive, **given)
         return DIFFERS if differs else 0
 
     tried = [*chosen.drive.split(","), "" if chosen.against else chosen.other]
@@ -187,11 +190,10 @@ def params_restore(chosen: argparse.Namespace) -> int:
         dry_run=chosen.dry_run,
         other_product=chosen.other_product,
     )
-    if not work.is_several(chosen.drive):
-        files.load(chosen.file)
+    loaded = None if work.is_several(chosen.drive) else files.load(chosen.file)
 
     async def put(session: Session) -> None:
-        await work.restore_each(session, chosen.file, chosen.drive, options)
+        await work.restore_each(session, chosen.file, chosen.drive, options, loaded)
 
     return runner.run([chosen.url], put, agreed=chosen.yes, unsolicited=False, tried=chosen.drive.split(","))
 
@@ -210,15 +212,14 @@ def certify(chosen: argparse.Namespace) -> int:
     """Write a report, or compare a drive with one; report a wrong file before anything is opened."""
     if is_several(chosen.drive):
         raise Diagnostic(f"--drive {chosen.drive}: a report is of one drive", "certify", "name one")
-    if chosen.compare:
-        certificate.load(chosen.compare)
-    else:
+    theirs = certificate.load(chosen.compare) if chosen.compare else None
+    if theirs is None:
         new_file.check(chosen.output, printed=True)
 
     async def work(session: Session) -> int:
         [drive] = targets(session, chosen.drive)
-        if chosen.compare:
-            return DIFFERS if await certificate.compare(session, drive, chosen.compare) else 0
+        if theirs is not None:
+            return DIFFERS if await certificate.compare(session, drive, chosen.compare, theirs) else 0
         await certificate.certify(session, drive, chosen.output)
         return 0
 

@@ -41,7 +41,7 @@ def show(chosen: argparse.Namespace) -> int:
 
 
 def play(chosen: argparse.Namespace) -> int:
-    """Play a macro; report wrong values and lines before anything is opened."""
+    """Play a macro; report wrong values and lines before anything is opened. What was checked is what plays."""
     from multidrop.shell.batch.report import Report
     from multidrop.shell.scripts.reading import read_macro
 
@@ -55,7 +55,7 @@ def play(chosen: argparse.Namespace) -> int:
         values |= _asked(macro, values)
         if hides := store.hides(macro.name):
             write(sys.stderr, hides)
-        read_macro(macro, values, store)
+        checked = read_macro(macro, values, store)
     except Diagnostic as problem:
         return report.refused(problem)
     except KeyboardInterrupt:
@@ -66,7 +66,7 @@ def play(chosen: argparse.Namespace) -> int:
     async def body(session: Session) -> None:
         await report.watched(session, chosen.on, chosen.role)
         with report.noting():
-            given = {"times": chosen.times, "fast": chosen.fast}
+            given = {"times": chosen.times, "fast": chosen.fast, "checked": checked}
             await play_macro(session, macro, values, **given, executed=report.executed, ended=report.ended)
 
     code = runner.run([], body, agreed=chosen.yes, beyond=chosen.beyond, asks=False, replies=not chosen.json)
@@ -137,7 +137,8 @@ def _changed(chosen: argparse.Namespace, store: MacroStore) -> list[str]:
         case "macro import":
             return macro_changes.import_(store, chosen.file, chosen.force)
         case "macro delete":
-            what = macro_changes.deletion(store, chosen.name)
+            doomed = macro_changes.deletion(store, chosen.name)
+            what = doomed.what
             agreed = chosen.yes
             if not agreed and sys.stdin.isatty() and sys.stderr.isatty():
                 sys.stderr.write(f"macro delete {what}. Go on? [y/N] ")
@@ -145,7 +146,7 @@ def _changed(chosen: argparse.Namespace, store: MacroStore) -> list[str]:
                 agreed = sys.stdin.readline().strip() in ("y", "Y")
             if not agreed:
                 raise Diagnostic(f"{what}; nothing was deleted", "macro delete", "--yes agrees to it")
-            return macro_changes.delete(store, chosen.name)
+            return macro_changes.delete(store, doomed)
         case _:
             return _edited(chosen.name, store)
 

@@ -90,10 +90,15 @@ class _Replacement:
             return
         await check_ready(self._drive)
         steps = ", ".join(changes) if changes else f"nothing differs, {self._parameters.saving} saves it"
+        agreed = self._session.questions.agreed
         await self._session.questions.confirm(
             f"it gets the state of {spec.name!r} in {self._file}: {steps}", self._name
         )
         await check_ready(self._drive)  # a person may have thought about it for long
+        if not agreed:
+            again = await snapshots.read(self._session, self._drive)
+            if self._steps(again) != self._steps(now):
+                raise Refused(f"{self._name}: it changed since the question was asked; nothing was sent; try again")
         try:
             await self._write(here)
             now = await snapshots.read(self._session, self._drive)
@@ -149,8 +154,7 @@ class _Replacement:
             out(f"{self._name}: program: {counted(len(self._program.lines), 'line')} in place of {len(now.program)}")
         elif now.program and not self._program.lines:
             out(f"{self._name}: its program of {counted(len(now.program), 'line')} stays: {self._file} has none")
-        readings = replace(now.readings, labels=(*now.readings.labels, *self._program.labels))
-        ordinary, whole = self._plan(readings), self._plan(readings, communication=True)
+        ordinary, whole = self._plans(now)
         final = {each.name: each for each in whole if not each.temporary}
         wire = [name for name in final if name not in {each.name for each in ordinary}]
         for name, each in final.items():
@@ -176,6 +180,15 @@ class _Replacement:
             if name in self._parameters.later:
                 out(f"{self._name}: after that, {name} waits until the drive is switched off and on")
         return changes
+
+    def _plans(self, now: Snapshot) -> tuple[Plan, Plan]:
+        """The steps to the settings of the file, without those of communication and with them."""
+        readings = replace(now.readings, labels=(*now.readings.labels, *self._program.labels))
+        return self._plan(readings), self._plan(readings, communication=True)
+
+    def _steps(self, now: Snapshot) -> tuple[object, ...]:
+        """What an apply changes in a drive: what the question is about."""
+        return (now.program, *(tuple((each.text, each.before) for each in plan) for plan in self._plans(now)))
 
     def _differs(self, here: DriveSpec) -> bool:
         program = self._program.lines

@@ -167,16 +167,25 @@ async def save(workspace: Workspace, target: str) -> None:
 
 
 async def diff(
-    workspace: Workspace, target: str, *, name: str = "", other: Drive | None = None, as_json: bool = False
+    workspace: Workspace,
+    target: str,
+    *,
+    name: str = "",
+    other: Drive | None = None,
+    as_json: bool = False,
+    loaded: files.SettingsFile | None = None,
 ) -> bool:
-    """Print what differs from a file, another drive, or (without both) the defaults; whether anything does."""
+    """Print what differs from a file, another drive, or (without both) the defaults; whether anything does.
+
+    `loaded`: the file of one drive, if it was read already.
+    """
     differs = False
     reference = await files.read(workspace, other, "reading") if other is not None else None
     several = is_several(target)
 
     async def compare(drive: Drive) -> None:
         nonlocal differs
-        file = files.load(file_of(workspace, drive, name, target)) if name else None
+        file = loaded or (files.load(file_of(workspace, drive, name, target)) if name else None)
         # No setting has the same meaning in a file or a drive of another family.
         language = drive.family.values.parameters.language
         has = f"{workspace.display_name(drive)} has {language}; their settings cannot be compared"
@@ -415,13 +424,17 @@ async def _finish(workspace: Workspace, drive: Drive, plan: Plan, goal: Mapping[
         workspace.notify(f"{result}; not saved, so lost at power-off: --save keeps it ({saving})", warning=True)
 
 
-async def restore_each(session: Session, name: str, target: str, options: Options) -> None:
+async def restore_each(
+    session: Session, name: str, target: str, options: Options, ready: files.SettingsFile | None = None
+) -> None:
     """Restore drives from their files; every file is read before the first step.
+
+    `ready`: the file of one drive, if it was read already.
 
     Raises Diagnostic where the file for one of several drives names another drive, or none.
     """
     drives = targets(session, target)
-    loaded = {drive: files.load(file_of(session, drive, name, target)) for drive in drives}
+    loaded = {drive: ready or files.load(file_of(session, drive, name, target)) for drive in drives}
     for drive, file in loaded.items() if is_several(target) else ():
         if file.name != (drive.state.name or drive.address):
             who, whose = session.display_name(drive), f"drive {file.name}" if file.name else "no drive"

@@ -8,11 +8,13 @@ from __future__ import annotations
 
 import os
 import re
+from dataclasses import dataclass
 from pathlib import Path
 
 from multidrop.dialects import Diagnostic
 from multidrop.dialects.files import bytes_of, decoded, why
 from multidrop.dialects.text import ACTING
+from multidrop.shell.state.store import digest
 
 LARGEST = 512 * 1024
 """Bytes; many times what a drive holds, and as much as an editor takes with ease."""
@@ -21,10 +23,16 @@ _STAND_IN_OF = {code: chr(0xF700 + number) for number, code in enumerate(_ACT)}
 _REAL = {ord(shown): chr(code) for code, shown in _STAND_IN_OF.items()}
 STAND_INS = "".join(_STAND_IN_OF.values())
 """The characters of an edited text that stand for others."""
+_OTHER = b"\0"
+"""A content that no file under editing has."""
 
 
 class ChangedMeanwhile(Diagnostic):
-    """The file on the disk is not the one that was opened."""
+    """The file on the disk is not the one that was opened. `seen` is what it holds now; None: there is no file."""
+
+    def __init__(self, message: str, where: str, seen: bytes | None) -> None:
+        super().__init__(message, where)
+        self.seen = seen
 
 
 class EditedFile:
@@ -32,9 +40,18 @@ class EditedFile:
 
     def __init__(self, path: str | Path) -> None:
         """Read the file; one that does not exist is empty. Raises Diagnostic."""
-        self.path = Path(path)
-        self._data = _content(self.path)
-        text, self.encoding = decoded(self._data or b"")
+        self._take(Path(path), _content(Path(path)))
+
+    @classmethod
+    def _of(cls, path: Path, data: bytes) -> EditedFile:
+        made = cls.__new__(cls)
+        made._take(path, data)
+        return made
+
+    def _take(self, path: Path, data: bytes | None) -> None:
+        """Take the content of a file. Raises Diagnostic for one that no editor can hold."""
+        self.path, self._data = path, data
+        text, self.encoding = decoded(data or b"")
         if _REAL.keys() & set(map(ord, text)):
             raise Diagnostic("holds characters of the private area U+F700", str(self.path), "edit it elsewhere")
         ends = re.findall(_end(text), text)
@@ -44,12 +61,43 @@ class EditedFile:
         self.text = edited(text)
 
     @property
+    def data(self) -> bytes | None:
+        """The content of the file when it was last read or written; None: there was no file."""
+        return self._data
+
+    def look(self) -> Outside:
+        """Compare the file on the disk, byte by byte, with what was last read or written. For a thread."""
+        try:
+            data = _content(self.path)
+            if data == self._data:
+                return Outside()
+            if data is None:
+                return Outside("is gone from the disk", gone=True)
+            now = EditedFile._of(self.path, data)
+        except Diagnostic as problem:
+            return Outside(f"cannot be read again: {problem.message}")
+        return Outside("is new on the disk" if self._data is None else "has changed on the disk", now)
+
+    @property
+    def digest(self) -> str:
+        """A short name for the content when it was last read or written; the same for every file that is not there."""
+        return digest((self._data or b"").decode("latin-1"), 32)
+
+    def outdated(self) -> None:
+        """Note that the text under editing was made of another content than the file has: a save asks."""
+        self._data = _OTHER
+
+    def lost(self) -> None:
+        """Note that the file is gone from the disk: its text is not saved any more."""
+        self._data, self.text = None, ""
+
+    @property
     def new(self) -> bool:
         """True if the file did not exist when it was last read or written."""
         return self._data is None
 
-    def save(self, text: str, over: bool = False) -> None:
-        """Write the text, whole or not at all. `over`: also over a file that changed meanwhile.
+    def save(self, text: str, over: ChangedMeanwhile | None = None) -> None:
+        """Write the text, whole or not at all. `over`: also over the content that a person was told about.
 
         Raises ChangedMeanwhile, or Diagnostic where it cannot be written; the file is then as it was.
         """
@@ -57,9 +105,12 @@ class EditedFile:
 
         data = self._encoded(text)
         now = _content(self.path)
-        if now != self._data and not over:
+        if now not in (self._data, data) and (over is None or now != over.seen):
             what = "is new on the disk" if self._data is None else "has changed on the disk since it was read"
-            raise ChangedMeanwhile(what if now is not None else "is gone from the disk", str(self.path))
+            raise ChangedMeanwhile(what if now is not None else "is gone from the disk", str(self.path), now)
+        if now == data != self._data:  # another program has saved this text
+            self._data, self.text, self.mixed = data, text, False
+            return
         if now is not None and not os.access(self.path, os.W_OK):  # a replacement would not heed that
             raise Diagnostic("cannot be written: it is read-only", str(self.path), "the file is as it was")
         try:
@@ -80,6 +131,16 @@ class EditedFile:
             line = real.count("\n", 0, problem.start) + 1
             what = f"{real[problem.start]!r} cannot be written: the file is {self.encoding}"
             raise Diagnostic(what, f"{self.path}:{line}", "nothing was saved; replace the character") from None
+
+
+@dataclass(frozen=True)
+class Outside:
+    """What another program did to an open file, in words (empty: it is as it was), and the file as it is now."""
+
+    said: str = ""
+    now: EditedFile | None = None
+    """None: it cannot be read."""
+    gone: bool = False
 
 
 def edited(text: str) -> str:

@@ -16,13 +16,13 @@ from weakref import WeakSet
 from multidrop.dialects import Diagnostic, DriveError, Refused, SourceLine
 from multidrop.dialects.errors import Differs
 from multidrop.dialects.families import program_languages
-from multidrop.dialects.files import program_text_of
+from multidrop.dialects.files import check_program_text, program_text_of
 from multidrop.dialects.program_files import LOCKED, Difference, Held, errors, refuse
 from multidrop.dialects.text import counted
 from multidrop.drives.drive import Drive, still
 from multidrop.shell.channel import running, transferring
 from multidrop.shell.events import By, Printed
-from multidrop.shell.program_listing import check_one, read
+from multidrop.shell.program_listing import Sight, check_one, read
 from multidrop.shell.session import Session
 from multidrop.shell.state.backups import Copy, Sources, write_backup
 from multidrop.shell.state.crash_marks import marked
@@ -61,7 +61,11 @@ async def checked(
 
     Raises Diagnostic for the first error, or for another language.
     """
-    own, text = drive.program_files, await asyncio.to_thread(program_text_of, file) if text is None else text
+    if text is None:
+        text = await asyncio.to_thread(program_text_of, file)
+    else:
+        check_program_text(text, file)
+    own = drive.program_files
     problems = await asyncio.to_thread(own.language.check, text, drive.product)
     for other in program_languages().values() if errors(problems) else ():
         if other is not own and not errors(await asyncio.to_thread(other.language.check, text)):
@@ -73,12 +77,13 @@ async def checked(
     return text, await asyncio.to_thread(own.language.read, text, file)
 
 
-async def differences(session: Session, drive: Drive, file: str) -> Sequence[Difference]:
+async def differences(session: Session, drive: Drive, file: str, text: str | None = None) -> Sequence[Difference]:
     """Read the program lines of a drive, and return where a file differs; programs that it lacks do not count.
 
-    Raises Diagnostic for the file, and Refused where the drive's program is locked.
+    `text`: what a file of that name would hold. Raises Diagnostic for the file, and Refused where the drive's program
+    is locked.
     """
-    _, lines = await checked(session, drive, file)
+    _, lines = await checked(session, drive, file, text)
     held = await read(session, drive, "diff", lines)
     held.check_listed(session.display_name(drive))
     return drive.programs.differences(drive.state, lines, held, None)
@@ -115,9 +120,12 @@ async def download(
         _under_way.discard(drive)
 
 
-async def start(session: Session, drive: Drive, file: str, wanted: Wanted) -> None:
-    """Execute the program of a download whose start was left for `later`. Raises the drive's failures."""
-    _, lines = await checked(session, drive, file)
+async def start(session: Session, drive: Drive, file: str, wanted: Wanted, text: str) -> None:
+    """Execute the program of a download whose start was left for `later`. `text`: what was downloaded.
+
+    Raises the drive's failures.
+    """
+    _, lines = await checked(session, drive, file, text)
     async with session.automations.run(f"the start of {file}"):
         await _Download(session, drive, file, wanted).start(drive.programs.start(lines, wanted.run))
 
@@ -236,6 +244,8 @@ class _Download:
         workspace.addressed.add((drive.link.name, drive.address))
         if any(drive.codec.starts_motion(line.text) for line in self._programs.executed(lines)):
             self._session.path.starting(drive)
+        if self._programs.size(lines) and drive.family.debugging is not None:
+            Sight(workspace, drive).changes()
         try:
             with running(workspace, f"{self._name}: download") as job:
                 sent = await drive.download(lines, held, job)

@@ -22,7 +22,7 @@ from multidrop.shell.events import FAILURES, By, OnBus, SessionEvent
 from multidrop.shell.playing import NO_ROLES, cast
 from multidrop.shell.scripts.captured_prints import hearing
 from multidrop.shell.scripts.execution import CUT, Execution, Frame, Unfinished
-from multidrop.shell.scripts.model import Ended, Ending, Executed, Result, Script, ScriptLine
+from multidrop.shell.scripts.model import Ended, Ending, Executed, MacroScript, Result, Script, ScriptLine
 from multidrop.shell.scripts.planning import bind, macro_claims, script_claims
 from multidrop.shell.scripts.reading import read_macro
 from multidrop.shell.session import Session
@@ -110,15 +110,17 @@ async def play(
     roles: Mapping[str, str] = NO_ROLES,
     executed: Executed = lambda result: None,
     ended: Ended = lambda end: None,
+    checked: MacroScript | None = None,
 ) -> None:
     """Play a macro to its end as one automation, listed in `session.playing` meanwhile. Raises the first failure.
 
     It is checked whole first, and the drives that it moves are claimed, as far as its lines show them. Its early end
     stops those that it started, executes its `on_early_end` lines, and is reported. `times` None: until it is ended.
     `fast`: without recorded pauses. `roles`: the bus for each role. A line without an address goes to the drive that
-    was selected when the macro began, or by a `/use` in it.
+    was selected when the macro began, or by a `/use` in it. `checked`: the macro with all that it calls, where that was
+    read and checked with these values already.
     """
-    played = read_macro(macro, values, session.macros)
+    played = checked or read_macro(macro, values, session.macros)
     if session.latched:
         raise Stopped(LATCHED)
     roles = bind(session, macro, roles)

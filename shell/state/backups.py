@@ -21,10 +21,12 @@ class Copy(NamedTuple):
     file: str
     text: str
     at: str
+    base: str = ""
+    """A digest of what the file held when a draft was made; empty: not known."""
 
     @classmethod
     def parse(cls, found: Any) -> Copy:
-        return cls(*(str(found[key]) for key in cls._fields))
+        return cls(str(found["file"]), str(found["text"]), str(found["at"]), str(found.get("base", "")))
 
 
 class Drafts:

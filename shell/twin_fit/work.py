@@ -257,7 +257,8 @@ async def fit(session: Session, log: Path, cell: Path, as_json: bool) -> Callabl
 
     Raises Diagnostic for a log or a cell that is not one, DriveError where nothing can be told.
     """
-    logged, shop = steps.read(log), cells.load(cell, session.settings.allowed)
+    logged, text = steps.read(log), utf8_of(cell)
+    shop = cells.read(text, str(cell), cell.absolute().parent, session.settings.allowed)
     everything: list[Step | Exchange] = [*logged.steps, *logged.polls]
     drives = {place: each for place, each in targets(session, everything).items() if place[1] not in EVERYONE}
     specs = {(bus.name, each.name): each for bus in shop.buses for each in bus.drives}
@@ -281,7 +282,7 @@ async def fit(session: Session, log: Path, cell: Path, as_json: bool) -> Callabl
     told = {axis: values for axis, values in told.items() if values}
     if not told:
         raise DriveError(f"{log} tells no value; {cell} is unchanged")
-    return partial(_keep, cell, shop, told)
+    return partial(_keep, cell, text, shop, told)
 
 
 def _line(axis: Axis, name: str, known: Estimate | None, seen: Evidence, as_json: bool) -> str:
@@ -317,11 +318,16 @@ def _name(axis: Axis) -> str:
     return join_target(bus, drive) + (f".{own}" if own else "")
 
 
-def _keep(path: Path, shop: Cell, told: Mapping[Axis, Mapping[str, float]]) -> None:
-    """Put values into a cell's file, with its remarks and its layout; it is replaced as a whole. Raises Diagnostic."""
+def _keep(path: Path, before: str, shop: Cell, told: Mapping[Axis, Mapping[str, float]]) -> None:
+    """Put values into a cell's file, with its remarks and its layout; it is replaced as a whole.
+
+    `before`: the text that was fitted. Raises Diagnostic, also for a file that has another text now.
+    """
     import tomlkit
 
-    document: Any = tomlkit.parse(utf8_of(path))
+    if utf8_of(path) != before:
+        raise Diagnostic("has changed since it was read", str(path), "fit it again; the file is as it is now")
+    document: Any = tomlkit.parse(before)
     for (bus, drive, axis), values in told.items():
         (at,) = (n for n, each in enumerate(shop.buses) if each.name == bus)
         (own,) = (n for n, each in enumerate(shop.buses[at].drives) if each.name == drive)

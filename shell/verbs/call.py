@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Coroutine, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from multidrop.dialects import Diagnostic
 from multidrop.drives.drive import Drive
@@ -14,6 +14,9 @@ from multidrop.shell.line_syntax import split_target
 from multidrop.shell.operations.operation import Operation
 from multidrop.shell.operations.usage import limits, split
 from multidrop.shell.session import Session
+
+if TYPE_CHECKING:
+    from multidrop.macros import Macro
 
 
 def words(verb: Operation, rest: str) -> list[str]:
@@ -33,6 +36,8 @@ class Call:
     verb: Operation
     rest: str
     by: By = By.OPERATOR
+    shown: str | Macro | None = None
+    """What a person was shown of the file that the line names; see `line_syntax.VerbLine`."""
 
     def work(self) -> Coroutine[Any, Any, None]:
         work: Coroutine[Any, Any, None] = self.verb.imported(self.verb.work)(self)

@@ -36,6 +36,11 @@ async def play(call: Call) -> None:
     if call.by is By.OPERATOR and any(each.name == chosen.macro for each in workspace.playing):
         raise Diagnostic(f"macro {chosen.macro} is playing", "/play", f"/play stop {chosen.macro} ends it")
     macro = workspace.macros.load(chosen.macro)
+    if isinstance(call.shown, Macro) and macro != call.shown:
+        what = f"macro {macro.name} has changed on the disk since it was shown here; nothing was sent"
+        raise Diagnostic(
+            what, str(workspace.macros.path(macro.name)), "look at it; play it again to play it as it is now"
+        )
     values, roles = await settled(workspace, macro, chosen.given)
     await executor.play(call.session, macro, values, times=chosen.times, fast=chosen.fast, roles=roles)
 
@@ -74,8 +79,9 @@ async def macro(call: Call) -> None:
         case ["import", file] if not file.startswith("--"):
             done = macro_changes.import_(store, file)
         case ["delete", name]:
-            await workspace.questions.confirm(macro_changes.deletion(store, name), so_far="nothing was deleted")
-            done = macro_changes.delete(store, name)
+            doomed = macro_changes.deletion(store, name)
+            await workspace.questions.confirm(doomed.what, so_far="nothing was deleted")
+            done = macro_changes.delete(store, doomed)
         case ["export", file, *names]:
             done = macro_changes.export(store, call.output_file(file), names, workspace.output)
         case _:

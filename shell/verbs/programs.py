@@ -84,7 +84,8 @@ async def download(call: Call) -> None:
         only_changed="--only-changed" in options,
         run=options.get("--run", ""),
     )
-    await transfers.download(call.session, call.drive(target), file, wanted, by=call.by)
+    shown = call.shown if isinstance(call.shown, str) else None
+    await transfers.download(call.session, call.drive(target), file, wanted, shown, by=call.by)
 
 
 async def check(call: Call) -> None:

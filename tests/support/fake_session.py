@@ -29,7 +29,7 @@ from multidrop.drives.telemetry import Value
 from multidrop.shell.channel import Front
 from multidrop.shell.configuration import Settings
 from multidrop.shell.events import By, Entered, Failed, Notified, OnBus, Printed, SessionEvent, StateChanged
-from multidrop.shell.line_syntax import Place, TypedLine
+from multidrop.shell.line_syntax import Place, TypedLine, VerbLine
 from multidrop.shell.prompt.complete import Completion
 from multidrop.shell.roles import RunningPlot, Series
 from multidrop.shell.state.backups import Drafts
@@ -164,6 +164,8 @@ class FakeSession:
 
     def __init__(self, *buses: FakeBus, macros: Sequence[FakeMacro] = ()) -> None:
         self.buses = {bus.name: bus for bus in buses}
+        self.shown: list[object] = []
+        """What a person was shown of the files of the lines that were started with it."""
         self.selected_bus = buses[0].name if buses else ""
         self.addresses = {bus.name: next(iter(bus.drives), "") for bus in buses}
         self.reconnections = SimpleNamespace(trying=[])
@@ -260,6 +262,8 @@ class FakeSession:
 
     def start(self, line: str | TypedLine, by: By = By.OPERATOR, since: int | None = None) -> asyncio.Task[bool]:
         text = line if isinstance(line, str) else line.typed
+        if isinstance(line, VerbLine):
+            self.shown.append(line.shown)
         typed = self.stops if since is None else since
 
         async def quietly() -> bool:

@@ -199,11 +199,17 @@ class MacrosPage(ListPage):
     def action_play(self) -> None:
         """Play the chosen macro, once a press; it asks for the values that it needs.
 
-        The line waits for no other one: presses while the macro plays are refused, and play nothing later.
+        The line waits for no other one: presses while the macro plays are refused, and play nothing later. A macro
+        that has changed on the disk is not played: it is shown as it is now.
         """
         chosen = self._chosen()
-        if chosen is not None and not self.host.macros.held(ENTER, self.host.session.now()):
-            self.host.outbox.at_once([f"/play {chosen.name}"])
+        if chosen is None or self.host.macros.held(ENTER, self.host.session.now()):
+            return
+        if chosen.macro is not None:
+            self.start(f"/play {chosen.name}", chosen.macro)
+        else:
+            self.host.show_line(f"{chosen.trouble}; nothing was played", "x")
+        self.host.model.changed = True  # it is read again: its file may have changed
 
     def action_end(self) -> None:
         if (chosen := self._chosen()) is not None:

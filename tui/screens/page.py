@@ -6,6 +6,7 @@ that the transcript shows what was sent.
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import Awaitable, Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import ClassVar, NamedTuple
@@ -16,12 +17,13 @@ from textual.screen import Screen
 
 from multidrop.dialects import Diagnostic
 from multidrop.dialects.on_demand import imported
-from multidrop.shell.line_syntax import Place
+from multidrop.macros import Macro
+from multidrop.shell.line_syntax import Place, showing
 from multidrop.shell.session import Session
 from multidrop.tui.frame_scheduler import Frames
 from multidrop.tui.key_table import Keyed
 from multidrop.tui.keymap import FunctionKeys
-from multidrop.tui.outbox import Outbox
+from multidrop.tui.outbox import Outbox, ended
 from multidrop.tui.panels.view import View
 from multidrop.tui.screen_model import Record, ScreenModel
 from multidrop.tui.screens.dialogs import Field
@@ -139,6 +141,16 @@ class Page(Framed):
         """Make a part that is rows; `lines` finds it by its name."""
         self._parts[name] = Lines(id=name)
         return self._parts[name]
+
+    def start(self, line: str, shown: str | Macro | None = None, since: int | None = None) -> asyncio.Task[bool]:
+        """Run a line as if it was typed; a failure is shown in the transcript.
+
+        `shown`: what a person was shown of the file that the line names; it is used instead of the file. `since`: the
+        number of stops when a person agreed to the line.
+        """
+        task = self.host.session.start(line if shown is None else showing(line, shown) or line, since=since)
+        self.run_worker(ended(task))
+        return task
 
     def action_leave(self) -> None:
         self.dismiss(None)

@@ -20,17 +20,18 @@ from textual.containers import Horizontal, Vertical
 from multidrop.dialects import Diagnostic
 from multidrop.dialects.program_files import Entry, Problem
 from multidrop.shell.programs.checking import ending_of
-from multidrop.shell.programs.edited_file import ChangedMeanwhile
+from multidrop.shell.programs.edited_file import real_text
 from multidrop.shell.programs.program_text import ProgramGrammar
-from multidrop.tui.editor import ConfigurationGrammar, Editor, Grammar, grammar_of
-from multidrop.tui.outbox import ended
+from multidrop.tui.editor import Editor, Grammar, grammar_of
 from multidrop.tui.panels.program import SIGNS, index_of, spot_of, state_words
 from multidrop.tui.panels.table import column_rows, panel, side_width
 from multidrop.tui.panels.view import View
 from multidrop.tui.readout import ProgramFacts
 from multidrop.tui.screens.dialogs import Ask, Confirm, Offer, Search, offers_like
 from multidrop.tui.screens.page import Host, Page
+from multidrop.tui.screens.program_file import FileOnScreen, Seen
 from multidrop.tui.screens.program_rows import (
+    LOOK_FIRST,
     UPLOAD,
     Finder,
     Findings,
@@ -43,7 +44,6 @@ from multidrop.tui.screens.program_rows import (
     news_rows,
     problem_rows,
     product_of,
-    refusal,
     rule,
     run_choices,
     target_of,
@@ -71,6 +71,7 @@ class ProgramPage(Page):
         self.editor = Editor(id="editor")
         self.text: OpenText | None = None
         self.grammar: Grammar | None = None
+        self.file = FileOnScreen(self)
         self.findings = Findings()
         self.view = View(host.session, host.model, (), host.session.now(), True)
         self._edited_at: float | None = None
@@ -78,6 +79,8 @@ class ProgramPage(Page):
         self._taking_in = False
         self._compared: tuple[object, str] = ((), "")
         """The lines of the drive to which the text was compared, and the product for which it was checked."""
+        self._checked: str | None = None
+        """The text of which the findings are."""
         self._warned = ""
         self._step: asyncio.Task[bool] | None = None
 
@@ -97,9 +100,23 @@ class ProgramPage(Page):
         self.set_interval(PAUSE / 2, self._settle)
         self.on_resize()
         if self.host.texts.current is not None:
-            self._show_text(self.host.texts.current)
+            self.show_text(self.host.texts.current)
+            self.host.keyboard.hold(self)
+            self.run_worker(self._return())
         else:
             await self.action_open()
+
+    async def _return(self) -> None:
+        """Look at the disk when the page is shown again. A slow disk holds up only the keys."""
+        try:
+            await self.file.catch_up()
+        finally:
+            self.host.keyboard.release(self)
+
+    @property
+    def in_front(self) -> bool:
+        """Whether it is shown, without a box in front of it."""
+        return self.is_attached and self.app.screen is self
 
     def on_unmount(self) -> None:
         """Keep the text as it was left."""
@@ -119,7 +136,8 @@ class ProgramPage(Page):
         self.view = view
         width = self.editor.size.width
         title = self.grammar.title if self.grammar is not None else ""
-        self.lines("heading").put([heading_row(self.text, title, self.findings, view.chosen, width)])
+        outside = self.file.outside
+        self.lines("heading").put([heading_row(self.text, title, self.findings, view.chosen, width, outside)])
         lines, product = self._compared
         if (self.program.lines is not lines or product_of(self.host.session) != product) and self._edited_at is None:
             self._edited_at = 0.0
@@ -183,20 +201,33 @@ class ProgramPage(Page):
         if self._edited_at is not None and now - self._edited_at >= PAUSE and not self._taking_in:
             self._taking_in, self._edited_at = True, None
             self.run_worker(self._take_in())
+        if self.file.look_is_due(now):
+            self.run_worker(self.file.look())
+
+    async def _examine(self) -> Findings | None:
+        """Check the text on the screen, and compare it with the drive's program; None without a text."""
+        self.take_text()
+        text, grammar, lines = self.text, self.grammar, self.program.lines
+        if text is None or grammar is None:
+            return None
+        product, shown = product_of(self.host.session), text.text
+        self._compared = lines, product
+        found = await asyncio.to_thread(examined, grammar, shown, product, lines)
+        self.take_text()
+        if self.text is text and text.text == shown:
+            self.findings, self._checked = found, shown
+        return found
+
+    async def _look_at_text(self) -> None:
+        """Check the text now if it was edited since the last check: its lines have other addresses, and labels."""
+        if self.editor.text != self._checked:
+            await self._examine()
 
     async def _take_in(self) -> None:
         """Check the text, compare it with the drive's program, and keep a copy of it."""
         try:
-            self.take_text()
-            text, grammar, lines = self.text, self.grammar, self.program.lines
-            if text is None or grammar is None:
-                return
-            product = product_of(self.host.session)
-            self._compared = lines, product
-            found = await asyncio.to_thread(examined, grammar, text.text, product, lines)
-            if self.text is text and self._edited_at is None:
-                self.findings = found
-            if self.host.texts.due(text):
+            await self._examine()
+            if (text := self.text) is not None and self.host.texts.due(text):
                 await asyncio.to_thread(self.host.texts.keep, text)
         except Diagnostic as problem:
             self._warn(str(problem))
@@ -208,7 +239,7 @@ class ProgramPage(Page):
             self._warned = text
             self.host.show_line(text, "!")
 
-    def _show_text(self, text: OpenText) -> None:
+    def show_text(self, text: OpenText) -> None:
         self.text, self.grammar, self.findings = text, grammar_of(text.name), Findings(pending=True)
         self.editor.read_only = False
         self.editor.show_text(text.text, self.grammar, text.cursor)
@@ -236,7 +267,7 @@ class ProgramPage(Page):
             await self.action_open(name)
         elif name:
             self.host.keyboard.hold(self)
-            self.run_worker(self.open_file(name))
+            self.run_worker(self.file.open(name))
 
     async def upload(self) -> None:
         """Read what the drive holds into a new file, and open that."""
@@ -250,91 +281,21 @@ class ProgramPage(Page):
         def named(file: str | None) -> None:
             if file:
                 line = with_target("/upload", shlex.quote(file), target)
-                self.run_worker(self._then_open(self._start(line), file))
+                self.run_worker(self._then_open(self.start(line), file))
 
         await self.app.push_screen(Ask(f"New file for the program in {target or base}", name), named)
 
     async def _then_open(self, task: asyncio.Task[bool], file: str) -> None:
         await asyncio.wait([task])
         if not task.cancelled() and task.result():
-            await self.open_file(file)
-
-    async def open_file(self, name: str) -> None:
-        """Show a file; offer the copy of an earlier session, if there is one. A slow disk holds up only the keys."""
-        self.host.keyboard.hold(self)
-        try:
-            text = await asyncio.to_thread(self.host.texts.open, name)
-            draft = await asyncio.to_thread(self.host.texts.draft, text)
-        except Diagnostic as problem:
-            self.host.show_line(str(problem), "x")
-            self.notify(str(problem), timeout=6)
-            return
-        finally:
-            self.host.keyboard.release(self)
-        self.take_text()
-        self._show_text(text)
-        if draft is not None:
-            self._offer(text, draft.text, draft.at)
-
-    def _offer(self, text: OpenText, copy: str, at: str) -> None:
-        answers = [("take", "Go on with the copy"), ("file", "Use the file, and delete the copy")]
-        lines = [f"{text.name} was edited and not saved; its copy is of {at}."]
-
-        def answered(answer: str | None) -> None:
-            if answer == "take":
-                text.text, text.kept = copy, copy
-                self._show_text(text)
-            elif answer == "file":
-                self.host.texts.drop_draft(text)
-
-        self.app.push_screen(Confirm("A text that was not saved", lines, answers), answered)
+            await self.file.open(file)
 
     async def action_save(self) -> None:
         await self.save()
 
-    async def save(self, over: bool = False) -> bool:
-        """Save the text; return whether that was done. Ask where another program has written the file."""
-        self.take_text()
-        text = self.text
-        if text is None:
-            return False
-        if why := refusal(self.grammar, text):
-            self.host.show_line(why, "x")
-            self.notify(why, timeout=6)
-            return False
-        try:
-            await asyncio.to_thread(text.file.save, text.text, over)
-        except ChangedMeanwhile as problem:
-            self._ask_over(problem)
-            return False
-        except Diagnostic as problem:
-            self.host.show_line(str(problem), "x")
-            self.notify(str(problem), timeout=6)
-            return False
-        self.host.texts.drop_draft(text)
-        later = "; multidrop reads it when it is started next" if isinstance(self.grammar, ConfigurationGrammar) else ""
-        self.host.show_line(f"saved {text.name}{later}", ".")
-        self.host.model.changed = True  # it may be a macro
-        return True
-
-    def _ask_over(self, problem: ChangedMeanwhile) -> None:
-        answers = [
-            ("no", "Save nothing"),
-            ("over", "Save this text over it"),
-            ("read", "Give up this text, read the file"),
-        ]
-
-        async def answered(answer: str | None) -> None:
-            if answer == "over":
-                await self.save(over=True)
-            elif answer == "read" and self.text is not None:
-                name = self.text.name
-                self.host.texts.close(self.text)
-                self.text = None
-                await self.open_file(name)
-
-        lines = [f"{problem.where} {problem.message}.", "Another program has written it."]
-        self.app.push_screen(Confirm("Save?", lines, answers), answered)
+    async def save(self) -> bool:
+        """Save the text on the screen; return whether that was done."""
+        return await self.file.save()
 
     def action_next_problem(self) -> None:
         """Go to the next problem below the cursor, errors before warnings."""
@@ -352,14 +313,8 @@ class ProgramPage(Page):
 
     # The drive
 
-    def _start(self, line: str) -> asyncio.Task[bool]:
-        """Run a line as if it was typed; a failure is shown in the transcript."""
-        task = self.host.session.start(line)
-        self.run_worker(ended(task))
-        return task
-
     async def action_download(self) -> None:
-        """Send the file to the drive: show what that does, and ask how."""
+        """Send the text on the screen to the drive: show what that does, and ask how."""
         self.take_text()
         text, chosen = self.text, self.host.session.selected
         if text is None or chosen is None:
@@ -368,16 +323,37 @@ class ProgramPage(Page):
         if not isinstance(self.grammar, ProgramGrammar):
             self.notify(f"{text.name} is not a program: nothing to download")
             return
-        ways = download_choices(text, target_of(self.host.session))
-        facts = download_facts(text, self.findings, self.program)
+        self.host.keyboard.hold(self)  # keys are for the question
+        self.run_worker(self._ask_download(text, chosen.product))
 
-        async def answered(line: str | None) -> None:
-            if line and (await self.save() if text.changed or text.file.new else True):
-                self._start(line)
+    async def _ask_download(self, text: OpenText, product: str) -> None:
+        """Look at the disk, check the text that is on the screen then, and ask; that text is sent, and no other."""
+        try:
+            seen = await self.file.catch_up()
+            if seen is Seen.ASKED or self.text is not text:
+                return
+            findings = await self._examine()
+            if not self.in_front or self.text is not text or findings is None:
+                return
+            target, shown, outside = target_of(self.host.session), text.text, self.file.outside
+            again = seen is Seen.READ
+            facts = download_facts(text, findings, self.program, outside, again)
 
-        title = f"Download {text.name} to {target_of(self.host.session) or chosen.product}?"
-        answers = [(each.line, f"{each.title:<38} {each.line}") for each in ways]
-        await self.app.push_screen(Confirm(title, facts, answers), answered)
+            def answered(line: str | None) -> None:
+                if line:
+                    self.run_worker(self._download(line, text, shown, self.host.session.stops))
+
+            title = f"Download {text.name} to {target or product}?"
+            answers = [(each.line, f"{each.title:<38} {each.line}") for each in download_choices(text, target)]
+            answers = [LOOK_FIRST, *answers] if again else answers
+            await self.app.push_screen(Confirm(title, facts, answers), answered)
+        finally:
+            self.host.keyboard.release(self)
+
+    async def _download(self, line: str, text: OpenText, shown: str, stops: int) -> None:
+        """Save the text that was shown, if the file has another one, and send it. `stops`: those before the answer."""
+        if not (text.file.new or shown != text.file.text) or await self.file.save(shown):
+            self.start(line, real_text(shown), stops)
 
     async def action_run(self) -> None:
         await self._choose("", "Run in")
@@ -388,6 +364,7 @@ class ProgramPage(Page):
             self.notify("No drive is selected: ^O chooses one")
             return
         program = self.program
+        await self._look_at_text()
         found = run_choices(self._entries(), target_of(self.host.session), program)
         found = [each for each in found if only in each.line]
         known = "is this text" if self.findings.addresses else "may be another one than this text"
@@ -395,7 +372,7 @@ class ProgramPage(Page):
 
         def taken(key: str | None) -> None:
             if key is not None:
-                self._start(found[int(key)].line)
+                self.start(found[int(key)].line)
 
         offers = [Offer(str(number), f"{each.title:<30}  {each.line}") for number, each in enumerate(found)]
         await self.app.push_screen(Search(heading, partial(offers_like, offers), "do it"), taken)
@@ -407,7 +384,7 @@ class ProgramPage(Page):
             return
         program = self.program
         if program.line is not None and program.phase.waits:
-            self._step = self._start(with_target("/step", target_of(self.host.session)))
+            self._step = self.start(with_target("/step", target_of(self.host.session)))
         else:
             await self._choose("/step ", "Step in")
 
@@ -416,13 +393,14 @@ class ProgramPage(Page):
         row, target, program = self.editor.cursor_location[0], target_of(self.host.session), self.program
         if self.host.session.selected is None:
             return
+        await self._look_at_text()
         if self._break_line(program) == row:
-            self._start(with_target("/break", target, "off"))
+            self.start(with_target("/break", target, "off"))
             return
         place = next((each.name for each in self._entries() if each.line == row + 1), "")
         place = place or next((str(at) for at, line in self.findings.addresses if line == row), "")
         if place:
-            self._start(with_target("/break", target, place))
+            self.start(with_target("/break", target, place))
         else:
             self.notify(
                 "No label here, and no address: the drive is not known to hold this text; ^D sends it", timeout=6

@@ -56,17 +56,26 @@ class Findings:
         return "✓ no error ", "text"
 
 
-def heading_row(text: OpenText | None, title: str, findings: Findings, target: Glance | None, width: int) -> Row:
-    """The file, whether it is saved, the result of the check, and the drive that it is for."""
+def heading_row(
+    text: OpenText | None, title: str, findings: Findings, target: Glance | None, width: int, outside: str = ""
+) -> Row:
+    """The file, whether it is saved, the result of the check, and the drive that it is for.
+
+    `outside`: what another program did to the file.
+    """
     if text is None:
         return ((" PROGRAM   ", "strong"), ("no file: ^E opens one", "dim"))
     state = "new, not saved" if text.file.new else "changed, not saved" if text.changed else "saved"
+    told = outside.partition(":")[0]
+    if told:
+        state = f"{state}, and the file {told}" if text.changed else f"the file {told}"
+    unsaved = text.changed or text.file.new or bool(told)
     where = f"for {name_of(target)} ({target.product}) " if target is not None else "no drive selected "
     left: list[Span] = [
         (" PROGRAM  ", "strong"),
         (f" {visible(text.name)} ", "accent"),
         (f" {title} ", "dim"),
-        (f" {'● ' if text.changed or text.file.new else ''}{state} ", "motion" if text.changed else "dim"),
+        (f" {'● ' if unsaved else ''}{state} ", "motion" if text.changed or told else "dim"),
         (" ", "text"),
     ]
     if text.text.strip():
@@ -215,6 +224,10 @@ def _match(name: str, about: str) -> Match:
 # Download
 
 
+LOOK_FIRST = ("", "Send nothing, look at the new text")
+"""The first answer where the text on the screen has just been read again."""
+
+
 def download_choices(text: OpenText, target: str) -> list[Choice]:
     file = shlex.quote(text.name)
     first = "Save the file and send it" if text.changed or text.file.new else "Send it"
@@ -225,10 +238,18 @@ def download_choices(text: OpenText, target: str) -> list[Choice]:
     ]
 
 
-def download_facts(text: OpenText, findings: Findings, program: ProgramFacts) -> list[str]:
-    """The facts before a download: errors, and the fate of the program in the drive."""
+def download_facts(
+    text: OpenText, findings: Findings, program: ProgramFacts, outside: str = "", again: bool = False
+) -> list[str]:
+    """The facts before a download: errors, the fate of the program in the drive, and what other programs did.
+
+    `again`: the text was read again just now. `outside`: what became of the file, while its text stays on the screen.
+    """
     wrong = len(errors(findings.problems))
-    lines = [f"✗ {counted(wrong, 'error')}: it will be refused, and nothing is sent"] if wrong else []
+    lines = ["! The file has changed on the disk and was read again: the text on the screen is new."] if again else []
+    if outside:
+        lines.append(f"! The file {outside}; the text on the screen is sent.")
+    lines += [f"✗ {counted(wrong, 'error')}: it will be refused, and nothing is sent"] if wrong else []
     if program.line is not None:
         lines.append("its program runs: it is ended first")
     return [*lines, "What the drive holds is read and saved to a backup first, then replaced."]

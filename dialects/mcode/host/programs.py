@@ -186,6 +186,7 @@ PROGRAMS: Programs[MCodeState] = Programs(
     save="S",
     remark="'",
     clearing="CP",
+    begins=("PG", "FD"),
     names=program_readout.read_names,
     offered=program_readout.offered,
 )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -48,10 +49,14 @@ def test_a_file_that_changed_meanwhile_is_not_overwritten_unless_told(tmp_path: 
     path.write_text("H\n")
     file = EditedFile(path)
     path.write_text("another's\n")
-    with pytest.raises(ChangedMeanwhile, match="has changed on the disk"):
+    with pytest.raises(ChangedMeanwhile, match="has changed on the disk") as told:
         file.save("mine\n")
     assert path.read_text() == "another's\n"
-    file.save("mine\n", over=True)
+    path.write_text("a third one's\n")  # nobody was asked about this one
+    with pytest.raises(ChangedMeanwhile, match="has changed on the disk") as now:
+        file.save("mine\n", told.value)
+    assert path.read_text() == "a third one's\n"
+    file.save("mine\n", now.value)
     assert path.read_text() == "mine\n"
     file.save("mine again\n")
     assert path.read_text() == "mine again\n"
@@ -71,10 +76,104 @@ def test_a_file_that_is_gone_is_said_and_can_be_written_again(tmp_path: Path) ->
     path.write_text("H\n")
     file = EditedFile(path)
     path.unlink()
-    with pytest.raises(ChangedMeanwhile, match="is gone"):
+    with pytest.raises(ChangedMeanwhile, match="is gone") as told:
         file.save("mine\n")
-    file.save("mine\n", over=True)
+    file.save("mine\n", told.value)
     assert path.read_text() == "mine\n"
+
+
+def test_a_text_that_another_program_has_saved_already_needs_no_question(tmp_path: Path) -> None:
+    path = tmp_path / "a.mxt"
+    path.write_text("H\n")
+    file = EditedFile(path)
+    path.write_text("mine\n")
+    file.save("mine\n")
+    assert file.text == "mine\n" and not file.look().said
+
+
+# A look at the disk
+
+
+def changed(path: Path) -> None:
+    """Write another text of the same size, with the same time of the last change."""
+    state = path.stat()
+    path.write_bytes(bytes(path.stat().st_size - 1).replace(b"\0", b"E") + b"\n")
+    os.utime(path, ns=(state.st_atime_ns, state.st_mtime_ns))
+
+
+def a_folder(path: Path) -> None:
+    path.unlink()
+    path.mkdir()
+
+
+def a_pipe(path: Path) -> None:
+    path.unlink()
+    os.mkfifo(path)
+
+
+@pytest.mark.parametrize(
+    ("act", "said"),
+    [
+        (lambda path: None, ""),
+        (lambda path: os.utime(path, (1, 1)), ""),
+        (lambda path: path.write_bytes(path.read_bytes()), ""),
+        (changed, "has changed on the disk"),
+        (Path.unlink, "is gone from the disk"),
+        (a_folder, "cannot be read again: is not a regular file"),
+        pytest.param(
+            a_pipe,
+            "cannot be read again: is not a regular file",
+            marks=pytest.mark.skipif(os.name != "posix", reason="no pipes with a name"),
+        ),
+        (lambda path: path.write_bytes(b"A\0"), "cannot be read again: is not a text file"),
+        (lambda path: path.write_bytes(b"x" * 600_000), "cannot be read again: is larger than 512 KB"),
+        (lambda path: path.write_bytes("\uf703".encode()), "cannot be read again: holds characters of the private"),
+    ],
+)
+def test_a_look_at_the_disk_compares_the_content(tmp_path: Path, act: Callable[[Path], None], said: str) -> None:
+    path = tmp_path / "a.mxt"
+    path.write_text("PG 1\nE\nPG\n")
+    file = EditedFile(path)
+    act(path)
+    seen = file.look()
+    assert seen.said.startswith(said) and bool(seen.said) == bool(said)
+    assert (seen.now is not None) == (said == "has changed on the disk") and seen.gone == ("gone" in said)
+    assert file.text == "PG 1\nE\nPG\n"  # a look changes nothing
+
+
+def test_what_was_read_again_is_saved_as_it_is_then(tmp_path: Path) -> None:
+    path = tmp_path / "a.mxt"
+    path.write_text("H\n")
+    file = EditedFile(path)
+    path.write_bytes(b"' caf\xe9\r\nMR 5\r\n")
+    now = file.look().now
+    assert now is not None and now.text == "' caf\u00e9\nMR 5\n"
+    now.save(now.text + "E\n")
+    assert path.read_bytes() == b"' caf\xe9\r\nMR 5\r\nE\r\n"
+
+
+def test_a_text_whose_file_is_gone_is_not_saved_and_keeps_its_line_ends(tmp_path: Path) -> None:
+    path = tmp_path / "a.mxt"
+    path.write_bytes(b"H\r\n")
+    file = EditedFile(path)
+    path.unlink()
+    file.lost()
+    assert file.new and file.text == "" and not file.look().said
+    path.write_text("another's\n")
+    assert file.look().said == "is new on the disk"
+    path.unlink()
+    file.save("H\n")
+    assert path.read_bytes() == b"H\r\n"
+
+
+def test_an_outdated_text_is_asked_about_before_it_is_saved(tmp_path: Path) -> None:
+    path = tmp_path / "a.mxt"
+    path.write_text("H\n")
+    file = EditedFile(path)
+    file.outdated()
+    assert file.look().said == "has changed on the disk" and not file.new
+    with pytest.raises(ChangedMeanwhile):
+        file.save("mine\n")
 
 
 def test_mixed_line_ends_become_one_kind_and_are_known(tmp_path: Path) -> None:

@@ -221,7 +221,7 @@ def test_a_drive_in_one_line_gets_its_world_there(tmp_path: Path) -> None:
     path = tmp_path / "cell.toml"
     drive_ = '{ personality = "LMDCM", name = "a", motor = "nema17" }'
     path.write_text(f'bus = [ {{ name = "axis", drive = [ {drive_} ] }} ]  # mine\n')
-    _keep(path, cells.load(path), {("axis", "a", ""): {"load": 0.3}})
+    _keep(path, path.read_text(), cells.load(path), {("axis", "a", ""): {"load": 0.3}})
     assert cells.load(path).buses[0].drives[0].world.load == 0.3 and path.read_text().endswith("# mine\n")
 
 
