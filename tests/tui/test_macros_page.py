@@ -144,12 +144,12 @@ async def test_a_wrong_macro_is_not_saved_and_a_right_one_is(tmp_path: Path, mon
                 await pilot.pause(0.01)
         page = app.screen
         page.editor.text = TEXT.replace("line", "lin")
-        assert not await page.save()
+        assert not await page.file.save()
         assert path.read_text() == TEXT
         app.tick()
         told = [record.text for record in app.last_records(10) if "not saved" in record.text]
         assert told[0].startswith(f"{path}:4:1: step 1: unknown key 'lin'")
         assert told[0].endswith("not saved: the macro is as it was, and this text stays")
         page.editor.text = TEXT.replace("1", "2")
-        assert await page.save()
+        assert await page.file.save()
         assert path.read_text() == TEXT.replace("1", "2")

@@ -11,7 +11,7 @@ from multidrop.macros import Macro, MacroStore
 from multidrop.shell.playing import Playing
 from multidrop.tui.panels.view import View
 from multidrop.tui.screens.dialogs import Ask, Confirm
-from multidrop.tui.screens.page import Host, ListPage
+from multidrop.tui.screens.page import Host, ListPage, start
 from multidrop.tui.screens.program_rows import news_rows, rule
 from multidrop.tui.text import fit, visible
 from multidrop.tui.widgets.lines import Row, in_view, spread
@@ -206,7 +206,7 @@ class MacrosPage(ListPage):
         if chosen is None or self.host.macros.held(ENTER, self.host.session.now()):
             return
         if chosen.macro is not None:
-            self.start(f"/play {chosen.name}", chosen.macro)
+            start(self, f"/play {chosen.name}", chosen.macro)
         else:
             self.host.show_line(f"{chosen.trouble}; nothing was played", "x")
         self.host.model.changed = True  # it is read again: its file may have changed

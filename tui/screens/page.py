@@ -142,18 +142,19 @@ class Page(Framed):
         self._parts[name] = Lines(id=name)
         return self._parts[name]
 
-    def start(self, line: str, shown: str | Macro | None = None, since: int | None = None) -> asyncio.Task[bool]:
-        """Run a line as if it was typed; a failure is shown in the transcript.
-
-        `shown`: what a person was shown of the file that the line names; it is used instead of the file. `since`: the
-        number of stops when a person agreed to the line.
-        """
-        task = self.host.session.start(line if shown is None else showing(line, shown) or line, since=since)
-        self.run_worker(ended(task))
-        return task
-
     def action_leave(self) -> None:
         self.dismiss(None)
+
+
+def start(page: Page, line: str, shown: str | Macro | None = None, since: int | None = None) -> asyncio.Task[bool]:
+    """Run a line as if it was typed on a page; a failure is shown in the transcript.
+
+    `shown`: what a person was shown of the file that the line names; it is used instead of the file. `since`: the
+    number of stops when a person agreed to the line.
+    """
+    task = page.host.session.start(line if shown is None else showing(line, shown) or line, since=since)
+    page.run_worker(ended(task))
+    return task
 
 
 class AskingPage(Page):

@@ -30,6 +30,7 @@ from multidrop.shell.params import file as files
 from multidrop.tui.panels.table import column_rows, panel
 from multidrop.tui.panels.view import Glance, View, name_of
 from multidrop.tui.screens.page import Host, ListPage, SendingPage
+from multidrop.tui.screens.settings_file import FileColumn
 from multidrop.tui.text import age, fit
 from multidrop.tui.widgets.lines import Row, Span, spread
 
@@ -247,6 +248,7 @@ class ParametersPage(ListPage, SendingPage):
     def __init__(self, host: Host) -> None:
         super().__init__(host)
         self._table = SettingsTable()
+        self._file_column = FileColumn(lambda: self._table, self.say, self.run_worker)
         self._asked_for = False
         """The settings were asked for, as nobody had read them."""
         self._reading = False
@@ -336,6 +338,7 @@ class ParametersPage(ListPage, SendingPage):
         else:
             self.host.outbox.type("/params read")
             self.say(READING, "dim")
+            self._file_column.look()
 
     def action_defaults(self) -> None:
         found = self._settings()
@@ -355,6 +358,7 @@ class ParametersPage(ListPage, SendingPage):
             self.say("choose first what to compare with: ^P, compare")
         else:
             table.only_differing, table.at = not table.only_differing, 0
+            self._file_column.look()
 
     def action_variables(self) -> None:
         self.field.value = "" if self.field.value == VARIABLES else VARIABLES
@@ -373,6 +377,7 @@ class ParametersPage(ListPage, SendingPage):
                 self.send(begun.lines)
         elif (row := self._table.chosen) is not None:
             self.action_ask(EDIT, row.reading.name, row.value.strip('[]"'))
+            self._file_column.look()
 
     def action_save(self) -> None:
         if self._glance is None:
@@ -411,13 +416,10 @@ class ParametersPage(ListPage, SendingPage):
             self.say(f"nothing was sent: {failure}")
 
     def _file(self, name: str, text: str) -> None:
-        loaded = files.load(text)
-        drive = self.host.session.selected
-        parameters = drive.family.values.parameters if drive is not None else None
-        if parameters is not None and loaded.language and loaded.language != parameters.language:
-            raise Diagnostic(f"has settings in {loaded.language}, this drive has {parameters.language}", text)
-        self._table.compare(text.rpartition("/")[2], dict(loaded.named))
-        self._close("")
+        asked = self.asked
+        self._file_column.show(
+            text, self.host.session.selected, lambda: self._close("") if self.asked is asked else None
+        )
 
     def _drive(self, name: str, text: str) -> None:
         bus, _, address = text.rpartition(":")

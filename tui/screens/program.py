@@ -28,7 +28,7 @@ from multidrop.tui.panels.table import column_rows, panel, side_width
 from multidrop.tui.panels.view import View
 from multidrop.tui.readout import ProgramFacts
 from multidrop.tui.screens.dialogs import Ask, Confirm, Offer, Search, offers_like
-from multidrop.tui.screens.page import Host, Page
+from multidrop.tui.screens.page import Host, Page, start
 from multidrop.tui.screens.program_file import FileOnScreen, Seen
 from multidrop.tui.screens.program_rows import (
     LOOK_FIRST,
@@ -101,17 +101,9 @@ class ProgramPage(Page):
         self.on_resize()
         if self.host.texts.current is not None:
             self.show_text(self.host.texts.current)
-            self.host.keyboard.hold(self)
-            self.run_worker(self._return())
+            self.file.come_back()
         else:
             await self.action_open()
-
-    async def _return(self) -> None:
-        """Look at the disk when the page is shown again. A slow disk holds up only the keys."""
-        try:
-            await self.file.catch_up()
-        finally:
-            self.host.keyboard.release(self)
 
     @property
     def in_front(self) -> bool:
@@ -281,7 +273,7 @@ class ProgramPage(Page):
         def named(file: str | None) -> None:
             if file:
                 line = with_target("/upload", shlex.quote(file), target)
-                self.run_worker(self._then_open(self.start(line), file))
+                self.run_worker(self._then_open(start(self, line), file))
 
         await self.app.push_screen(Ask(f"New file for the program in {target or base}", name), named)
 
@@ -291,11 +283,7 @@ class ProgramPage(Page):
             await self.file.open(file)
 
     async def action_save(self) -> None:
-        await self.save()
-
-    async def save(self) -> bool:
-        """Save the text on the screen; return whether that was done."""
-        return await self.file.save()
+        await self.file.save()
 
     def action_next_problem(self) -> None:
         """Go to the next problem below the cursor, errors before warnings."""
@@ -353,7 +341,7 @@ class ProgramPage(Page):
     async def _download(self, line: str, text: OpenText, shown: str, stops: int) -> None:
         """Save the text that was shown, if the file has another one, and send it. `stops`: those before the answer."""
         if not (text.file.new or shown != text.file.text) or await self.file.save(shown):
-            self.start(line, real_text(shown), stops)
+            start(self, line, real_text(shown), stops)
 
     async def action_run(self) -> None:
         await self._choose("", "Run in")
@@ -372,7 +360,7 @@ class ProgramPage(Page):
 
         def taken(key: str | None) -> None:
             if key is not None:
-                self.start(found[int(key)].line)
+                start(self, found[int(key)].line)
 
         offers = [Offer(str(number), f"{each.title:<30}  {each.line}") for number, each in enumerate(found)]
         await self.app.push_screen(Search(heading, partial(offers_like, offers), "do it"), taken)
@@ -384,7 +372,7 @@ class ProgramPage(Page):
             return
         program = self.program
         if program.line is not None and program.phase.waits:
-            self._step = self.start(with_target("/step", target_of(self.host.session)))
+            self._step = start(self, with_target("/step", target_of(self.host.session)))
         else:
             await self._choose("/step ", "Step in")
 
@@ -395,12 +383,12 @@ class ProgramPage(Page):
             return
         await self._look_at_text()
         if self._break_line(program) == row:
-            self.start(with_target("/break", target, "off"))
+            start(self, with_target("/break", target, "off"))
             return
         place = next((each.name for each in self._entries() if each.line == row + 1), "")
         place = place or next((str(at) for at, line in self.findings.addresses if line == row), "")
         if place:
-            self.start(with_target("/break", target, place))
+            start(self, with_target("/break", target, place))
         else:
             self.notify(
                 "No label here, and no address: the drive is not known to hold this text; ^D sends it", timeout=6

@@ -134,6 +134,17 @@ class FileOnScreen:
         finally:
             self._looking = False
 
+    def come_back(self) -> None:
+        """Look at the disk when the page is shown again; keys wait meanwhile."""
+        self._host.keyboard.hold(self._page)
+        self._page.run_worker(self._come_back())
+
+    async def _come_back(self) -> None:
+        try:
+            await self.catch_up()
+        finally:
+            self._host.keyboard.release(self._page)
+
     async def catch_up(self) -> Seen:
         """Look at the disk; read a file again that has changed, or ask where the text here has changed, too."""
         page, text = self._page, self._page.text
