@@ -8,6 +8,7 @@ from __future__ import annotations
 import argparse
 import contextlib
 import io
+import linecache
 import os
 import signal
 import sys
@@ -15,8 +16,8 @@ import traceback
 from collections.abc import Callable, Coroutine, Iterator
 from datetime import datetime
 from functools import partial
+from importlib.util import decode_source
 from itertools import dropwhile, takewhile
-from linecache import getline
 from pathlib import Path
 from types import CodeType, FrameType, ModuleType
 from typing import Any, TypeVar
@@ -39,7 +40,7 @@ T = TypeVar("T")
 
 
 def result_of(end: BaseException, file: str, number: int) -> Result:
-    line = ScriptLine(file, number, getline(file, number).strip() or file)
+    line = ScriptLine(file, number, linecache.getline(file, number).strip() or file)
     error = str(end) if isinstance(end, FAILURES) else f"{type(end).__name__}: {end}".removesuffix(": ")
     failed = isinstance(end, AssertionError)
     return Result(line, line.text, datetime.now().astimezone(), 0.0, error=error, failed_check=failed)
@@ -150,7 +151,8 @@ def replaced(name: str, stream: object) -> Iterator[None]:
 def run(chosen: argparse.Namespace, report: Report) -> int:
     file = chosen.script
     try:
-        code = compile(bytes_of(file), file, "exec", dont_inherit=True)  # before anything is opened
+        data = bytes_of(file)
+        code = compile(data, file, "exec", dont_inherit=True)  # before anything is opened
     except SyntaxError as error:
         problem = Diagnostic(f"{error.msg}", f"{file}:{error.lineno or 1}")
     except ValueError as error:  # a NUL
@@ -158,6 +160,8 @@ def run(chosen: argparse.Namespace, report: Report) -> int:
     except Diagnostic as error:
         problem = error
     else:
+        # Reports quote the lines that run, whatever the file holds by then.
+        linecache.cache[file] = (len(data), None, decode_source(data).splitlines(True), file)
         return report.finish(_Execution(chosen, report, code).run())
     return report.refused(problem)
 

@@ -140,7 +140,9 @@ async def test_a_download_of_a_file_that_changed_shows_the_new_text_first(folder
         (folder / "a.mxt").write_text(OTHER)
         typed(pilot, "ctrl+d")
         asked = await question(pilot, "Download a.mxt")
-        assert shown(pilot).editor.text == OTHER and "was read again" in asked.lines[0]
+        assert shown(pilot).editor.text == OTHER and "Line 3 is now 'MR 999999'" in asked.lines[0]
+        assert not any("the text on the screen is sent" in line for line in asked.lines)
+        assert shown(pilot).editor.cursor_location == (2, 0)  # where it differs
         assert told(pilot, "a.mxt has changed on the disk: it was read again") == 1
         typed(pilot, "enter")  # the first answer sends nothing
         await until(pilot, lambda: isinstance(pilot.app.screen, ProgramPage))
@@ -310,7 +312,7 @@ async def test_the_heading_names_a_change_while_the_page_is_shown(
         await until(pilot, lambda: "● the file has changed on the disk" in heading())
         assert shown(pilot).editor.text == TEXT  # nothing changes under a person's eyes
         typed(pilot, "ctrl+end", "' mine")
-        await until(pilot, lambda: "changed, not saved, and the file has changed on the disk" in heading())
+        await until(pilot, lambda: "● not saved; file has changed on the disk" in heading())
         (folder / "a.mxt").write_text(TEXT)
         await until(pilot, lambda: "on the disk" not in heading())
 

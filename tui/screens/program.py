@@ -324,7 +324,7 @@ class ProgramPage(Page):
             if not self.in_front or self.text is not text or findings is None:
                 return
             target, shown, outside = target_of(self.host.session), text.text, self.file.outside
-            again = seen is Seen.READ
+            again = self.file.news.words if seen is Seen.READ else ""
             facts = download_facts(text, findings, self.program, outside, again)
 
             def answered(line: str | None) -> None:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Coroutine
 from enum import Enum, auto
-from typing import Any, Protocol
+from typing import Any, NamedTuple, Protocol
 
 from textual.app import App
 
@@ -19,10 +19,13 @@ from multidrop.tui.editor import ConfigurationGrammar, Grammar
 from multidrop.tui.screens.dialogs import Confirm
 from multidrop.tui.screens.page import Host
 from multidrop.tui.screens.program_rows import refusal
+from multidrop.tui.text import visible
 from multidrop.tui.texts import OpenText
 
 LOOK = 2.0
 """Seconds between two looks at the disk while a text is shown."""
+WIDEST = 40
+"""Characters of a line that a note quotes."""
 
 
 class Seen(Enum):
@@ -35,6 +38,27 @@ class Seen(Enum):
     """The file has changed, and so has the text: a question is open."""
     KEPT = auto()
     """The disk has no other text to show, or a person has decided to keep the text on the screen."""
+
+
+class Difference(NamedTuple):
+    """The first line that differs, from 0, and its text now."""
+
+    row: int = 0
+    now: str = ""
+
+    @property
+    def words(self) -> str:
+        """The line in words, as much of it as a box has room for."""
+        return f"Line {self.row + 1} is now '{visible(self.now.strip())[:WIDEST]}'"
+
+
+def first_difference(before: str, now: str) -> Difference:
+    """Find the first line in which two texts differ; past the end of the new one it is empty."""
+    old, new = before.split("\n"), now.split("\n")
+    row = next(
+        (n for n, (one, other) in enumerate(zip(old, new, strict=False)) if one != other), min(len(old), len(new))
+    )
+    return Difference(row, new[row] if row < len(new) else "")
 
 
 class Sheet(Protocol):
@@ -72,6 +96,8 @@ class FileOnScreen:
         self._page, self._host = page, page.host
         self.outside = ""
         """What another program did to it, as was last seen and not taken in yet; empty: nothing."""
+        self.news = Difference()
+        """Where the text that was read again last differs from the one before it."""
         self._looking = False
         self._looked_at = 0.0
 
@@ -176,10 +202,13 @@ class FileOnScreen:
                 return Seen.KEPT
             self._ask_which(text, seen)
             return Seen.ASKED
+        self.news = first_difference(text.text, now.text)
         text.take(now)
+        text.cursor = (self.news.row, 0)
+        self.outside = ""
         page.show_text(text)
         self._host.keyboard.turn_deaf()  # keys that were typed before were meant for the text that was shown
-        self._note(f"{text.name} {seen.said}: it was read again, and this is its new text")
+        self._note(f"{text.name} {seen.said}: it was read again. {self.news.words}")
         return Seen.READ
 
     def _ask_which(self, text: OpenText, seen: Outside) -> None:

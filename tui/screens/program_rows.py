@@ -68,7 +68,7 @@ def heading_row(
     state = "new, not saved" if text.file.new else "changed, not saved" if text.changed else "saved"
     told = outside.partition(":")[0]
     if told:
-        state = f"{state}, and the file {told}" if text.changed else f"the file {told}"
+        state = f"not saved; file {told}" if text.changed else f"the file {told}"
     unsaved = text.changed or text.file.new or bool(told)
     where = f"for {name_of(target)} ({target.product}) " if target is not None else "no drive selected "
     left: list[Span] = [
@@ -239,14 +239,15 @@ def download_choices(text: OpenText, target: str) -> list[Choice]:
 
 
 def download_facts(
-    text: OpenText, findings: Findings, program: ProgramFacts, outside: str = "", again: bool = False
+    text: OpenText, findings: Findings, program: ProgramFacts, outside: str = "", again: str = ""
 ) -> list[str]:
     """The facts before a download: errors, the fate of the program in the drive, and what other programs did.
 
-    `again`: the text was read again just now. `outside`: what became of the file, while its text stays on the screen.
+    `again`: where the text that was read again just now is new. `outside`: what became of the file, while its text
+    stays on the screen.
     """
     wrong = len(errors(findings.problems))
-    lines = ["! The file has changed on the disk and was read again: the text on the screen is new."] if again else []
+    lines = [f"! The file has changed on the disk and was read again. {again}."] if again else []
     if outside:
         lines.append(f"! The file {outside}; the text on the screen is sent.")
     lines += [f"✗ {counted(wrong, 'error')}: it will be refused, and nothing is sent"] if wrong else []

@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+import contextlib
 import io
 import shlex
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from multidrop.__main__ import main
-from multidrop.dialects import Diagnostic
-from multidrop.macros import MacroStore
+from multidrop.dialects import Diagnostic, DriveError
+from multidrop.macros import Macro, MacroStore
 from multidrop.shell.events import By, Notified, Output
+from multidrop.shell.line_syntax import showing
 from multidrop.shell.session import Session
 
 HAND = "# by hand\nname = 'm' # mine\nkey = 'F3' # left\nnote = 'to and fro'\n\n# first\n[[step]]\nline = '/sleep 0'\n"
@@ -273,3 +276,57 @@ def test_the_command_line_changes_macros(folder: Path, capsys: pytest.CaptureFix
     assert main(["macro", "delete", "n", "--yes"]) == 0
     assert not (folder / "n.toml").exists()
     assert main(["macro", "delete", "n", "--yes"]) == 2
+
+
+async def test_a_macro_that_changed_while_its_deletion_was_asked_about_stays(session: Session, folder: Path) -> None:
+    async def ask(question: str) -> bool:
+        (folder / "m.toml").write_text((folder / "m.toml").read_text() + "# another's work\n")
+        return True
+
+    session.front.ask = ask
+    with pytest.raises(Diagnostic, match="has changed since you were asked; nothing was deleted"):
+        await session.run("/macro delete m")
+    assert "another's work" in (folder / "m.toml").read_text()
+
+
+async def test_another_macro_that_came_to_hide_the_one_that_is_deleted_stays(session: Session, folder: Path) -> None:
+    project = Path("macros")
+
+    async def ask(question: str) -> bool:
+        project.mkdir()
+        (project / "m.toml").write_bytes((folder / "m.toml").read_bytes())
+        return True
+
+    session.front.ask = ask
+    with pytest.raises(Diagnostic, match="nothing was deleted"):
+        await session.run("/macro delete m")
+    assert (project / "m.toml").exists() and (folder / "m.toml").exists()
+
+
+async def test_a_macro_is_played_as_it_was_shown_or_not_at_all(session: Session, folder: Path) -> None:
+    shown = session.macros.load("m")
+    (folder / "m.toml").write_text((folder / "m.toml").read_text() + "# a remark\n")
+    line = showing("/play m", shown)
+    assert line is not None
+    with contextlib.suppress(DriveError, Diagnostic):  # there is no drive: it came that far
+        await session.run(line)
+    other = replace(shown, steps=(*shown.steps, *shown.steps))
+    line = showing("/play m", other)
+    assert line is not None
+    with pytest.raises(Diagnostic, match="macro m has changed on the disk since it was shown here; nothing was sent"):
+        await session.run(line)
+
+
+async def test_a_key_is_not_put_into_a_file_that_changed_meanwhile(
+    session: Session, folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    on_key = session.macros.on_key
+
+    def slow(*given: str) -> tuple[list[Macro], list[Diagnostic]]:
+        (folder / "m.toml").write_text((folder / "m.toml").read_text() + "# another's work\n")
+        return on_key(*given)
+
+    monkeypatch.setattr(session.macros, "on_key", slow)
+    with pytest.raises(Diagnostic, match="the file has changed meanwhile"):
+        session.macros.set_key("m", "F4")
+    assert "another's work" in (folder / "m.toml").read_text()

@@ -97,6 +97,31 @@ async def test_a_dry_run_shows_it_and_sends_nothing(tmp_path):
         assert any("does not print; check it: OE, " in text for text in cell.warned())
 
 
+@pytest.mark.parametrize("change", ["", "VM=600000", "PG 300", "A=70000"])
+async def test_a_drive_that_changed_during_the_question_gets_nothing(tmp_path, change):
+    async with CellSession(tmp_path, unit(FRESH)) as cell:
+        (tmp_path / "machine.toml").write_text(MACHINE)
+        drive = cell.session.drive()
+        spec = replacement.chosen(cells.load(tmp_path / "machine.toml"), "m", drive, "b")
+        device = next(each.device for each in cell.floor.floor.drives)
+        sent: list[int] = []
+
+        async def ask(question: str) -> bool:
+            for line in (change, "LB Zz", "E", "PG") if change.startswith("PG") else filter(None, [change]):
+                device.execute(line, device.now)
+            sent.append(drive.commands)
+            return True
+
+        cell.session.questions.agreed, cell.session.front.ask = False, ask
+        if not change:
+            await replacement.apply(cell.session, drive, "m", spec, Options())
+            assert drive.commands > sent[0]
+            return
+        with pytest.raises(Refused, match="it changed since the question was asked; nothing was sent; try again"):
+            await replacement.apply(cell.session, drive, "m", spec, Options())
+        assert drive.commands == sent[0]
+
+
 async def test_without_a_yes_nothing_is_sent(tmp_path):
     async with CellSession(tmp_path, unit(FRESH)) as cell:
         (tmp_path / "machine.toml").write_text(MACHINE)

@@ -7,7 +7,8 @@ from pathlib import Path
 import pytest
 
 from multidrop.dialects import Diagnostic
-from multidrop.shell.events import Progressed
+from multidrop.shell.events import ProgramRead, Progressed
+from multidrop.shell.line_syntax import showing
 from multidrop.shell.state.backups import write_backup
 from tests.support.cell_session import CellSession, bus, pmx
 from tests.support.transfers import FILE, LISTED, LONG, SLOW, kept, load, shop_with
@@ -201,3 +202,54 @@ async def test_a_controller_has_the_same_options_as_far_as_its_words_go(tmp_path
             and "\nSA0=" in backup
             and "V2 = " in backup
         )
+
+
+# A text that was shown
+
+
+async def test_a_download_of_a_text_that_was_shown_reads_no_file(tmp_path: Path, shop: CellSession) -> None:
+    shown = "PG 1\nLB G1\n  MR 7\nE\nPG\n"
+    for change in (lambda path: path.write_text("K9 wrong\n"), Path.unlink, Path.mkdir):
+        change(tmp_path / "p.mxt")
+        line = showing(f"/download {tmp_path / 'p.mxt'} a", shown)
+        assert line is not None
+        await shop.session.run(line)
+        assert [text.split()[-1] for text in shop.device("line:a").program.listing()] == ["G1", "7", "E"]
+
+
+async def test_a_wrong_text_that_was_shown_is_refused_though_the_file_is_right(
+    tmp_path: Path, shop: CellSession
+) -> None:
+    for text, why in (
+        ("K9\n", r"p\.mxt:1"),
+        ("PG 1\nE\0\nPG\n", "not a text file"),
+        ("\n" * 20_001, "more than 20000"),
+    ):
+        line = showing(f"/download {tmp_path / 'p.mxt'} a", text)
+        assert line is not None
+        with pytest.raises(Diagnostic, match=why):
+            await shop.session.run(line)
+    assert shop.device("line:a").program.listing() == []
+
+
+async def test_what_was_read_of_a_program_is_not_known_once_lines_are_sent_that_change_it(
+    tmp_path: Path, shop: CellSession
+) -> None:
+    def last() -> ProgramRead:
+        return [each for each in shop.events if isinstance(each, ProgramRead)][-1]
+
+    await load(shop, tmp_path)
+    assert last().known and len(last().lines) == 4
+    await shop.session.run("@a PR P")
+    assert last().known  # which changes nothing
+    await load(shop, tmp_path, "--no-verify")
+    assert not last().known and last().lines == ()
+    for line in ("@a PG 1", "@a CP"):
+        await load(shop, tmp_path)
+        shop.events.clear()
+        shop.session.questions.agreed = True
+        await shop.session.run(line)
+        if line == "@a PG 1":
+            assert not last().known
+            await shop.session.run("@a PG")
+    assert not last().known

@@ -225,6 +225,16 @@ def test_a_drive_in_one_line_gets_its_world_there(tmp_path: Path) -> None:
     assert cells.load(path).buses[0].drives[0].world.load == 0.3 and path.read_text().endswith("# mine\n")
 
 
+def test_a_cell_that_changed_since_it_was_fitted_is_left(tmp_path: Path) -> None:
+    path = tmp_path / "cell.toml"
+    path.write_text('[[bus]]\nname = "axis"\n[[bus.drive]]\npersonality = "LMDCM"\nname = "a"\nmotor = "nema17"\n')
+    before, shop = path.read_text(), cells.load(path)
+    path.write_text(before + "# another's work\n")
+    with pytest.raises(Diagnostic, match="has changed since it was read"):
+        _keep(path, before, shop, {("axis", "a", ""): {"load": 0.3}})
+    assert path.read_text() == before + "# another's work\n"
+
+
 @pytest.mark.virtual
 async def test_a_drive_of_another_name_is_said_with_those_that_there_are(tmp_path: Path) -> None:
     log = await recorded(tmp_path, axis(), "MR 100")
