@@ -6,7 +6,7 @@ It also runs the tasks that a stop ends: verbs, scripts, macros, waits, download
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Awaitable, Callable, Coroutine, Iterator, Mapping, Sequence
+from collections.abc import Awaitable, Callable, Collection, Coroutine, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import datetime, timedelta
@@ -161,6 +161,8 @@ class Front:
     """Called when a bus gets another name, with the name before and the name now."""
     edit: Callable[[str], Awaitable[None]] | None = None
     """Its editor of files, in which Ctrl+X stops."""
+    unsaved: Callable[[], Collection[str]] | None = None
+    """The absolute paths of the files with a text in that editor that is not saved."""
     screen: Callable[[str], Awaitable[None]] | None = None
     """Shows a page of the screen by its name, or `tour`, or raises Diagnostic."""
     clear: Callable[[], None] | None = None

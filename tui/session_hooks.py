@@ -28,6 +28,7 @@ class Hooks:
             before_quit=self._before_quit,
             renamed=parts.selection.rename,
             edit=self._edit,
+            unsaved=lambda: {str(text.file.path.absolute()) for text in parts.texts.unsaved()},
             screen=self._show_page,
             clear=actions.action_clear,
             transcripts=Transcripts(

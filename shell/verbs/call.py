@@ -98,6 +98,13 @@ class Call:
             raise Diagnostic(f"{name} leaves the current folder, in which a macro writes", self.verb.name, hint)
         return name
 
+    def warn_of_editor(self, file: str | Path) -> None:
+        """Warn where a text of a file that the line reads is in the editor of the screen, and not saved."""
+        unsaved = self.session.front.unsaved
+        if not isinstance(self.shown, str) and unsaved is not None and str(Path(file).absolute()) in unsaved():
+            text = f"{file}: its text in the editor is not saved; the file on the disk is used"
+            self.session.notify(text, warning=True)
+
     def wrong(self, message: str = "") -> Diagnostic:
         return self.verb.wrong(message)
 

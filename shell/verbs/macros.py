@@ -36,6 +36,8 @@ async def play(call: Call) -> None:
     if call.by is By.OPERATOR and any(each.name == chosen.macro for each in workspace.playing):
         raise Diagnostic(f"macro {chosen.macro} is playing", "/play", f"/play stop {chosen.macro} ends it")
     macro = workspace.macros.load(chosen.macro)
+    if workspace.front.unsaved is not None:
+        call.warn_of_editor(workspace.macros.path(macro.name))
     if isinstance(call.shown, Macro) and macro != call.shown:
         what = f"macro {macro.name} has changed on the disk since it was shown here; nothing was sent"
         raise Diagnostic(

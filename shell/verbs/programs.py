@@ -84,6 +84,7 @@ async def download(call: Call) -> None:
         only_changed="--only-changed" in options,
         run=options.get("--run", ""),
     )
+    call.warn_of_editor(file)
     shown = call.shown if isinstance(call.shown, str) else None
     await transfers.download(call.session, call.drive(target), file, wanted, shown, by=call.by)
 
@@ -97,6 +98,7 @@ async def check(call: Call) -> None:
     selected = call.session.selected
     own = selected.product if selected else ""
     product = wanted or (own if own in valid else PROGRAMS[language].drive.personality)
+    call.warn_of_editor(file)
     checked = await asyncio.to_thread(examine, file, product)
     for each in checked.problems:
         call.session.notify(each.line_for(file), warning=True)
