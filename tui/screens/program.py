@@ -312,16 +312,16 @@ class ProgramPage(Page):
             self.notify(f"{text.name} is not a program: nothing to download")
             return
         self.host.keyboard.hold(self)  # keys are for the question
-        self.run_worker(self._ask_download(text, chosen.product))
+        self.run_worker(self._ask_download(text, chosen.product, self.host.session.stops))
 
-    async def _ask_download(self, text: OpenText, product: str) -> None:
+    async def _ask_download(self, text: OpenText, product: str, stops: int) -> None:
         """Look at the disk, check the text that is on the screen then, and ask; that text is sent, and no other."""
         try:
             seen = await self.file.catch_up()
             if seen is Seen.ASKED or self.text is not text:
                 return
             findings = await self._examine()
-            if not self.in_front or self.text is not text or findings is None:
+            if not self.in_front or self.text is not text or findings is None or self.host.session.stops != stops:
                 return
             target, shown, outside = target_of(self.host.session), text.text, self.file.outside
             again = self.file.news.words if seen is Seen.READ else ""

@@ -111,6 +111,7 @@ class FileOnScreen:
             text = await asyncio.to_thread(texts.open, name)
             draft = await asyncio.to_thread(texts.draft, text)
             page.take_text()
+            self.outside = ""
             page.show_text(text)
             await self.catch_up()  # it may have been open already
         except Diagnostic as problem:
