@@ -1,7 +1,7 @@
 """Stops of a link, in two phases: write the bytes, then publish it and confirm that it works.
 
 1. The thread that reads the keys calls `Stopping.ahead` for each link: `stop_forms` makes the bytes, and the transport
-   writes them past every queue, whatever the event loop does.
+   writes them past every queue, whatever the event loop does (`StopAhead`).
 2. In the loop `Stopping.halt` takes that over, or writes the stop now. Then the line fails what waits, and notes what
    the drives may hold of a line. A session does this for all links before anything else: none delays another's stop.
 3. `Stopping.halted` publishes the stop. The line repeats it in pieces once it is quiet.
@@ -14,16 +14,19 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import Enum
+from functools import partial
 from typing import NamedTuple
 
-from multidrop.dialects import Codec, DriveError, DriveState, Stopped, StopPiece
+from multidrop.dialects import DriveError, DriveState, Stopped, StopPiece
 from multidrop.drives.drive import Drive
 from multidrop.drives.events import Sample, Traffic, isolated
 from multidrop.drives.link import Link
 from multidrop.drives.port_journal import GLOBAL
 from multidrop.drives.roster import Roster
+from multidrop.drives.stop_ahead import Begun, StopAhead
+from multidrop.drives.stop_forms import stop_forms
 from multidrop.transports import TransportLost, Undelivered
 
 TRIES = 3
@@ -64,7 +67,9 @@ class Halt:
     drives: tuple[Drive, ...]
     others: tuple[Drive, ...] = ()
     data: bytes = b""
-    """The bytes written; empty if none were."""
+    """The bytes that begin it; empty if none were written."""
+    written: tuple[bytes, ...] = ()
+    """What was written of it: nothing, where it goes on with one that was on its way."""
     missed: set[Drive] = field(default_factory=set)
     """Drives whose part of the stop could not be made."""
     trouble: list[str] = field(default_factory=list)
@@ -110,80 +115,6 @@ class Halt:
         return Fate.NOT_KNOWN if self.link.lost or drive in self.doubts else Fate.SENT
 
 
-@dataclass(frozen=True)
-class StopForms:
-    """The forms of a stop, of which the state of the wire selects one."""
-
-    immediate: bytes
-    unterminated: bytes
-    """The same stop without any byte that ends a half-sent line."""
-    repeats: tuple[StopPiece, ...]
-    """The same stop, to be written piece by piece once it is quiet."""
-    invalidate: bytes
-    """Makes a half-sent line harmless; empty if none is needed."""
-    framed: bool
-    """Messages carry their length: one that has begun to leave must leave whole."""
-    missed: tuple[Drive, ...] = ()
-    """Drives whose dialect failed to make a stop."""
-
-    def written(self, cut: bool) -> tuple[bytes, bool]:
-        """The bytes to write, and whether they make a half-sent line harmless if they leave whole.
-
-        `cut`: a line may have been cut in two.
-        """
-        if cut and self.invalidate:
-            return self.unterminated + self.invalidate + self.immediate, True
-        return self.immediate, False
-
-
-def stop_forms(roster: Roster, only: Iterable[Drive] | None = None) -> StopForms:
-    """Make the bytes that stop these drives; by default all of the link, unlisted and probed ones included.
-
-    Each form of each language and setting is in it once.
-    """
-    groups: dict[tuple[Codec, bool], tuple[list[str], list[Drive]]] = {}
-    for drive in roster.all_drives if only is None else only:
-        state = drive.state
-        names, drives = groups.setdefault((state.codec, not state.settings_unknown), ([], []))
-        names.append(state.address or state.name)
-        drives.append(drive)
-    if only is None and (roster.probing or not groups):
-        groups.setdefault((roster.family.codec, False), ([], []))[0].extend(roster.probing)
-    immediate, unterminated, invalidate = list[bytes](), list[bytes](), list[bytes]()
-    repeats, missed, framed = list[StopPiece](), list[Drive](), False
-    for (codec, sure), (names, drives) in groups.items():
-        framed, failed = framed or codec.framed, list[str]()
-        with isolated(f"the stop of {', '.join(names)} on {roster.link.name}", failed):
-            stop, unfinished = codec.stop(names, sure), codec.stop(names, sure, half_sent=True)
-            pieces, harmless = codec.stop_again(names, sure), codec.invalidate()
-            if stop not in immediate:
-                # Written at once, the reply to a second answered stop would collide with the reply to the first.
-                if immediate and codec.stop_replies:
-                    repeats.append(StopPiece(stop, pieces[0].quiet))
-                else:
-                    immediate.append(stop)
-                    unterminated.append(unfinished)
-                repeats += pieces
-            if harmless not in invalidate:
-                invalidate.append(harmless)
-        if failed:
-            missed += drives
-    repeats += roster.sweep if only is None else ()
-    joined = b"".join
-    return StopForms(joined(immediate), joined(unterminated), tuple(repeats), joined(invalidate), framed, tuple(missed))
-
-
-class Written(NamedTuple):
-    """A stop that was written."""
-
-    forms: StopForms
-    data: bytes
-    invalidates: bool
-    """It makes a half-sent line harmless."""
-    before: bool = False
-    """A stop before it did so, of which the loop knows nothing yet."""
-
-
 class Stopping:
     """Stops the drives of one link."""
 
@@ -192,8 +123,7 @@ class Stopping:
         """The last stop of the whole link."""
         self._roster = roster
         self._link = roster.link
-        self._ahead: Written | None = None
-        """The last stop that another thread has written and the loop has not yet taken over."""
+        self._ahead = StopAhead(roster.link, partial(stop_forms, roster), self._went_on)
         self._missed = False
         """Another thread's stop found the link lost, and the loop has not taken that over."""
         self._unconfirmed: list[Halt] = []
@@ -213,21 +143,10 @@ class Stopping:
 
         From then until that `halt` the loop writes nothing. Does nothing on a transport that cannot be preempted.
         """
-        link = self._link
-        if link.lost:
+        if self._link.lost:
             self._missed = True
-            return
-        forms = stop_forms(self._roster)
-        now = link.now()
-
-        def stop(dropped: int) -> bytes:
-            last = self._ahead
-            before = last is not None and (last.invalidates or last.before)
-            self._ahead = Written(forms, *forms.written(bool(dropped or link.line.half_sent(now))), before)
-            link.line.overtaken = True
-            return self._ahead.data
-
-        link.transport.preempt(forms.framed, stop)
+        else:
+            self._ahead.press()
 
     def halt(self, only: Iterable[Drive] | None = None, follows: bool = True) -> Halt:
         """Write a stop of all drives or some, and nothing else: no watcher hears of it before `halted`.
@@ -251,15 +170,13 @@ class Stopping:
         if halt.whole:
             conversations.stop(None)
         if link.lost:
-            self._ahead = None
+            self._ahead.forget()
             halt.trouble.append("lost")
             return
         with isolated(f"the stop of {link.name}", halt.trouble):
-            at, ahead = link.now(), self._ahead
-            if halt.whole and follows and link.transport.yielded():  # else another thread's stop has not been followed
-                self._ahead = None
+            at, ahead = link.now(), self._ahead.take(halt.whole and follows)
             written = ahead or self._write_now(halt)
-            halt.data = written.data
+            halt.data, halt.written = written.data, tuple(data for _, data in written.written)
             halt.missed.update(written.forms.missed)
             # A late reply to the stop of one would pass for that to a request of another, with its mark behind it.
             repliers = [drive for drive in self._roster.all_drives if drive.state.codec.stop_replies]
@@ -268,9 +185,11 @@ class Stopping:
                 others = [drive for drive in self._roster.all_drives if drive not in halt.drives]
                 halt.others = tuple(drive for drive in others if _hears(drive.state, halt.data))
                 only = {*GLOBAL, *(drive.address for drive in (*halt.affected, *repliers))}
-            link.line.stop(at, *written.forms.repeats, only=only)
-            link.line.wrote(halt.data, at, whole=written.invalidates)
-            link.debris.stop_written(halt.data, link.line.transmitted)
+            since = None if ahead is None else ahead.since(link.line.transmitted)
+            link.line.stop(at, *written.pieces, only=only, since=since)
+            if written.first is not None:
+                link.line.put_first(written.first)
+            self._note_written(written)
             for drive in halt.affected:
                 drive.state.stopped()
             for drive in repliers:
@@ -279,18 +198,48 @@ class Stopping:
             if written.invalidates or written.before or link.transport.may_invalidate:
                 for drive in self._roster.all_drives:
                     drive.state.line_invalidated()
+            self._ahead.watch(written.forms)
         if not halt.whole:
             conversations.stop(drive.state for drive in halt.affected)
 
-    def _write_now(self, halt: Halt) -> Written:
-        """Drop what is unsent and write a stop, whatever fails."""
-        link, forms = self._link, stop_forms(self._roster, None if halt.whole else halt.drives)
-        dropped = 1
-        with isolated(f"taking back what {link.name} has not sent", halt.trouble):
-            dropped = link.transport.discard(whole=forms.framed)
-        written = Written(forms, *forms.written(bool(dropped or link.line.half_sent(link.now()))))
-        link.transport.write(written.data)
-        return written
+    def _note_written(self, begun: Begun) -> None:
+        line = self._link.line
+        for when, data in begun.written:
+            line.wrote(data, when, whole=begun.invalidates and data == begun.data)
+            self._link.debris.stop_written(data, line.transmitted)
+
+    def _went_on(self) -> None:
+        """Take over the pieces that another thread has written while the loop was held up."""
+        link, begun = self._link, self._ahead.take(True)
+        if begun is None or link.lost:
+            return
+        link.line.went_on(begun.pieces, begun.since(link.line.transmitted))
+        self._note_written(begun)
+        for drive in self._roster.all_drives:
+            if drive.state.codec.stop_replies:
+                drive.state.reply_outstanding()
+        for _, data in begun.written:
+            link.publish(Traffic(link.now(), True, data, stop=True))
+        self._ahead.watch(begun.forms)
+        link.advance()
+
+    def _write_now(self, halt: Halt) -> Begun:
+        """Drop what is unsent and write a stop, whatever fails. One that is still leaving is not dropped."""
+        link, forms, now = self._link, stop_forms(self._roster, None if halt.whole else halt.drives), self._link.now()
+        under_way = Begun(forms, forms.immediate, link.line.transmitted, [*forms.pieces])
+        if link.line.only_stop and (link.transport.pending or now < under_way.clear(link.line.byte_time)):
+            if halt.whole:
+                return under_way
+            if forms.gap:  # the gap behind what is leaving comes first, and before the rest of that this stop
+                return replace(under_way, pieces=[*forms.repeats], first=StopPiece(forms.immediate, forms.gap))
+            begun, dropped = replace(under_way, pieces=[*forms.repeats]), 0
+        else:
+            begun, dropped = Begun(forms, b"", now, [*forms.repeats]), 1
+            with isolated(f"taking back what {link.name} has not sent", halt.trouble):
+                dropped = link.transport.discard(whole=forms.framed)
+            begun.data, begun.invalidates = forms.written(bool(dropped or link.line.half_sent(now)))
+        link.transport.write(begun.wrote(begun.data, now, link.line.byte_time))
+        return begun
 
     # What follows
 
@@ -315,7 +264,7 @@ class Stopping:
 
         Call it as soon as the link has another transport, before anything else is written.
         """
-        self._ahead = None
+        self._ahead.forget()
         open_, self._unconfirmed = self._unconfirmed, []
         drives = {drive: None for halt in open_ for drive in halt.not_started}
         whole = any(halt.whole and len(halt.not_started) == len(halt.affected) for halt in open_)
@@ -338,8 +287,8 @@ class Stopping:
         task.add_done_callback(self._tasks.pop)
 
     def _publish(self, halt: Halt) -> None:
-        if halt.data:
-            self._link.publish(Traffic(self._link.now(), True, halt.data, stop=True))
+        for data in halt.written:
+            self._link.publish(Traffic(self._link.now(), True, data, stop=True))
         self._link.advance()
 
     def _repeat(self, halt: Halt) -> None:
