@@ -41,7 +41,9 @@ class Halt:
     drives: tuple[Drive, ...]
     others: tuple[Drive, ...] = ()
     data: bytes = b""
-    """The bytes written; empty if none were."""
+    """The bytes that begin it; empty if none were written."""
+    written: tuple[bytes, ...] = ()
+    """What was written of it: nothing, where it goes on with one that was on its way."""
     missed: set[Drive] = field(default_factory=set)
     """Drives whose part of the stop could not be made."""
     trouble: list[str] = field(default_factory=list)

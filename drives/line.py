@@ -156,6 +156,11 @@ class Line:
         self._doubt = Doubt()
         self._repeats: list[StopPiece] = []
         """Pieces of the last stop that are still to be repeated."""
+        self._offered: tuple[StopPiece, int] | None = None
+        """The piece that the last Write carries, and the number of stops then, until the transport has accepted it."""
+        self._stops = 0
+        self.only_stop = False
+        """What was written last is a stop or a piece of one: no part of anything else can be on the wire behind it."""
         self._partial_until = float("-inf")
         """Until then the drives have part of a line that would do harm if it ended there."""
         self.overtaken = False
@@ -201,6 +206,29 @@ class Line:
         self.inbox.wrote(b"", now)
         if isinstance(self._state, Flight):
             self._state.sent = False
+        self.put_back()
+
+    def accepted(self) -> None:
+        """Note that the transport has accepted the last Write."""
+        self._offered = None
+
+    def put_back(self) -> None:
+        """Note that the transport has not accepted the piece of a stop in the last Write: it is the next again."""
+        if self._offered is None:
+            return
+        (piece, stops), self._offered = self._offered, None
+        if stops != self._stops and piece in self._repeats:  # a stop that came meanwhile has it at the end
+            del self._repeats[len(self._repeats) - 1 - self._repeats[::-1].index(piece)]
+        self._repeats.insert(0, piece)
+
+    def put_first(self, piece: StopPiece) -> None:
+        """Write a piece of a stop before all others that are still to be repeated."""
+        self._repeats.insert(0, piece)
+
+    def owed_pieces(self) -> list[StopPiece]:
+        """The pieces of the last stop that no transport has accepted yet, in their order. From any thread."""
+        offered = self._offered
+        return [*((offered[0],) if offered is not None else ()), *self._repeats]
 
     def half_sent(self, now: float) -> bool:
         """Whether the drives have part of a line that would do harm if it ended here."""
@@ -208,12 +236,16 @@ class Line:
 
     # Stops
 
-    def stop(self, now: float, *repeats: StopPiece, only: Container[str] | None = None) -> None:
+    def stop(
+        self, now: float, *repeats: StopPiece, only: Container[str] | None = None, since: float | None = None
+    ) -> None:
         """Fail what is queued (for `only` these addresses) and in flight; write each of `repeats` once it is quiet.
 
-        Pieces of the last stop that are not written yet go first, so that each drive has its turn.
+        Pieces of the last stop that are not written yet go first, so that each drive has its turn. `since`: another
+        thread has begun the stop, and written to it up to then, as for `went_on`.
         """
-        self.overtaken = False
+        self.overtaken, self.only_stop = False, True
+        self._stops += 1
         flight = self._state if isinstance(self._state, Flight) else None
         if flight is not None:
             self._finish(flight, Decoded(Reply(end=End.STOPPED), 0), now)
@@ -226,12 +258,19 @@ class Line:
             self._events.append(Finished(each.ticket, ended))
         self.inbox.stop(flight.request if flight is not None else None)
         added = [each for each in repeats if each.data]
-        pending = [each for each in self._repeats if _taken_from(added, each) or only is not None]
-        self._repeats = [*pending, *added]
+        if since is not None:
+            return self.went_on(added, since)
+        waited, _ = divided(self._repeats)
+        self._repeats = merged(self._repeats, added, keep=only is not None)
         held_up = float("inf")
-        if pending and isinstance(self._state, Recovering):  # further stops interrupt the wait of the pieces
-            held_up = min(self._state.held_up_since, self._state.since)
+        if waited and self._repeats[0] in waited and isinstance(self._state, Recovering):
+            held_up = min(self._state.held_up_since, self._state.since)  # further stops interrupt the wait of the piece
         self._state = Recovering(now, held_up)
+
+    def went_on(self, repeats: Sequence[StopPiece], since: float) -> None:
+        """Note that another thread has gone on with the last stop, up to then: `repeats` is left of it."""
+        self.overtaken = False
+        self._repeats, self._state = [*repeats], Recovering(since)
 
     def cut_off(self, now: float, begun: bool) -> Flight | None:
         """Note that the wire broke: forget what is queued. Return the flight that this ended.
@@ -247,6 +286,7 @@ class Line:
         self.inbox.cut_off(now)
         self._queue = []
         self._repeats = []
+        self._offered, self.only_stop = None, False
         self._partial_until = float("inf") if begun else float("-inf")
         self._state = Recovering(now)
         return flight
@@ -288,10 +328,11 @@ class Line:
             self.inbox.resume()
             self._state = None
         if self._repeats:  # one piece of the stop
-            data = self._repeats.pop(0).data
+            piece = self._repeats.pop(0)
+            self._offered = piece, self._stops
             self._state = Recovering(now)
-            self.wrote(data, now)
-            self._events.append(Write(data, None))
+            self.wrote(piece.data, now)
+            self._events.append(Write(piece.data, None))
             return False
         if self.inbox.awaits_tail(now):
             return False
@@ -309,6 +350,7 @@ class Line:
         self._poll_passed_over = poll_waits and priority is not Priority.POLL
         request = copy_with(request, tag=ticket)
         data = request.codec.encode(request)
+        self.only_stop = False
         self.wrote(data, now, whole=True)
         self._state = Flight(ticket, request, now, self.transmitted, now)
         self._events.append(Write(data, request))
@@ -395,6 +437,29 @@ class Line:
             return max(quiet_at, self.inbox.tail_at() or quiet_at)  # not in the middle of a program's line
         # A stop key that is held down must not keep the stop from the drives that get it piece by piece.
         return min(quiet_at, max(self.transmitted, trouble.held_up_since + HELD_UP * quiet))
+
+
+PAUSE = 0.5
+"""A piece of a stop with a longer quiet time begins its repetition: every drive has been sent a stop before it, s."""
+
+
+def merged(pending: Sequence[StopPiece], added: Sequence[StopPiece], keep: bool = False) -> list[StopPiece]:
+    """The pieces of a stop behind those of the one before that are not written yet, each once.
+
+    So stops in quick succession go round, and do not begin with the first drive each time. `keep`: the new stop is for
+    some drives alone, and the pieces for others stay.
+    """
+    before, again = divided(pending)
+    soon, late = divided(added)
+    first = [each for each in before if _taken_from(soon, each) or keep]
+    rest = [each for each in again if each not in late] if keep else []
+    return [*first, *soon, *rest, *late]
+
+
+def divided(pieces: Sequence[StopPiece]) -> tuple[list[StopPiece], list[StopPiece]]:
+    """Pieces before and behind the pause of a stop."""
+    at = next((at for at, each in enumerate(pieces) if each.quiet > PAUSE), len(pieces))
+    return [*pieces[:at]], [*pieces[at:]]
 
 
 def _taken_from(added: list[StopPiece], piece: StopPiece) -> bool:

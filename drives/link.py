@@ -10,10 +10,10 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from math import inf, nextafter
 
-from multidrop.dialects import End, Kind, Priority, Request
+from multidrop.dialects import End, Kind, Priority, Request, StopPiece
 from multidrop.drives import events
 from multidrop.drives.inbox import TERMINATORS, Debris, Leftovers
-from multidrop.drives.line import Finished, Line, Write
+from multidrop.drives.line import Finished, Line, Write, divided
 from multidrop.drives.port_journal import GLOBAL, Departure, Keeper
 from multidrop.transports import Transport, TransportLost
 from multidrop.transports.pipe import running_loop
@@ -66,8 +66,10 @@ class Link:
         self.leftovers = Leftovers()
         self._orderly = False
         """The port was still open when it was shut."""
+        self._rest: list[StopPiece] = []
+        """What was still to be written of a stop then."""
         self._loop = running_loop()
-        self.now = self._loop.time
+        self.now, self.call_soon = self._loop.time, self._loop.call_soon_threadsafe
         self._stamped = -inf
         self._waiting: dict[int, OnAnswer] = {}
         self._advancing = self._further = False
@@ -141,7 +143,7 @@ class Link:
         """
         if loss := self.loss:
             raise loss
-        now = self.now()
+        now, self.line.only_stop = self.now(), False
         if not self.transport.write(data):
             return False
         text = data.decode("latin-1")
@@ -178,8 +180,10 @@ class Link:
                     if isinstance(event, Write):
                         if event.request is not None and event.request.priority is not Priority.POLL:
                             self._news.tell()
-                        if stops == self.stops or event.request is None:  # else a watcher has stopped it meanwhile
+                        if stops == self.stops:
                             self._write(event, now)
+                        else:  # a watcher has stopped it meanwhile
+                            self.line.put_back()
                     elif isinstance(event, Finished):
                         self._finished(event)
                     else:
@@ -231,6 +235,7 @@ class Link:
         if not self.transport.write(data):  # broken, or a stop of another thread has gone first
             self.line.not_written(now)
             return
+        self.line.accepted()
         if request is None:
             self.debris.stop_written(b"", self.line.transmitted)
             self.publish(events.Traffic(now, True, data, stop=True))
@@ -304,16 +309,27 @@ class Link:
                 on_answer(LostInFlight(str(error)) if ticket == in_flight else error.again())
 
     def shut(self) -> None:
-        """Write the stop that is still to be repeated, and fail what waits, so that every conversation ends."""
+        """Write the stop that is still to be repeated, and fail what waits, so that every conversation ends.
+
+        Where drives reply to a stop, `close` writes it, piece by piece.
+        """
         self._orderly = not self.lost
-        if self._orderly and (repeats := self.line.take_repeats()):
+        if self._orderly and self.line.inbox.codec.stop_replies:
+            self._rest = self.line.owed_pieces()
+        elif self._orderly and (repeats := self.line.take_repeats()):
             with events.isolated(f"the stop of {self.name}"):
                 self.transport.write(repeats)
         self._lose(self.lost or TransportLost(f"{self.transport.name} is closed"))
 
     async def close(self) -> None:
-        """Close the port. Call `shut` first."""
+        """Write the rest of a stop, up to its repetition after a pause, and close the port. Call `shut` first."""
         self._sleep()
+        for piece in divided(self._rest)[0]:
+            due = self.line.transmitted + piece.quiet + len(piece.data) * self.line.byte_time
+            await asyncio.sleep(max(0.0, due - self.now()))
+            with events.isolated(f"the stop of {self.name}"):
+                self.transport.write(piece.data)
+                self.line.wrote(piece.data, self.now())
         await self.transport.close()
         if self._orderly:
             self.departure.arrived()

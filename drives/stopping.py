@@ -1,7 +1,7 @@
 """Stops of a link, in two phases: write the bytes, then publish it and confirm that it works.
 
 1. The thread that reads the keys calls `Stopping.ahead` for each link: `stop_forms` makes the bytes, and the transport
-   writes them past every queue, whatever the event loop does.
+   writes them past every queue, whatever the event loop does (`StopAhead`).
 2. In the loop `Stopping.halt` takes that over, or writes the stop now. Then the line fails what waits, and notes what
    the drives may hold of a line. A session does this for all links before anything else: none delays another's stop.
 3. `Stopping.halted` publishes the stop. The line repeats it in pieces once it is quiet.
@@ -14,16 +14,18 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
-from typing import NamedTuple
+from dataclasses import replace
+from functools import partial
 
-from multidrop.dialects import Codec, DriveState, Started, StopPiece
+from multidrop.dialects import DriveState, StopPiece
 from multidrop.drives.drive import Drive
 from multidrop.drives.events import Traffic, isolated
 from multidrop.drives.halts import Fate as Fate
 from multidrop.drives.halts import Halt as Halt
 from multidrop.drives.port_journal import GLOBAL
 from multidrop.drives.roster import Roster
+from multidrop.drives.stop_ahead import Begun, StopAhead
+from multidrop.drives.stop_forms import StopForms, single_forms, stop_forms
 from multidrop.drives.stop_readings import ENDLESS, Activity, read_activity
 
 TRIES = 3
@@ -35,98 +37,6 @@ AGAIN = 3
 """How often a stop is written again for a drive that stored it."""
 
 
-@dataclass(frozen=True)
-class StopForms:
-    """The forms of a stop, of which the state of the wire selects one."""
-
-    immediate: bytes
-    unterminated: bytes
-    """The same stop without any byte that ends a half-sent line."""
-    repeats: tuple[StopPiece, ...]
-    """The same stop, to be written piece by piece once it is quiet."""
-    invalidate: bytes
-    """Makes a half-sent line harmless; empty if none is needed."""
-    framed: bool
-    """Messages carry their length: one that has begun to leave must leave whole."""
-    missed: tuple[Drive, ...] = ()
-    """Drives whose dialect failed to make a stop."""
-
-    def written(self, cut: bool) -> tuple[bytes, bool]:
-        """The bytes to write, and whether they make a half-sent line harmless if they leave whole.
-
-        `cut`: a line may have been cut in two.
-        """
-        if cut and self.invalidate:
-            return self.unterminated + self.invalidate + self.immediate, True
-        return self.immediate, False
-
-
-def stop_forms(roster: Roster, only: Iterable[Drive] | None = None) -> StopForms:
-    """Make the bytes that stop these drives; by default all of the link, unlisted and probed ones included.
-
-    Each form of each language and setting is in it once.
-    """
-    groups: dict[tuple[Codec, bool], tuple[list[str], list[Drive]]] = {}
-    for drive in roster.all_drives if only is None else only:
-        state = drive.state
-        names, drives = groups.setdefault((state.codec, not state.settings_unknown), ([], []))
-        names.append(state.address or state.name)
-        drives.append(drive)
-    if only is None and (roster.probing or not groups):
-        groups.setdefault((roster.family.codec, False), ([], []))[0].extend(roster.probing)
-    immediate, unterminated, invalidate = list[bytes](), list[bytes](), list[bytes]()
-    repeats, missed, framed = list[StopPiece](), list[Drive](), False
-    for (codec, sure), (names, drives) in groups.items():
-        framed, failed = framed or codec.framed, list[str]()
-        with isolated(f"the stop of {', '.join(names)} on {roster.link.name}", failed):
-            stop, unfinished = codec.stop(names, sure), codec.stop(names, sure, half_sent=True)
-            pieces, harmless = codec.stop_again(names, sure), codec.invalidate()
-            if stop not in immediate:
-                # Written at once, the reply to a second answered stop would collide with the reply to the first.
-                if immediate and codec.stop_replies:
-                    repeats.append(StopPiece(stop, pieces[0].quiet))
-                else:
-                    immediate.append(stop)
-                    unterminated.append(unfinished)
-                repeats += pieces
-            if harmless not in invalidate:
-                invalidate.append(harmless)
-        if failed:
-            missed += drives
-    repeats += roster.sweep if only is None else ()
-    joined = b"".join
-    return StopForms(joined(immediate), joined(unterminated), tuple(repeats), joined(invalidate), framed, tuple(missed))
-
-
-def single_forms(started: Mapping[Drive, Started]) -> StopForms | None:
-    """Make the bytes that stop what was started in these drives, and nothing else; None where a drive has no such stop.
-
-    That needs a drive that is known to read lines, and whose settings are known.
-    """
-    pieces: list[StopPiece] = []
-    framed = False
-    for drive, what in started.items():
-        unsure = drive.state.settings_unknown or drive.programming or drive.missing
-        own = () if unsure else drive.codec.stop_started(drive.address, what)
-        if not own:
-            return None
-        pieces += own
-        framed = framed or drive.codec.framed
-    first, *rest = pieces
-    return StopForms(first.data, first.data, (*rest, *pieces), b"", framed)
-
-
-class Written(NamedTuple):
-    """A stop that was written."""
-
-    forms: StopForms
-    data: bytes
-    invalidates: bool
-    """It makes a half-sent line harmless."""
-    before: bool = False
-    """A stop before it did so, of which the loop knows nothing yet."""
-
-
 class Stopping:
     """Stops the drives of one link."""
 
@@ -135,8 +45,7 @@ class Stopping:
         """The last stop of the whole link."""
         self._roster = roster
         self._link = roster.link
-        self._ahead: Written | None = None
-        """The last stop that another thread has written and the loop has not yet taken over."""
+        self._ahead = StopAhead(roster.link, partial(stop_forms, roster), self._went_on)
         self._missed = False
         """Another thread's stop found the link lost, and the loop has not taken that over."""
         self._unconfirmed: list[Halt] = []
@@ -156,21 +65,10 @@ class Stopping:
 
         From then until that `halt` the loop writes nothing. Does nothing on a transport that cannot be preempted.
         """
-        link = self._link
-        if link.lost:
+        if self._link.lost:
             self._missed = True
-            return
-        forms = stop_forms(self._roster)
-        now = link.now()
-
-        def stop(dropped: int) -> bytes:
-            last = self._ahead
-            before = last is not None and (last.invalidates or last.before)
-            self._ahead = Written(forms, *forms.written(bool(dropped or link.line.half_sent(now))), before)
-            link.line.overtaken = True
-            return self._ahead.data
-
-        link.transport.preempt(forms.framed, stop)
+        else:
+            self._ahead.press()
 
     def halt(self, only: Iterable[Drive] | None = None, follows: bool = True) -> Halt:
         """Write a stop of all drives or some, and nothing else: no watcher hears of it before `halted`.
@@ -196,15 +94,13 @@ class Stopping:
         if halt.whole:
             conversations.stop(None)
         if link.lost:
-            self._ahead = None
+            self._ahead.forget()
             halt.trouble.append("lost")
             return
         with isolated(f"the stop of {link.name}", halt.trouble):
-            at, ahead = link.now(), self._ahead
-            if halt.whole and follows and link.transport.yielded():  # else another thread's stop has not been followed
-                self._ahead = None
+            at, ahead = link.now(), self._ahead.take(halt.whole and follows)
             written = ahead or self._write_now(halt)
-            halt.data = written.data
+            halt.data, halt.written = written.data, tuple(data for _, data in written.written)
             halt.missed.update(written.forms.missed)
             # A late reply to the stop of one would pass for that to a request of another, with its mark behind it.
             repliers = [drive for drive in self._roster.all_drives if drive.state.codec.stop_replies]
@@ -212,10 +108,13 @@ class Stopping:
             if not halt.whole:  # the bytes may stop other drives as well
                 halt.others = () if halt.single else self._reached(halt.drives, halt.data)
                 only = {*GLOBAL, *(drive.address for drive in (*halt.affected, *repliers))}
-            link.line.stop(at, *written.forms.repeats, only=only)
-            link.line.wrote(halt.data, at, whole=written.invalidates)
-            replied = (each.data for each in written.forms.repeats if halt.single)
-            link.debris.stop_written(b"".join((halt.data, *replied)), link.line.transmitted)
+            since = None if ahead is None else ahead.since(link.line.transmitted)
+            link.line.stop(at, *written.pieces, only=only, since=since)
+            if written.first is not None:
+                link.line.put_first(written.first)
+            self._note_written(written)
+            if halt.single:
+                link.debris.stop_written(b"".join(each.data for each in written.pieces), link.line.transmitted)
             for drive in halt.affected:
                 if not halt.spares_programs(drive):
                     halt.programs.setdefault(drive, _ran(drive, halt))
@@ -226,15 +125,37 @@ class Stopping:
             if written.invalidates or written.before or link.transport.may_invalidate:
                 for drive in self._roster.all_drives:
                     drive.state.line_invalidated()
+            self._ahead.watch(written.forms)
         if not halt.whole:
             conversations.stop(drive.state for drive in halt.affected)
+
+    def _note_written(self, begun: Begun) -> None:
+        line = self._link.line
+        for when, data in begun.written:
+            line.wrote(data, when, whole=begun.invalidates and data == begun.data)
+            self._link.debris.stop_written(data, line.transmitted)
+
+    def _went_on(self) -> None:
+        """Take over the pieces that another thread has written while the loop was held up."""
+        link, begun = self._link, self._ahead.take(True)
+        if begun is None or link.lost:
+            return
+        link.line.went_on(begun.pieces, begun.since(link.line.transmitted))
+        self._note_written(begun)
+        for drive in self._roster.all_drives:
+            if drive.state.codec.stop_replies:
+                drive.state.reply_outstanding()
+        for _, data in begun.written:
+            link.publish(Traffic(link.now(), True, data, stop=True))
+        self._ahead.watch(begun.forms)
+        link.advance()
 
     def _reached(self, drives: Iterable[Drive], data: bytes) -> tuple[Drive, ...]:
         """The other drives of the link that the bytes of a stop stop as well."""
         others = [drive for drive in self._roster.all_drives if drive not in drives]
         return tuple(drive for drive in others if _hears(drive.state, data))
 
-    def _write_single(self, halt: Halt, usual: StopForms) -> Written | None:
+    def _write_single(self, halt: Halt, usual: StopForms) -> Begun | None:
         """Write a stop of what was started, behind what leaves; None where the usual one stops no more, or must.
 
         Nothing that is on its way is dropped: a line that is cut off needs the usual stop.
@@ -243,23 +164,34 @@ class Stopping:
         reaches_more = self._reached(halt.drives, data) or any(each.codec.stops_unknown(data) for each in halt.drives)
         if not (reaches_more or any(map(halt.spares_programs, halt.drives))):
             return None
-        forms, link = single_forms(halt.started), self._link
-        if forms is None or link.away or link.transport.pending or not link.transport.write(forms.immediate):
+        forms, link, now = single_forms(halt.started), self._link, self._link.now()
+        if forms is None or link.away or link.transport.pending:
             return None
-        return Written(forms, forms.immediate, False)
+        begun = Begun(forms, forms.immediate, now, [*forms.repeats])
+        return begun if link.transport.write(begun.wrote(begun.data, now, link.line.byte_time)) else None
 
-    def _write_now(self, halt: Halt) -> Written:
-        """Drop what is unsent and write a stop, whatever fails."""
-        link, forms = self._link, stop_forms(self._roster, None if halt.whole else halt.drives)
-        halt.single = bool(halt.started)
+    def _write_now(self, halt: Halt) -> Begun:
+        """Drop what is unsent and write a stop, whatever fails. One that is still leaving is not dropped."""
+        link, forms, now = self._link, stop_forms(self._roster, None if halt.whole else halt.drives), self._link.now()
+        under_way = Begun(forms, forms.immediate, link.line.transmitted, [*forms.pieces])
+        leaving = link.line.only_stop and (link.transport.pending or now < under_way.clear(link.line.byte_time))
+        halt.single = bool(halt.started) and not leaving
         if halt.single and (single := self._write_single(halt, forms)) is not None:
             return single
-        halt.single, dropped = False, 1
-        with isolated(f"taking back what {link.name} has not sent", halt.trouble):
-            dropped = link.transport.discard(whole=forms.framed)
-        written = Written(forms, *forms.written(bool(dropped or link.line.half_sent(link.now()))))
-        link.transport.write(written.data)
-        return written
+        halt.single = False
+        if leaving:
+            if halt.whole:
+                return under_way
+            if forms.gap:  # the gap behind what is leaving comes first, and before the rest of that this stop
+                return replace(under_way, pieces=[*forms.repeats], first=StopPiece(forms.immediate, forms.gap))
+            begun, dropped = replace(under_way, pieces=[*forms.repeats]), 0
+        else:
+            begun, dropped = Begun(forms, b"", now, [*forms.repeats]), 1
+            with isolated(f"taking back what {link.name} has not sent", halt.trouble):
+                dropped = link.transport.discard(whole=forms.framed)
+            begun.data, begun.invalidates = forms.written(bool(dropped or link.line.half_sent(now)))
+        link.transport.write(begun.wrote(begun.data, now, link.line.byte_time))
+        return begun
 
     # What follows
 
@@ -284,7 +216,7 @@ class Stopping:
 
         Call it as soon as the link has another transport, before anything else is written.
         """
-        self._ahead = None
+        self._ahead.forget()
         open_, self._unconfirmed = self._unconfirmed, []
         drives = {drive: None for halt in open_ for drive in halt.not_started}
         whole = any(halt.whole and len(halt.not_started) == len(halt.affected) for halt in open_)
@@ -308,8 +240,8 @@ class Stopping:
         task.add_done_callback(self._tasks.pop)
 
     def _publish(self, halt: Halt) -> None:
-        if halt.data:
-            self._link.publish(Traffic(self._link.now(), True, halt.data, stop=True))
+        for data in halt.written:
+            self._link.publish(Traffic(self._link.now(), True, data, stop=True))
         self._link.advance()
 
     def _repeat(self, halt: Halt) -> None:

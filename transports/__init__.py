@@ -114,6 +114,8 @@ class Transport(ABC):
     """The promises of others that it cannot keep, for a person who opens it."""
     network = False
     """It leads to a network port, which may be a drive's own."""
+    preemptible = False
+    """Other threads can write a stop to it: `preempt` and `follow`."""
     may_invalidate = False
     """At a stop its server drops unsent bytes, too, and may make a half-sent line harmless by itself."""
     identity = ""
@@ -152,8 +154,21 @@ class Transport(ABC):
         """
         return False
 
-    def yielded(self) -> bool:
-        """Take note of one `preempt`; return whether it was the last, so that the loop writes again."""
+    def follow(self, make: Callable[[int], bytes | None], key: bool = False) -> bool:
+        """Write `make(bytes that wait)` behind what was written, from any thread, and drop nothing.
+
+        `key`: it counts as a `preempt`. Else it does so only between a `preempt` and the last `yielded`. `make` may
+        give nothing, so that what waits is passed on, or None: then the result is False, as where the pipe is broken or
+        cannot do this.
+        """
+        return False
+
+    def yielded(self, note: Callable[[bool], None] = lambda last: None) -> bool:
+        """Take note of one `preempt`; return whether it was the last, so that the loop writes again.
+
+        `note` is called with that first, while no other thread can write.
+        """
+        note(True)
         return True
 
     @abstractmethod

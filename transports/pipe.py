@@ -161,6 +161,8 @@ _READS = 64
 class DescriptorPipe(Pipe):
     """A transport over an `Endpoint`. Each `write` is first offered to the endpoint as a whole."""
 
+    preemptible = True
+
     def __init__(self, endpoint: Endpoint, control: PortControl | None = None) -> None:
         super().__init__(endpoint.name, control)
         self._endpoint = endpoint
@@ -216,9 +218,23 @@ class DescriptorPipe(Pipe):
         self._loop.call_soon_threadsafe(self._after_push, problem)
         return True
 
-    def yielded(self) -> bool:
+    def follow(self, make: Callable[[int], bytes | None], key: bool = False) -> bool:
+        with self._guard:
+            if not self._usable or not (key or self._preempted):
+                return False
+            problem = self._push() if self._preempted else None  # else a line may wait that the next stop drops
+            data = make(sum(map(len, self._pending))) if problem is None else None
+            if data is not None:
+                self._preempted += key
+                self._pending += [memoryview(data)] if data else ()
+                problem = self._push()
+        self._loop.call_soon_threadsafe(self._after_push, problem)
+        return data is not None
+
+    def yielded(self, note: Callable[[bool], None] = lambda last: None) -> bool:
         with self._guard:
             self._preempted = max(0, self._preempted - 1)
+            note(not self._preempted)
             return not self._preempted
 
     def _begin(self) -> None:

@@ -178,6 +178,10 @@ class RelayEndpoint:
         self._rest.append(memoryview(frame(Kind.DROP)))
         return held
 
+    def hurry(self) -> None:
+        """Let what is written next leave at once and whole: the rest of a stop waits for no report of the far side."""
+        self._urgent = True
+
     def explain(self, error: OSError | None) -> str:
         """Reason of a break in one line for a person."""
         self._lost = True
@@ -248,6 +252,14 @@ class RelayPipe(DescriptorPipe):
         if self._usable:
             self._send()
         return dropped
+
+    def follow(self, make: Callable[[int], bytes | None], key: bool = False) -> bool:
+        def urgent(waiting: int) -> bytes | None:
+            if data := make(waiting):
+                self._relay.hurry()
+            return data
+
+        return super().follow(urgent, key)
 
     def _begin(self) -> None:
         super()._begin()

@@ -70,6 +70,7 @@ class Rfc2217Pipe(Transport):
     """One port of a device server."""
 
     may_invalidate = True
+    preemptible = True
 
     def __init__(self, inner: Transport) -> None:
         self._inner, self.name = inner, inner.name
@@ -226,8 +227,15 @@ class Rfc2217Pipe(Transport):
         purge = b"" if whole else _PURGE
         return self._inner.preempt(True, lambda dropped: purge + telnet.escaped(make(dropped)))
 
-    def yielded(self) -> bool:
-        return self._inner.yielded()
+    def follow(self, make: Callable[[int], bytes | None], key: bool = False) -> bool:
+        def escaped(waiting: int) -> bytes | None:
+            data = make(waiting)
+            return data and telnet.escaped(data)
+
+        return self._inner.follow(escaped, key)
+
+    def yielded(self, note: Callable[[bool], None] = lambda last: None) -> bool:
+        return self._inner.yielded(note)
 
     async def close(self) -> None:
         self._lost = self._received = None

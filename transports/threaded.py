@@ -62,6 +62,8 @@ class Device(Protocol):
 class ThreadedPipe(Pipe):
     """A transport over a `Device`."""
 
+    preemptible = True
+
     def __init__(self, device: Device, control: PortControl | None = None) -> None:
         super().__init__(device.name, control)
         self._device = device
@@ -115,10 +117,23 @@ class ThreadedPipe(Pipe):
             self._queue.append(bytes(make(dropped)))
         return True
 
-    def yielded(self) -> bool:
+    def follow(self, make: Callable[[int], bytes | None], key: bool = False) -> bool:
+        with self._turn:
+            if not self._usable or self._ending or not (key or self._preempted):
+                return False
+            if (data := make(sum(map(len, self._queue)) + self._busy)) is None:
+                return False
+            self._preempted += key
+            if data:
+                self._queue.append(bytes(data))
+                self._turn.notify_all()
+        return True
+
+    def yielded(self, note: Callable[[bool], None] = lambda last: None) -> bool:
         with self._turn:
             self._preempted = max(0, self._preempted - 1)
-        return not self._preempted
+            note(not self._preempted)
+            return not self._preempted
 
     def _spawn(self, work: Callable[[], None], what: str) -> None:
         thread = threading.Thread(target=work, name=f"{self.name} {what}", daemon=True)

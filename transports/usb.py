@@ -85,6 +85,8 @@ class Carrier(Protocol):
 class UsbPipe(Pipe):
     """One controller on USB; `open_usb` makes it ready."""
 
+    preemptible = True
+
     def __init__(self, carrier: Carrier) -> None:
         super().__init__(carrier.name)
         self._carrier = carrier
@@ -178,9 +180,20 @@ class UsbPipe(Pipe):
         self._loop.call_soon_threadsafe(self._watch, commands, numbers)
         return True
 
-    def yielded(self) -> bool:
+    def follow(self, make: Callable[[int], bytes | None], key: bool = False) -> bool:
+        with self._guard:
+            if not self._usable or not (key or self._preempted) or (data := make(0)) is None:
+                return False
+            self._preempted += key
+            commands = data.split(b"\r")
+            numbers = self._send(commands)
+        self._loop.call_soon_threadsafe(self._watch, commands, numbers)
+        return True
+
+    def yielded(self, note: Callable[[bool], None] = lambda last: None) -> bool:
         with self._guard:
             self._preempted = max(0, self._preempted - 1)
+            note(not self._preempted)
             return not self._preempted
 
     def _drop(self) -> None:

@@ -78,6 +78,8 @@ class SharedPort:
         self._loss: TransportLost | None = None
         self._purged = 0
         """Bytes that a purge has dropped, until the next ones are written: the drives may hold a half-sent line."""
+        self._only_stop = False
+        """What was written last is a stop or a piece of one: whoever stops or purges next does not drop it."""
         self._timer: asyncio.TimerHandle | None = None
         self._tasks: dict[asyncio.Task[None], None] = {}
         self._turns = asyncio.Lock()
@@ -118,13 +120,15 @@ class SharedPort:
     def _write_pieces(self, pieces: Sequence[StopPiece], owed: bool) -> None:
         first, *others = pieces
         self._do(self._exchange.stop(first.data, self._loop.time(), owed))
-        self._begin(self._repeat(others, owed))
+        self._begin(self._repeat(first, others, owed))
 
-    async def _repeat(self, pieces: Sequence[StopPiece], owed: bool) -> None:
-        """Write pieces of a stop; those of an owed one end where a client starts something."""
-        starts = self._exchange.owed.starts
+    async def _repeat(self, last: StopPiece, pieces: Sequence[StopPiece], owed: bool) -> None:
+        """Write pieces of a stop behind the last one; those of an owed one end where a client starts something."""
+        starts, baud = self._exchange.owed.starts, self._transport.control.baud if self._transport.control else 0
         for piece in pieces:
-            await asyncio.sleep(piece.quiet)
+            leaving = 10.0 * len(last.data) / baud if baud else 0.0
+            await asyncio.sleep(piece.quiet + 2 * leaving)  # and its reply
+            last = piece
             if self._loss is not None or (owed and self._exchange.owed.starts != starts):
                 return
             self._do(self._exchange.stop(piece.data, self._loop.time(), owed))
@@ -186,19 +190,23 @@ class SharedPort:
                     ahead = f"it wrote {AHEAD} bytes more than the line has taken; {lost} dropped"
                     self._do(self._exchange.close(action.client, "dropped", ahead))
                     continue
-                self._purged = 0
+                self._purged, self._only_stop = 0, False
                 self._transport.write(action.data)
             elif isinstance(action, Stop):
-                dropped = self._transport.discard(whole=self._exchange.framed)
+                dropped = self._take_back()
                 self._transport.write(action.mended if dropped or self._purged else action.data)
-                self._purged = 0
+                self._purged, self._only_stop = 0, True
                 self._do(self._exchange.dropped(dropped))
             elif isinstance(action, Purge):
-                dropped = self._transport.discard(whole=self._exchange.framed)
+                dropped = self._take_back()
                 self._purged += dropped
                 self._do(self._exchange.dropped(dropped, True, self._loop.time()))
             else:
                 self._begin(self._apply(action))
+
+    def _take_back(self) -> int:
+        """Drop what the port has not sent, but no stop; return the number of bytes."""
+        return 0 if self._only_stop else self._transport.discard(whole=self._exchange.framed)
 
     async def _apply(self, action: Set) -> None:
         """Change a setting, in a thread, for the call may block. A port without settings takes any."""
@@ -234,7 +242,7 @@ class SharedPort:
             except TransportLost as failure:
                 pauses.lengthen(limit_of(failure))
             else:
-                self._loss, self._purged = None, 0
+                self._loss, self._purged, self._only_stop = None, 0, False
         self._transport.start(self._received, self._broke)
         self._exchange.back()
         if owed := self._exchange.owed.pieces:

@@ -25,6 +25,7 @@ from soak.simulation.clock import SimulatedLoop
 SHARED = {
     "multidrop.transports.pipe": ("Pipe", "DescriptorPipe"),
     "multidrop.transports.usb": ("UsbPipe",),
+    "multidrop.drives.stop_ahead": ("StopAhead",),
     "multidrop.drives.stopping": ("Stopping", "_read"),
     "multidrop.drives.link": ("Link",),
     "multidrop.drives.line": ("Line",),
@@ -35,13 +36,17 @@ SHARED = {
     "multidrop.shell.prompt.line_queue": ("LineQueue",),
 }
 """The modules that both threads run, and what of them they run: the other pipe is for Windows."""
-OWN = {"DescriptorPipe.preempt", "UsbPipe.preempt", "Stopping.ahead", "Keyboard._run"}
+OWN = {
+    *("DescriptorPipe.preempt", "DescriptorPipe.follow", "UsbPipe.preempt", "UsbPipe.follow", "Stopping.ahead"),
+    *("StopAhead.press", "StopAhead._begin", "StopAhead._again", "StopAhead._pace", "StopAhead._go_on"),
+    *("StopAhead._next", "StopAhead._take_back", "StopAhead._due_piece", "StopAhead._of_the_loop", "Keyboard._run"),
+}
 """What the keyboard's thread runs alone."""
 LOCKS = {"_guard"}
 QUEUES = {"_pending", "_queue", "_waiting", "_repeats", "_typed", "_background"}
-STATES = {"_ahead", "_preempted", "_partial_until", "lost", "transport", "buses"}
+STATES = {"_begun", "_preempted", "_partial_until", "lost", "transport", "buses"}
 """Attributes that one thread sets and the other reads."""
-WRITES = {"write", "discard", "drop", "unsent", "preempt", "yielded", "take_repeats"}
+WRITES = {"write", "discard", "drop", "unsent", "preempt", "yielded", "take_repeats", "take"}
 WRITING = (
     "pipe DescriptorPipe.write",
     "pipe DescriptorPipe._push",

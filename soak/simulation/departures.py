@@ -8,9 +8,9 @@ from dataclasses import dataclass
 from math import inf
 
 from multidrop.transports import telnet
-from multidrop.transports.relay import Frames, Kind
+from multidrop.transports.relay import Frames, Garbled, Kind
 from soak.languages import LANGUAGES
-from soak.simulation.history import Command
+from soak.simulation.history import Command, Stop
 from soak.simulation.rule import Rule
 from soak.simulation.world import World
 
@@ -115,13 +115,66 @@ def _repeated(world: World) -> Iterator[str]:
             lost = any(at >= stop.at and LOST.match(text) for at, text in history.notices)
             if begins < 0 or again or lost or any(at > stop.at + TAKEN_OVER for at in ends):
                 continue
-            left = b"".join(data for _, port, data in history.written[begins + 1 :] if port == line)
+            begins += not under_way(world, line, stop)
+            left = b"".join(data for _, port, data in history.written[begins:] if port == line)
             left = left.replace(b"\xff\xff", b"\xff") if world.place(line[:2]).kind == "rfc2217" else left
             yield from (
                 f"{line}: stop at {stop.at:.3f}, {each!r} did not leave again" for each in pieces if each not in left
             )
 
 
+def _last_before(world: World, line: str, index: int) -> tuple[float, bytes] | None:
+    """The last write to a line before the write of a number."""
+    found = (each for each in reversed(world.history.written[:index]) if each[1] == line)
+    return next(((at, data) for at, _, data in found), None)
+
+
+def under_way(world: World, line: str, stop: Stop) -> bool:
+    """Whether the stop of a key before it is on its way to the drives: then this one goes on with that."""
+    last = _last_before(world, line, stop.own[line][0])
+    if last is not None and not _for_drives(world, line, last[1]):  # a message that has begun to leave
+        stops = [each for each in world.history.stops if each.at <= stop.at and line in each.own]
+        before = stops[stops.index(stop) - 1] if stops.index(stop) else stop
+        return before is not stop and before.at >= stop.at - UNDER_WAY
+    return last is not None and last[0] >= stop.at - UNDER_WAY and _is_stop(world, line, stop, last[1])
+
+
+def _for_drives(world: World, line: str, written: bytes) -> bytes:
+    try:
+        return for_drives(world.place(line[:2]).kind, written)
+    except Garbled:  # the rest of a message
+        return written
+
+
+def _is_stop(world: World, line: str, stop: Stop, written: bytes) -> bool:
+    """Whether a write is of a stop, or a part of one."""
+    data = _for_drives(world, line, written)
+    return any(data and (data.endswith(each) or data in each) for each in stop.parts[line])
+
+
+def stop_bytes(world: World, line: str, stop: Stop, until: float) -> bytes:
+    """What has left for the drives of a line from a stop on, and before it as far as that was a stop, too."""
+    history, place = world.history, world.place(line[:2])
+    first = max((index for at, name, index in history.opened if name == line and at <= stop.at), default=0)
+    begins = stop.own[line][0]
+    for index in range(begins - 1, first - 1, -1):
+        at, name, data = history.written[index]
+        if name == line:
+            if at < stop.at - UNDER_WAY or not _is_stop(world, line, stop, data):
+                break
+            begins = index
+    whole, before = (
+        b"".join(data for at, name, data in history.written[first:end] if name == line and at <= until)
+        for end in (None, begins)
+    )
+    try:
+        return for_drives(place.kind, whole)[len(for_drives(place.kind, before)) :]
+    except Garbled:
+        return whole[len(before) :]
+
+
+UNDER_WAY = 0.2
+"""The longest time, s, between two pieces of a stop, but for the pause before its repetition."""
 LOST = re.compile(r"l\d: .* was lost|l\d: .*; trying again")
 TAKEN_OVER = 1e-9
 """The time in which the loop has taken over a stop, at the time of its key, s."""

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from functools import partial
 from typing import TYPE_CHECKING
 
 from multidrop.dialects import Codec
 from multidrop.drives.bus import Bus
 from multidrop.drives.events import Ended, Sent
-from multidrop.drives.stopping import stop_forms
+from multidrop.drives.stop_forms import stop_forms
 from multidrop.shell.events import Failed, Notified, OnBus, Output, Printed
 from multidrop.shell.session import Session
 from multidrop.transports import telnet
@@ -73,6 +74,7 @@ def typed(world: World, data: bytes, session: Session, who: str = "") -> None:
         forms = {f"{name}{who}": _forms(world, bus) for name, bus in buses.items()}
         repeats = {name + who: stop_forms(bus.roster).repeats for name, bus in buses.items() if name not in session.raw}
         pieces = {name: tuple(each.data for each in found) for name, found in repeats.items()}
+        parts = {name + who: _parts(bus) for name, bus in buses.items()}
         trying = session.reconnections.trying
         for name, bus in buses.items():
             pipe = bus.link.transport
@@ -81,8 +83,42 @@ def typed(world: World, data: bytes, session: Session, who: str = "") -> None:
             ):  # the far side has taken nothing of the last stops
                 world.history.full.append((world.loop.now, f"{name}{who}"))
         lost = tuple(name + who for name, bus in session.buses.items() if bus.link.lost and name in trying)
-        stop = Stop(world.loop.now, forms, who, len(world.history.written), lost=lost, pieces=pieces)
+        reaches = {f"{name}{who}": _reaches(bus) for name, bus in buses.items() if world.place(name).kind != "usb"}
+        stop = Stop(
+            world.loop.now,
+            forms,
+            who,
+            len(world.history.written),
+            lost=lost,
+            pieces=pieces,
+            parts=parts,
+            reaches=reaches,
+        )
         world.history.stops.append(stop)
+
+
+def _reaches(bus: Bus) -> dict[str, Callable[[bytes], bool]]:
+    """By drive, whether bytes hold its stop."""
+    found: dict[str, Callable[[bytes], bool]] = {}
+    for drive in bus.roster.all_drives:
+        codec, name, sure = drive.state.codec, drive.state.address or drive.state.name, not drive.state.settings_unknown
+        own = codec.stop([name], sure)
+        if codec.stop_replies:
+            found[drive.shown] = partial(_in, own)
+        else:
+            found[drive.shown] = partial(codec.hears_stop, address=name, sure=sure)
+    return found
+
+
+def _parts(bus: Bus) -> tuple[bytes, ...]:
+    """The bytes that a stop of a line is made of."""
+    forms = stop_forms(bus.roster)
+    found = (forms.immediate, forms.unterminated, forms.invalidate, *(each.data for each in forms.repeats))
+    return tuple(filter(None, (*found, *_unsure(bus))))
+
+
+def _in(own: bytes, left: bytes) -> bool:
+    return own in left
 
 
 def _unsure(bus: Bus) -> Iterator[bytes]:

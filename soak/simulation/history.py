@@ -7,6 +7,7 @@ they executed; the host's word is what the line's caller got, or the notice that
 from __future__ import annotations
 
 import re
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from enum import Enum
 from hashlib import sha256
@@ -37,6 +38,10 @@ class Stop:
     """The lines that were lost, and being tried again."""
     pieces: dict[str, tuple[bytes, ...]] = field(default_factory=dict)
     """By line that could be written, what has to leave again once it is quiet."""
+    parts: dict[str, tuple[bytes, ...]] = field(default_factory=dict)
+    """By line that could be written, the bytes that a stop is made of."""
+    reaches: dict[str, dict[str, Callable[[bytes], bool]]] = field(default_factory=dict)
+    """By line that could be written, and by drive: whether bytes hold the stop of that drive."""
 
 
 class Outcome(Enum):

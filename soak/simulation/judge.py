@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from multidrop.transports.relay import Garbled, Kind, frame
 from soak.languages import LANGUAGES
 from soak.simulation.bounds import beyond
-from soak.simulation.departures import DEPARTURES, for_drives
+from soak.simulation.departures import DEPARTURES, for_drives, stop_bytes, under_way
 from soak.simulation.history import Stop
 from soak.simulation.outcomes import ASTRAY, BARE_COMMAND, OUTCOMES, arrived_late, became
 from soak.simulation.promises import PROMISES
@@ -22,6 +22,7 @@ SOON = 0.05
 """The time, s, in which the kernel takes a stop: a line that takes nothing meanwhile is lost, or flooded."""
 
 
+SECOND = 1.0
 DROP = frame(Kind.DROP)
 CONTROL = re.compile(rb"(?:[PX]\0\0)*(?:[PX]\0?\Z)?")
 """Drops and signs of life of a relay, of which the last may not have left whole."""
@@ -38,6 +39,8 @@ def _first(world: World) -> Iterator[str | Granted]:
         killed = not stop.who and any(stop.at <= at <= stop.at + SOON for at in history.deaths)
         for line, forms in {} if killed else stop.forms.items():
             first, rest = stop.own[line]  # the rest of a message that leaves whole; other rests are dropped
+            if under_way(world, line, stop):
+                continue  # it goes on, as the rule of every drive says
             after = [(at, data) for at, port, data in history.written[first:] if port == line]
             if not after or after[0][0] > stop.at + SOON:
                 again = any(name == line and at >= stop.at for at, name, _ in history.opened)
@@ -62,6 +65,25 @@ def _first(world: World) -> Iterator[str | Granted]:
                         continue  # one of a stop before it that the far end had not taken: the next follows it
                 if not any(_begins(each, form, forms) for form in forms for each in begins):
                     yield f"{line}: stop at {stop.at:.6f}, {begun!r} left at {after[0][0]:.6f}"
+
+
+def _every_drive(world: World) -> Iterator[str | Granted]:
+    """Whatever the loop does. What has left of a stop that was under way counts, too."""
+    history = world.history
+    for stop in history.stops:
+        until = stop.at + SECOND
+        ends = (*history.deaths, *history.began)
+        if not stop.who and any(stop.at <= at <= until for at in ends):
+            continue
+        for line, drives in stop.reaches.items():
+            again = any(name == line and stop.at <= at <= until for at, name, _ in history.opened)
+            if again or _lost(world, line, stop):
+                continue
+            left = stop_bytes(world, line, stop, until)
+            for drive in (drive for drive, reached in drives.items() if not reached(left)):
+                words = f"{line}: stop at {stop.at:.6f}, nothing of it for {drive}, {left!r} left"
+                full = any(name == line and stop.at <= at <= until for at, name in history.full)
+                yield Granted(FULL, words) if full else words
 
 
 def _begins(left: bytes, form: bytes, forms: Collection[bytes]) -> bool:
@@ -145,6 +167,13 @@ RULES = (
         "What leaves next on a line that can be written is its stop, at once.",
         "What a stop promises",
         _first,
+        (FULL,),
+    ),
+    Rule(
+        "every drive",
+        "Within a second of the key every drive of every open line has been sent its stop.",
+        "What a stop promises",
+        _every_drive,
         (FULL,),
     ),
     Rule("stopped", "A drive that is said to be stopped does not move.", "What a stop promises", _true),

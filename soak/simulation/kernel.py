@@ -18,12 +18,14 @@ from random import Random
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any
 
+from multidrop.drives import pacing
 from multidrop.shell.connect import reconnect
 from multidrop.simulator.lexium import power
 from multidrop.simulator.serving.running import Listener, RunningFloor
 from multidrop.transports import libusb, relay, serial_port, serial_ports, sockets, ssh_session
 from soak.simulation.far import SshProgram
 from soak.simulation.network import Network, Socket
+from soak.simulation.pacer import Pacer
 from soak.simulation.ports import Descriptor, Port, Trace
 from soak.simulation.process import PROCESS, Process, operate, outside
 from soak.simulation.usb import OTHER, Carrier, UsbSockets
@@ -248,6 +250,7 @@ class Kernel:
             (ssh_session, "SshSession", self.ssh),
             (relay, "os", system),
             (relay, "_now", self.loop.time),
+            (pacing, "PACER", Pacer(self.loop, Random(f"{self.seed} pacer"))),
             (power, "ETHERNET_BOOT", BOOT),
         )
         before = [(module, name, getattr(module, name)) for module, name, _ in seams]

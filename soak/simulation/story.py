@@ -20,7 +20,7 @@ from soak.simulation.acts.crews import CREWS
 from soak.simulation.acts.failing import FAILING
 from soak.simulation.acts.files import FILES
 from soak.simulation.acts.hand import HAND
-from soak.simulation.acts.meetings import MEETINGS
+from soak.simulation.acts.meetings import HELD_UP, MEETINGS
 from soak.simulation.acts.operators import OPERATORS
 from soak.simulation.acts_kill import files, kill, power_cut
 from soak.simulation.bounds import sample
@@ -154,6 +154,8 @@ MEETING = 0.3
 """How many seeds have the acts of `MEETINGS`, and how many of their steps: the other stories are without them."""
 AT_WORK = 0.2, 0.1
 """How many seeds have the acts of `OPERATORS`, and how many of their steps."""
+STARVED = 0.2, 0.1
+"""How many seeds have the acts of `HELD_UP`, and how many of their steps."""
 AT_ONCE = 0.25
 """How many seeds end with the acts of `CREWS`."""
 CREW, LAST = 200, 5
@@ -179,6 +181,10 @@ def _drawn(world: World, step: int, rng: Random) -> Act:
     apart = Random(f"{world.seed} work {step}")
     if Random(f"{world.seed} work").random() < seeds and apart.random() < steps:
         return apart.choices(OPERATORS, [each.weight for each in OPERATORS])[0]
+    seeds, steps = STARVED
+    apart = Random(f"{world.seed} held up {step}")
+    if Random(f"{world.seed} held up").random() < seeds and apart.random() < steps:
+        return apart.choices(HELD_UP, [each.weight for each in HELD_UP])[0]
     apart = Random(f"{world.seed} meeting {step}")
     if Random(f"{world.seed} meetings").random() < MEETING and apart.random() < MEETING:
         return apart.choices(MEETINGS, [each.weight for each in MEETINGS])[0]

@@ -10,7 +10,8 @@ from multidrop.dialects.pmx.host.codec import GAP, Pmx
 from multidrop.drives.bus import Bus
 from multidrop.drives.events import Unsolicited
 from multidrop.drives.line import QUIET, Finished, Line, Write
-from multidrop.drives.stopping import Fate, stop_forms
+from multidrop.drives.stop_forms import stop_forms
+from multidrop.drives.stopping import Fate
 from multidrop.transports import Transport
 from tests.support.virtual import in_virtual_time
 
@@ -70,8 +71,9 @@ class Overtaken(Wire):
         self.held = super().write(make(self.discard(whole)))
         return True
 
-    def yielded(self):
+    def yielded(self, note=lambda last: None):
         self.held = False
+        note(True)
         return True
 
     def write(self, data):

@@ -50,8 +50,16 @@ class Preempted(SimPipe):
         self.held += 1
         return True
 
-    def yielded(self):
-        self.held -= 1
+    def follow(self, make, key=False):
+        data = make(0) if key or self.held else None
+        self.held += key and data is not None
+        if data:
+            super().write(data)
+        return data is not None
+
+    def yielded(self, note=lambda last: None):
+        self.held = max(0, self.held - 1)
+        note(not self.held)
         return not self.held
 
     def write(self, data):

@@ -10,7 +10,7 @@ import pytest
 from multidrop.dialects import DriveError, Inexpressible, NoAnswer, Refused, Stopped
 from multidrop.dialects.families import TABLE
 from multidrop.drives.events import Sample, Unsolicited
-from multidrop.drives.stopping import stop_forms
+from multidrop.drives.stop_forms import stop_forms
 from multidrop.shell.connect.urls import parse as parse_url
 from multidrop.shell.events import By, Notified, OnBus, Output, Printed
 from multidrop.shell.prompt.complete import complete, hint

@@ -203,12 +203,54 @@ async def test_what_preempts_the_loop_drops_what_is_unsent_and_follows_what_has_
         assert not whole or len(arrived) == large + 1
 
 
+@pytest.mark.parametrize("kind", KINDS)
+async def test_what_follows_a_stop_leaves_behind_it_until_the_loop_has_followed_the_key(kind: str):
+    async with rig(kind) as each:
+        each.start()
+        pipe, noted = each.transport, list[bool]()
+        assert pipe.preemptible
+        assert not pipe.follow(lambda waiting: b"piece"), "no key came"
+        assert pipe.preempt(False, lambda dropped: b"stop")
+        assert await each.far.receive(4) == b"stop"
+        assert pipe.follow(lambda waiting: b"piece")
+        assert await each.far.receive(5) == b"piece"
+        assert pipe.follow(lambda waiting: b""), "nothing is due"
+        assert not pipe.follow(lambda waiting: None), "nothing is left"
+        assert pipe.follow(lambda waiting: b"key", key=True)
+        assert await each.far.receive(3) == b"key"
+        assert not pipe.yielded(noted.append)
+        assert not pipe.write(b"MR 5\r")
+        assert pipe.yielded(noted.append)
+        assert noted == [False, True]
+        assert not pipe.follow(lambda waiting: b"piece"), "the loop writes again"
+        assert pipe.write(b"after")
+        assert await each.far.receive(5) == b"after"
+
+
+@pytest.mark.parametrize("kind", ["serial", "tcp", "relay"])
+async def test_a_line_that_waits_is_not_pushed_by_a_stop_that_asks_whether_another_is_on_its_way(kind: str):
+    large = 1_000_000
+    async with rig(kind) as each:
+        each.start()
+        each.transport.write(b"x" * large)
+        arrived = await each.far.receive_some()  # there is room again
+        waits = each.transport.pending
+        asked: list[int] = []
+        assert not each.transport.follow(lambda waiting: asked.append(waiting), key=True)
+        assert asked == [waits] and each.transport.pending == waits
+        assert each.transport.preempt(False, lambda dropped: b"!")
+        while b"!" not in arrived:
+            arrived += await each.far.receive_some()
+        assert len(arrived) < large
+
+
 async def test_a_broken_pipe_is_not_preempted():
     async with rig("tcp") as each:
         each.start()
         each.far.hang_up()
         await each.until(lambda: each.losses)
         assert not each.transport.preempt(False, lambda dropped: b"stop")
+        assert not each.transport.follow(lambda waiting: b"stop", key=True)
         assert not each.transport.write(b"MR 5\r")
 
 

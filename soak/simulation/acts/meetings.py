@@ -1,7 +1,7 @@
 """Acts in which meets what seldom does: a stop key that is held down, a drive that babbles or replies late, a burst of
 noise, prints of a program between replies, a macro that is played before `/resume`.
 
-One seed in three has them beside the others: see `story.tell`.
+One seed in three has them beside the others: see `story.tell`. One in five has a stop in a loop that is held up.
 """
 
 from __future__ import annotations
@@ -115,6 +115,19 @@ def stopped_download(world: World, rng: Random) -> None:
     later(world, rng.random() * 5, rng.choice((STOP, b"\x03")) + b"/resume\r")
 
 
+def in_a_held_up_loop(world: World, rng: Random) -> None:
+    """Press the stop key, once or held down, while the loop is held up, or has just taken over the first of them."""
+    place = rng.choice([each for each in world.places if len(each.drives) > 1] or world.places)
+    _several(world, rng, place)
+    at, keys = 0.2 + rng.random(), rng.choice((1, 1, 2, rng.randrange(5, 40)))
+    for number in range(keys):
+        later(world, at + number * REPEAT, STOP)
+    later(world, at + keys * REPEAT, b"/resume\r")
+    begins = at + rng.choice((-0.01, rng.random() * 0.15, rng.random() * 0.6))
+    world.loop.call_later(begins, world.loop.starve, 1.0 + rng.random() ** 2 * 4)
+
+
+HELD_UP = (Act("stop in a held-up loop", 1, in_a_held_up_loop, fault=True),)
 MEETINGS = (
     Act("stop held down", 1, held_down),
     Act("stop within a line", 3, within_a_line),

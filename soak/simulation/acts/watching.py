@@ -13,7 +13,7 @@ from collections.abc import Awaitable
 from typing import TYPE_CHECKING, Any
 
 from multidrop.dialects import Diagnostic, DriveError
-from multidrop.drives.stopping import stop_forms
+from multidrop.drives.stop_forms import stop_forms
 from multidrop.shell.events import By
 from multidrop.shell.line_syntax import DriveLine, VerbLine
 from multidrop.shell.session import LinePath

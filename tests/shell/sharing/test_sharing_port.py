@@ -237,6 +237,33 @@ async def test_our_stop_from_another_thread_passes_while_the_loop_is_held_up(sha
     await client.close()
 
 
+async def test_a_stop_takes_back_what_is_unsent_but_no_stop_that_is_still_leaving(
+    shared: Shared, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    taken_back = list[bool]()
+
+    def discard(whole: bool = False) -> int:
+        taken_back.append(whole)
+        return 0
+
+    monkeypatch.setattr(shared.port._transport, "discard", discard)
+    _, ada = await shared.client()
+    _, bob = await shared.client()
+    ada.write(b"PR P\r")
+    await shared.line.got(b"PR P\r")
+    ada.write(b"\x1b")
+    await shared.line.got(b"\x1b")
+    assert len(taken_back) == 1
+    bob.write(b"\x1b")
+    await shared.line.got(b"\x1b")
+    assert len(taken_back) == 1, "the next one follows it"
+    ada.write(b"PR V\r")
+    await shared.line.got(b"PR V\r")
+    bob.write(b"\x1b")
+    await shared.line.got(b"\x1b")
+    assert len(taken_back) == 2
+
+
 async def test_ctrl_x_at_the_shared_port_stops_the_drives_and_sharing_goes_on(shared: Shared) -> None:
     _, ada = await shared.client()
     ada.write(b"PR P\r")
