@@ -155,4 +155,4 @@ async def test_prints_with_a_name_which_replies_to_polls_have_too_are_shown(em, 
         for each in polls:
             each.close()
         missing = [n for n in range(1, LINES + 1) if f'{n}"c"' not in cell.shown]
-        assert len(missing) <= 3 * len(cell.warned()), cell.warned()
+        assert len(missing) <= 4 * len(cell.warned()), cell.warned()  # one warning may be of several prints

@@ -132,9 +132,12 @@ def carried_out(state: ModbusState, text: str, pdu: bytes) -> Procedure[bytes]:
         if not clear:
             old = f"{described(code, state)}; it may be older than '{text}', as the flag could not be read before"
             raise NoAnswer(f"{who(state)}: {old}: it is not known whether '{text}' was executed; it was sent once")
-        if code in BY_ITSELF:  # the reply confirms the write, and no line is refused by these
+        if code in BY_ITSELF and not state.codec.starts_motion(text):  # the reply confirms the write
             state.note(f"{who(state)}: '{text}' was executed, and meanwhile: {described(code, state)}, now cleared")
             return answer
+        if code in BY_ITSELF:
+            either = f"it refused '{text}', or that came by itself and it was executed"
+            raise Refused(f"{who(state)}: {described(code, state)}; {either}", code)
         raise Refused(f"{who(state)} refused '{text}': {described(code, state)}", code)
     return answer
 

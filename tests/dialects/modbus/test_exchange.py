@@ -238,9 +238,22 @@ def test_a_failure_is_told_with_the_drives_own_error_which_is_cleared(far):
 
 
 def test_an_error_behind_a_write_that_was_accepted_is_a_refusal():
-    far = Far(EF=1, ER=83)
-    with pytest.raises(Refused, match="refused 'MR 5': error 83: plus limit reached"):
+    far = Far(EF=1, ER=85)
+    with pytest.raises(Refused, match="refused 'MR 5': error 85: no move while homing"):
         type_("MR 5", far)
+
+
+def test_an_error_of_the_machine_behind_a_move_may_be_its_refusal():
+    far = Far(EF=1, ER=83)
+    with pytest.raises(Refused, match="error 83: plus limit reached .*; it refused 'MR 5', or that came by itself"):
+        type_("MR 5", far)
+
+
+def test_an_error_of_the_machine_behind_a_setting_is_no_refusal_of_it():
+    far, drive = Far(EF=1, ER=86), state()
+    assert type_("R1=777", far, drive) == ()
+    [note] = drive.notes
+    assert note.startswith("the drive: 'R1=777' was executed, and meanwhile: error 86: stall")
 
 
 def test_an_error_from_before_is_read_and_told_first():
