@@ -134,12 +134,9 @@ class DriveState:
 
     # Identity
 
-    def identified(self, product: str, version: str, part: str = "") -> None:
-        self.product, self.version, self.part = product, version, part or self.part
-
-    def recognised(self, stranger: str = "") -> None:
-        """Record that the device said what it is. `stranger`: why it may be no drive of the family."""
-        self.stranger = stranger
+    def identified(self, product: str, version: str, part: str = "", stranger: str = "") -> None:
+        """Record what the device says of itself. `stranger`: why it may be no drive of the family."""
+        self.product, self.version, self.part, self.stranger = product, version, part or self.part, stranger
 
     def named(self, name: str) -> None:
         self.name = name

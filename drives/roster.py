@@ -214,7 +214,7 @@ class Roster:
         like = next((drive.codec for drive in self.drives.values()), self.family.codec)
         state = family_of(like).new_state(like, address)
         if not self.strange:
-            state.recognised()
+            state.identified("", "")  # another name of what is known here
         if address not in GLOBAL:
             state.settings_may_have_changed()
         return Drive(self.conversations, self, state)

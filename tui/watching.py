@@ -382,9 +382,8 @@ def _family(bus: SharedBus) -> str:
 def _add(bus: Bus, drive: SharedDrive) -> None:
     family = FAMILIES.get(drive.family) or bus.roster.family
     state = family.new_state(family.codec, drive.address)
-    state.identified(drive.product, drive.version)
+    state.identified(drive.product, drive.version, stranger=drive.stranger)
     state.reference_lost(drive.unreferenced)
-    state.recognised(drive.stranger)
     if drive.programming:
         state.found_storing()
     bus.roster.found(state)

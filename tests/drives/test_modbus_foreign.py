@@ -161,7 +161,7 @@ async def test_a_write_is_in_doubt_until_the_error_is_read_although_the_server_h
     bus.start()
     try:
         drive = bus.at("")
-        drive.state.recognised()
+        drive.state.identified("LMDCE", "")
         with pytest.raises(TransportLost, match="; it is not known whether 'MA 700' was executed") as lost:
             await drive.send("MA 700")
         assert (lost.value.unproven, lost.value.executed) == ("MA 700", "")
@@ -185,7 +185,7 @@ async def test_answers_that_come_byte_by_byte():
     bus.start()
     try:
         drive = bus.at("")
-        drive.state.recognised()
+        drive.state.identified("LMDCE", "")
         (motion,) = await drive.motion(Priority.POLL)
         assert (motion.position, motion.velocity) == (0x1234, 0x1234)
     finally:

@@ -373,8 +373,8 @@ def recognise(state: ModbusState, found: Mapping[int, str]) -> None:
     """Record what a device says of itself; without the name of a Lexium drive it is a stranger."""
     text = " ".join(found.get(number, "") for number in (VERSION, PART))
     product, part = PRODUCT.search(text), found.get(PART, "")
-    state.identified(product.group() if product else part, found.get(VERSION, ""), part)
-    state.recognised("" if product else UNKNOWN)
+    name, stranger = (product.group(), "") if product else (part, UNKNOWN)
+    state.identified(name, found.get(VERSION, ""), part, stranger)
 
 
 def _announced(state: ModbusState) -> Procedure[dict[int, str]]:
