@@ -114,12 +114,20 @@ class Parameter:
         """Read a value. Raises Diagnostic with the valid ones."""
         if self.kind in _FORMS and _FORMS[self.kind].fullmatch(text):
             number = int(text) if self.kind == "int" else float(text)
+            if _digits(written(number)) != _digits(text):
+                raise Diagnostic(f"{self.name} = {text} has more digits than are kept", where, f"as {written(number)}")
             low = -LARGEST if self.low is None else self.low
             if low <= number <= (LARGEST if self.high is None else self.high):
                 return number
         elif (self.kind == "text" and visible(text) == text) or (self.kind == "choice" and text in self.choices):
             return text
         raise Diagnostic(f"invalid {self.name} = {visible(text)!r}", where, f"valid: {self.valid}")
+
+
+def _digits(text: str) -> str:
+    """The digits of a number, without a sign and without zeros that change nothing."""
+    whole, _, fraction = text.lstrip("+-").partition(".")
+    return f"{whole.lstrip('0')}.{fraction.rstrip('0')}"
 
 
 def written(value: Value) -> str:

@@ -25,6 +25,26 @@ class Several(argparse.Action):
         setattr(chosen, self.dest, f"{before},{values}" if before else values)
 
 
+class Once(argparse.Action):
+    """Keeps the value of an option that a line may have once: the first of two would be dropped without a word."""
+
+    def __call__(self, parser: object, chosen: argparse.Namespace, values: object, option: object = None) -> None:
+        if self in (given := chosen.__dict__.setdefault("_given", [])):
+            raise argparse.ArgumentError(self, "given twice")
+        given.append(self)
+        setattr(chosen, self.dest, values)
+
+
+class Each(argparse.Action):
+    """Gathers the values of an option that is repeated; of `NAME=VALUE` each name is given once."""
+
+    def __call__(self, parser: object, chosen: argparse.Namespace, values: object, option: object = None) -> None:
+        before: list[Any] = getattr(chosen, self.dest) or []
+        if isinstance(values, tuple) and any(values[0] == name for name, *_ in before):
+            raise argparse.ArgumentError(self, f"{values[0]} is given twice")
+        setattr(chosen, self.dest, [*before, values])
+
+
 # Values
 
 

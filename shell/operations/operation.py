@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from multidrop.dialects import Diagnostic
     from multidrop.shell.workspace import Workspace
 
+ACTIONS = "multidrop.shell.operations.arguments"
 NOTHING: Mapping[str, Any] = MappingProxyType({})
 Arguments = Mapping[str, Any]
 """The arguments of a command by their notation; each has its help, a mapping with `help` and what else
@@ -109,11 +110,13 @@ def add_arguments(parser: argparse._ActionsContainer, arguments: Arguments) -> N
         name, _, metavar = notation.partition(" ")
         if notation.startswith("-"):
             if metavar.endswith(" ..."):
-                options = {"action": "append", "default": []} | options
+                options = {"action": imported(f"{ACTIONS}:Each"), "default": []} | options
             elif not metavar and "choices" not in options:
                 options["action"] = "store_true"
             elif not {"type", "choices", "required"} & options.keys():
                 options.setdefault("default", "")
+            if metavar and "action" not in options:
+                options["action"] = imported(f"{ACTIONS}:Once")
             names = name.split("|")
         else:
             given, _, metavar = notation.rpartition("=")

@@ -78,6 +78,8 @@ def call(text: str) -> tuple[str, dict[str, str]]:
         name, sign, value = pair.partition("=")
         if not (name and sign):
             raise wrong("/call", f"no value {pair}; valid: NAME=VALUE")
+        if name in values:
+            raise wrong("/call", f"{name} is given twice")
         values[name] = value
     return target, values
 
@@ -118,6 +120,9 @@ def play_call(words: Sequence[str], wrong: Callable[[str], Diagnostic]) -> PlayC
     given: dict[str, str] = {}
     times: int | None = 1
     fast = False
+    for option in ("--times", "--fast"):
+        if rest.count(option) > 1:
+            raise wrong(f"{option} is given twice")
     while rest:
         word = rest.pop(0)
         if word == "--fast":
@@ -128,6 +133,8 @@ def play_call(words: Sequence[str], wrong: Callable[[str], Diagnostic]) -> PlayC
             name_of, sign, value = word.partition("=")
             if not (name_of and sign):
                 raise wrong(f"no value {word}; valid: NAME=VALUE")
+            if name_of in given:
+                raise wrong(f"{name_of} is given twice")
             given[name_of] = value
     return PlayCall(name, given, times, fast)
 

@@ -57,17 +57,17 @@ class Call:
         return split(self.rest, self.verb.name)
 
     def sort(
-        self, flags: Sequence[str], values: Mapping[str, str], *, once: bool = False, listed: bool = False
+        self, flags: Sequence[str], values: Mapping[str, str], *, listed: bool = False
     ) -> tuple[list[str], list[tuple[str, str]]]:
         """Sort the words into places and options, which are in any order. Raises Diagnostic.
 
-        `values` names the value that an option needs. `once`: no option twice; `listed`: an error names the valid ones.
+        `values` names the value that an option needs. `listed`: an error names the valid ones.
         """
         places: list[str] = []
         options: list[tuple[str, str]] = []
         left = iter(self.split())
         for word in left:
-            if once and any(word == name for name, _ in options):
+            if any(word == name for name, _ in options):
                 raise self.wrong(f"{word} is given twice")
             value = next(left, "") if word in values else ""
             if word in values and not value:

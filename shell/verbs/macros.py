@@ -12,6 +12,7 @@ from multidrop.macros.recorder import Offer, with_waits
 from multidrop.macros.store import listed
 from multidrop.shell import macro_changes
 from multidrop.shell.events import By
+from multidrop.shell.line_syntax import divided
 from multidrop.shell.macro_arguments import roles_in, settled
 from multidrop.shell.scripts import executor
 from multidrop.shell.scripts.words import play_call
@@ -64,7 +65,8 @@ async def macro(call: Call) -> None:
         case ["edit", name]:
             await _edit(workspace, name)
         case ["describe", name, *text]:
-            done = macro_changes.describe(store, name, " ".join(text))
+            typed = divided(divided(call.rest)[1])[1]
+            done = macro_changes.describe(store, name, text[0] if len(text) == 1 else typed)
         case ["copy", name, new, "--project"] if plain:
             done = macro_changes.copy(store, name, new, True)
         case ["import", file, "--force"] if plain:

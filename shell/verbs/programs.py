@@ -63,7 +63,7 @@ async def upload(call: Call) -> None:
 
 def _downloaded(call: Call) -> tuple[str, str, dict[str, str]]:
     """The file, the address, and the options."""
-    places, options = call.sort(FLAGS, {"--run": "a label"}, once=True)
+    places, options = call.sort(FLAGS, {"--run": "a label"})
     if not 1 <= len(places) <= 2:
         raise call.wrong()
     return places[0], "".join(places[1:]), dict(options)

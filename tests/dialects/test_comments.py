@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import re
+
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from multidrop.dialects import Diagnostic
@@ -99,6 +101,49 @@ def test_what_a_file_sends_of_a_line_is_all_before_a_comment_that_shows(line: st
     if rest and line[line.index(kept) + len(kept) - 1 : line.index(kept) + len(kept)].isdigit() and kept:
         at = line.index(kept) + len(kept)
         assert line[at : at + 1] == " " or grouped_at(line, at) is None
+
+
+SPELLED = st.text(st.sampled_from("XYV015;=+ -'\t"), max_size=9).map(str)
+
+
+@given(SPELLED)
+@example("X51;20")
+@example("V1=5+3")
+@example("X5\u00a0")
+def test_a_compiled_line_has_every_number_of_its_line(line: str) -> None:
+    text = f"PRG 0\n{line}\nEND\n"
+    if any(not each.warning for each in pmx_file.check(text)):
+        return
+    stored = [token for at, _, token in pmx_file.compiled(pmx_file.read(text, "x")) if at == 2]
+    kept = line.partition(";")[0]
+    assert bool(stored) == bool(kept.strip(" \t"))
+    shown = [each for each in pmx_file.readable(f"SA{n}={token}" for n, token in enumerate(pmx_file.memory(text, "x")))]
+    body = "".join(each.strip() for each in shown if each.strip() not in ("PRG 0", "END"))
+    assert _numbers(body) == _numbers(kept), (shown, kept)
+
+
+TMCL_LINE = st.tuples(
+    st.sampled_from(["MVP ABS,", "ROR ", "SAP 4, ", "STOP", "WAIT TICKS, 0,", "A = "]),
+    st.text(st.sampled_from("051,;/ -x_.'\t\u00a0"), max_size=8),
+).map("".join)
+
+
+@given(TMCL_LINE)
+@example("ROR 0, 51;20")
+@example("ROR 0,\u00a051")
+def test_an_assembled_line_has_every_number_of_its_line(line: str) -> None:
+    text = f"{line}\nSTOP\n"
+    if any(not each.warning for each in tmcl_file.check(text)):
+        return
+    kept = line[: tmcl_file.remark_at(line)]
+    first = tmcl_file.compiled(tmcl_file.read(text, "x"))[0].call
+    if "=" not in kept and kept.strip():
+        numbers = _numbers(str(first) if first.row else "") or [first.value]
+        assert all(each in (first.type, first.motor, first.value) for each in _numbers(kept)), (line, numbers)
+
+
+def _numbers(text: str) -> list[int]:
+    return [int(each) for each in re.findall(r"0x[0-9a-fA-F]+|[0-9]+", text) if not each.startswith("0x")]
 
 
 @for_each(

@@ -112,8 +112,10 @@ def _specific(word: str, arguments: Sequence[Argument | None]) -> bytes:
 def _parameter(argument: Argument | None) -> str:
     if argument is None:
         return ""
-    if isinstance(argument, Number):
+    if isinstance(argument, Number) and isinstance(argument.value, int):
         return str(argument.value)
+    if isinstance(argument, Number):
+        raise Inexpressible(f"{argument.value} is not a whole number; {ALTERNATIVE} may take it")
     if isinstance(argument, Name):
         return argument.word
     raise Inexpressible(f"expressions are not evaluated over Modbus: give numbers, or use {ALTERNATIVE}")

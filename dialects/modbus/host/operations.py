@@ -199,7 +199,8 @@ def _items(statement: grammar.Statement) -> Iterator[str | tuple[str, Reading]]:
         elif isinstance(item, grammar.Name):
             yield item.word, mapping.reading(item.word)
             if item.word == "IT" and rest and isinstance(rest[0], grammar.Number):
-                rest.pop(0)  # a sensor's number; the register has one sensor
+                if rest.pop(0) != grammar.Number(1):
+                    raise Inexpressible(f"a register has one sensor of IT, the first; {mapping.ALTERNATIVE} has others")
         else:
             raise Inexpressible(f"expressions are not evaluated over Modbus; {mapping.ALTERNATIVE} prints them")
 
