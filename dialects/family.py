@@ -299,7 +299,7 @@ class Family(Generic[S]):
     """Slow work before the first message, safe in any thread; None: there is none."""
 
     def check_line(self, state: S, text: str) -> None:
-        """Raise Inexpressible for a typed line that no drive gets: it would not be sent whole, or the language lacks it."""
+        """Raise Inexpressible for a typed line that would not be sent whole, or is wrong in the language."""
         if why := unsent(text):
             raise Inexpressible(f"'{text}': {why}; nothing was sent")
         self.check(state, text)

@@ -38,7 +38,9 @@ def steps_of(macro: Macro, macros: MacroStore | None) -> tuple[list[ScriptLine],
         ScriptLine(*at("line", number), plain(step.line).strip(ENDS), macro.name, number, step.after)
         for number, step in enumerate(macro.steps, 1)
     ]
-    on_early_end = [ScriptLine(*at("on_early_end", 0), plain(line).strip(ENDS), macro.name) for line in macro.on_early_end]
+    on_early_end = [
+        ScriptLine(*at("on_early_end", 0), plain(line).strip(ENDS), macro.name) for line in macro.on_early_end
+    ]
     return steps, on_early_end
 
 

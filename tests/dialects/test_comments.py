@@ -47,7 +47,8 @@ def test_a_number_in_groups_of_digits_is_an_error_with_the_number_to_write(langu
 
 
 BEHIND = (
-    ("mcode", "MR 51' far"), ("mcode", "MR 51'20"), ("mcode", "MR 51'2000"), ("mcode", "MR 51`"), ("mcode", "BR G1'back"),
+    ("mcode", "MR 51' far"), ("mcode", "MR 51'20"), ("mcode", "MR 51'2000"), ("mcode", "MR 51`"),
+    ("mcode", "BR G1'back"),
     ("pmx", "X51;far"), ("pmx", "X51;20"), ("tmcl", "ROR 0, 51//200"), ("tmcl", "ROR 0, 51;x"),
 )  # fmt: skip
 
@@ -79,7 +80,9 @@ def test_a_backslash_in_a_word_begins_no_comment() -> None:
 
 @for_each(("language", "line"), [("mcode", "MR 5^M"), ("mcode", "MR 5^M^J"), ("pmx", "X51^M"), ("tmcl", "ROR 0, 5^J")])
 def test_enter_in_two_characters_is_named(language: str, line: str) -> None:
-    assert [each.what for each in LANGUAGES[language](line)] == [f"{line[line.index('^') :][:2]} stands for Enter; leave it out"]
+    assert [each.what for each in LANGUAGES[language](line)] == [
+        f"{line[line.index('^') :][:2]} stands for Enter; leave it out"
+    ]
 
 
 def test_a_variable_may_be_called_m() -> None:

@@ -40,9 +40,12 @@ CUT = {
     "@press:b": ("MA 51\\200", "RC=2\\5", "MR 5'far", "MR 5^M", "MR 5 # far"),
     "@press:*": ("SL 51\\200", "MA 5 'far", "MR 5^M", "MR 5 # far"),
     "@alone:": ("MA 51\\200", "RC=2\\5", "MR 5`far", "MR 5^J", "MR 5 # far"),
-    "@stages:00": ("X51;200", "X1000 ;far", "ABS;", "SA0=X51;200", "X51`200", "X51\\200", "X5^M", "X5 # far", "X5\u00a0"),
-    "@lab:1": ("MVP ABS, 0, 51;200", "MVP ABS, 0, 51//200", "MST 0 ;far", "MST 0 // far", "MST 0^M", "MST 0 # far",
-               "MVP ABS, 0, 51\u00a0", "MVP ABS, 0, \uff15\uff11", "MVP ABS, 0, \u221251", "MVP ABS, 0, 5_1", "MST 0.5"),
+    "@stages:00": ("X51;200", "X1000 ;far", "ABS;", "SA0=X51;200", "X51`200", "X51\\200",
+                   "X5^M", "X5 # far", "X5\u00a0"),
+    "@lab:1": ("MVP ABS, 0, 51;200", "MVP ABS, 0, 51//200", "MST 0 ;far", "MST 0 // far", "MST 0^M",
+               "MST 0 # far",
+               "MVP ABS, 0, 51\u00a0", "MVP ABS, 0, \uff15\uff11", "MVP ABS, 0, \u221251", "MVP ABS, 0, 5_1",
+               "MST 0.5"),
 }  # fmt: skip
 
 
@@ -113,7 +116,9 @@ def test_the_commands_refuse_it(multidrop, line: str) -> None:
     assert piped.stdout == "0\n"
 
 
-TYPED = st.text(st.sampled_from("MRXSP =5120,'`\\;#/^MJ\"~-+.&_\t\u00a0\uff15\u2212é\x1f") | st.characters(), max_size=16)
+TYPED = st.text(
+    st.sampled_from("MRXSP =5120,'`\\;#/^MJ\"~-+.&_\t\u00a0\uff15\u2212é\x1f") | st.characters(), max_size=16
+)
 
 
 def _first(procedure: Procedure[tuple[str, ...]]) -> Request | None:
@@ -139,7 +144,9 @@ def _spaced(text: str) -> str:
 @example(text="MR 5\u00a0")
 def test_any_typed_text_is_sent_whole_or_refused(name: str, text: str) -> None:
     family = FAMILIES[name]
-    state = ModbusState(Modbus()) if name == "modbus" else family.new_state(family.codec, "00" if name == "pmx" else "1")
+    state = (
+        ModbusState(Modbus()) if name == "modbus" else family.new_state(family.codec, "00" if name == "pmx" else "1")
+    )
     try:
         line = parse(text)
         if not isinstance(line, DriveLine) or line.address is not None:
@@ -170,8 +177,8 @@ def test_any_typed_text_is_sent_whole_or_refused(name: str, text: str) -> None:
 def test_many_texts_of_words_are_sent_whole_or_refused() -> None:
     """As above, of words that the languages have, so that most lines are sent."""
     rng = Random(4)
-    words = ("MA", "MR", "R1=", "RC=", "PR ", "P", '"a', '"', "X", "HSPDX=", "MVP ABS, 0,", "SAP 4, 0,", " ", "\t", "51",
-             "200", "'", "`", "\\", ";", "#", " #", "^M", "//", ",", ".", "-", "_", "\u00a0", "x")  # fmt: skip
+    words = ("MA", "MR", "R1=", "RC=", "PR ", "P", '"a', '"', "X", "HSPDX=", "MVP ABS, 0,", "SAP 4, 0,", " ", "\t",
+             "51", "200", "'", "`", "\\", ";", "#", " #", "^M", "//", ",", ".", "-", "_", "\u00a0", "x")  # fmt: skip
     sent = 0
     for _ in range(6000):
         text = "".join(rng.choices(words, k=rng.randrange(1, 7)))

@@ -138,7 +138,7 @@ async def test_a_line_that_cannot_be_converted_is_refused_and_nothing_is_sent(tm
 
 
 async def test_everything_else_is_sent_as_it_is(tmp_path):
-    lines = ['@a PR "{1 mm}"', '@a PR "12 mm"', "@a MR 12", "@b MR 12 ' 5 mm", "@a VM=50000", "@a R1=5"]
+    lines = ['@a PR "{1 mm}"', '@a PR "12 mm"', "@a MR 12", "@b MR 12", "@a VM=50000", "@a R1=5"]
     written = []
     for units in ({}, {"a": "5 mm/turn"}):
         async with opened(tmp_path, units=units) as shop:

@@ -30,6 +30,9 @@ class FakeDrive:
     def link(self):
         return self.bus
 
+    def check_line(self, text):
+        pass
+
     def starts(self, text):
         return not text.startswith("PR")
 

@@ -2,10 +2,10 @@
 
 A file holds declarations, which are sent unchanged, a program between `PG <address>` and `PG`, and further lines, often
 `S`. A remark begins with an apostrophe (manual 3.3) or a back-quote, or with the backslash that replaces one in some
-copies, where that begins the line or follows a blank. It runs to the end of its line; quotation marks contain none. Inside them a TAB is an ordinary character (programs for
-units have some); outside it is a blank. This module does not check the language. It reports what cannot be sent, and
-what would be executed or stored unintentionally. So a file without a program may hold only settings: the drive would
-execute a program whose PG was forgotten.
+copies, where that begins the line or follows a blank. It runs to the end of its line; quotation marks contain none.
+Inside them a TAB is an ordinary character (programs for units have some); outside it is a blank. This module does not
+check the language. It reports what cannot be sent, and what would be executed or stored unintentionally. So a file
+without a program may hold only settings: the drive would execute a program whose PG was forgotten.
 """
 
 from __future__ import annotations

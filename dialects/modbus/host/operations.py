@@ -15,8 +15,8 @@ from multidrop.dialects.exchange import unanswered
 from multidrop.dialects.family import Hints, Motion
 from multidrop.dialects.mcode.host.state import described, report_error, who
 from multidrop.dialects.mcode.manual import grammar
-from multidrop.dialects.mcode.manual.program_file import commented, spaced
 from multidrop.dialects.mcode.manual.points import STATUS, in_words
+from multidrop.dialects.mcode.manual.program_file import commented, spaced
 from multidrop.dialects.modbus.host import framing, mapping
 from multidrop.dialects.modbus.host.codec import Modbus, ModbusState, pdu_codec
 from multidrop.dialects.modbus.host.mapping import Reading
@@ -198,9 +198,9 @@ def _items(statement: grammar.Statement) -> Iterator[str | tuple[str, Reading]]:
             yield str(item.value)
         elif isinstance(item, grammar.Name):
             yield item.word, mapping.reading(item.word)
-            if item.word == "IT" and rest and isinstance(rest[0], grammar.Number):
-                if rest.pop(0) != grammar.Number(1):
-                    raise Inexpressible(f"a register has one sensor of IT, the first; {mapping.ALTERNATIVE} has others")
+            sensor = item.word == "IT" and rest and isinstance(rest[0], grammar.Number)
+            if sensor and rest.pop(0) != grammar.Number(1):
+                raise Inexpressible(f"a register has one sensor of IT, the first; {mapping.ALTERNATIVE} has others")
         else:
             raise Inexpressible(f"expressions are not evaluated over Modbus; {mapping.ALTERNATIVE} prints them")
 

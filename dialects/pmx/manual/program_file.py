@@ -13,7 +13,17 @@ from multidrop.dialects.files import SourceLine, split_lines, wrong_characters
 from multidrop.dialects.pmx.manual import script_checker, script_compiler, script_parser
 from multidrop.dialects.pmx.manual.script_compiler import EMPTY, ERASED, LINES
 from multidrop.dialects.pmx.manual.script_parser import AXES, WORDS, parse
-from multidrop.dialects.program_files import BLANKS, Problem, check_comment, check_enter, errors, in_order, numbered, refuse, respelled
+from multidrop.dialects.program_files import (
+    BLANKS,
+    Problem,
+    check_comment,
+    check_enter,
+    errors,
+    in_order,
+    numbered,
+    refuse,
+    respelled,
+)
 
 _OPERATIONS = {code: op for op, code in script_compiler.OPERATION.items()}
 _COMPARISONS = {code: op for op, code in script_compiler.COMPARISON.items()}

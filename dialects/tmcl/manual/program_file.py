@@ -21,7 +21,19 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 from multidrop.dialects.files import SourceLine, split_lines, wrong_characters
-from multidrop.dialects.program_files import Entry, Part, Problem, check_comment, check_enter, errors, in_order, numbered, refuse, respelled, walk
+from multidrop.dialects.program_files import (
+    Entry,
+    Part,
+    Problem,
+    check_comment,
+    check_enter,
+    errors,
+    in_order,
+    numbered,
+    refuse,
+    respelled,
+    walk,
+)
 from multidrop.dialects.text import counted
 from multidrop.dialects.tmcl.manual import instructions
 from multidrop.dialects.tmcl.manual.commands import BLANKS, Call, Command

@@ -342,6 +342,29 @@ def beside_a_mover(world: World, rng: Random) -> float:
     return 9.0
 
 
+MARKS = {
+    "mcode": "\\200 \\far #_far ^M",
+    "modbus": "\\200 \\far #_far",
+    "pmx": ";far ;200 #_far ^M",
+    "tmcl": ";200 //far #_far",
+}
+"""What begins a comment in some language, as it follows a number; `_` is a blank. No drive executes a line with it."""
+
+
+def marks_in_lines(world: World, rng: Random) -> float:
+    """Type lines of which a part would be taken for a comment: none of them is sent, nor a part of one."""
+    for place in world.places:
+        phrases = PHRASES[place.language]
+        for mark in MARKS[place.language].split():
+            form = rng.choice((phrases.value, phrases.motion))
+            first = phrases.first if form == phrases.value else phrases.first_motion
+            tail = f" {mark}".replace("_", " ") if mark.startswith("#") else mark
+            drive, text = rng.choice(place.names), f"{form.format(first + number(world))}{tail}"
+            world.history.told.repeated[(place.name, drive, text)] = 1
+            world.person.type(f"@{target(place, drive)} {text}\r".encode(), rng.choice((0.0, 0.05)))
+    return 4.0
+
+
 CREWS = (
     Act("operators at once", 4, at_each_drive),
     Act("operators at once, late replies", 3, at_each_drive_late, fault=True),
@@ -362,5 +385,6 @@ AFTER_CREWS = (
     Act(
         "same question", 1, same_question, fault=True, where=lambda world: any(each.names[1:] for each in world.places)
     ),
+    Act("marks in lines", 1, marks_in_lines),
 )
 """The last of all, each once."""

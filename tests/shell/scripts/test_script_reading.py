@@ -7,8 +7,8 @@ import select
 import pytest
 
 from multidrop.dialects import Diagnostic
-from multidrop.dialects.files import LARGEST
 from multidrop.dialects.comments import uncommented
+from multidrop.dialects.files import LARGEST
 from multidrop.shell.prompt.terminal_input import stream_lines
 from multidrop.shell.scripts.reading import read_script
 from tests.support.until import PATIENCE
