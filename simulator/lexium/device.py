@@ -15,6 +15,8 @@ from multidrop.dialects.family import Motion
 from multidrop.dialects.files import split_lines
 from multidrop.dialects.mcode.manual.errors import text as error_text
 from multidrop.dialects.mcode.manual.grammar import LineError, parse, strip
+from multidrop.dialects.mcode.manual.program_file import bare, commented, remark_at
+from multidrop.dialects.program_files import check_comment
 from multidrop.simulator.cell.spec import DriveSpec
 from multidrop.simulator.kinematics import Effort
 from multidrop.simulator.lexium.event_loop import EventLoop
@@ -209,7 +211,11 @@ def _set_up(device: MCodeDevice, spec: DriveSpec) -> None:
     for name, value in spec.variables.items():
         _accept(device, f"VA {name}={value}", f"{where}: variables")
     for number, line in enumerate(split_lines(spec.program), 1):
-        _accept(device, line, f"{spec.program_name or 'program'}:{number}")
+        place = f"{spec.program_name or 'program'}:{number}"
+        for problem in check_comment(line, number, remark_at(line)):
+            if not problem.warning:
+                raise Diagnostic(problem.what, place, problem.hint)
+        _accept(device, bare(line), place)
     device.core.mode.address = None
     device.core.thread.finish()
     device.motor.stop(0.0)
@@ -218,6 +224,8 @@ def _set_up(device: MCodeDevice, spec: DriveSpec) -> None:
     last = ("EE", "AS") if spec.set.get("AS") else ("AS",)
     late = [each for name in last for each in lines if each[0] == name]
     early = [each for each in lines if each not in late]
+    for each in lines:
+        _check_whole("=".join(each), f"{where}: set")
     refused = early
     for _ in range(PASSES):
         again = [each for each in early if device.execute("=".join(each), 0.0).refused]
@@ -228,8 +236,15 @@ def _set_up(device: MCodeDevice, spec: DriveSpec) -> None:
     inputs.watched = True
 
 
+def _check_whole(line: str, where: str) -> None:
+    """Raise Diagnostic for a line of which the drive would ignore a part."""
+    if commented(line):
+        raise Diagnostic(f"{line}: a comment would be cut off", where, "delete it")
+
+
 def _accept(device: MCodeDevice, line: str, where: str) -> None:
     """Have a drive carry out a line at the start. Raises Diagnostic with the reason for its refusal."""
+    _check_whole(line, where)
     if device.execute(line, 0.0).refused:
         code, product = device.errors.code, device.spec.personality
         why = f"refused by an {product}: error {code}, {error_text(code, product)}"

@@ -236,8 +236,8 @@ def _read(text: str) -> Call | LineError:
 
 
 def _parsed(text: str) -> Call:
-    word, *given = re.split(r"[ \t]+", text.strip(BLANKS), maxsplit=1)
-    fields = [field.strip(BLANKS) for field in "".join(given).split(",")] if given else []
+    word, *rest = re.split(r"[ \t]+", text.strip(BLANKS), maxsplit=1)
+    fields = [field.strip(BLANKS) for field in "".join(rest).split(",")] if rest else []
     if word.isascii() and word.isdigit():
         if int(word) not in BYTE:
             raise LineError(f"no command {word}; valid: 0 to 255")
