@@ -123,33 +123,36 @@ def _repeated(world: World) -> Iterator[str]:
             )
 
 
-def _last_before(world: World, line: str, index: int) -> tuple[float, bytes] | None:
-    """The last write to a line before the write of a number."""
-    found = (each for each in reversed(world.history.written[:index]) if each[1] == line)
-    return next(((at, data) for at, _, data in found), None)
+def _written(world: World, line: str, index: int) -> bytes:
+    """What the write of a number has brought the drives of a line: a message of a network may be in several writes."""
+    history, kind = world.history, world.place(line[:2]).kind
+    first = max((begins for _, name, begins in history.opened if name == line and begins <= index), default=0)
+    whole, before = (
+        b"".join(data for _, name, data in history.written[first:end] if name == line) for end in (index + 1, index)
+    )
+    try:
+        return for_drives(kind, whole)[len(for_drives(kind, before)) :]
+    except Garbled:  # bytes are no frames where a session before has left half of one
+        return history.written[index][2]
 
 
 def under_way(world: World, line: str, stop: Stop) -> bool:
     """Whether the stop of a key before it is on its way to the drives: then this one goes on with that."""
-    last = _last_before(world, line, stop.own[line][0])
-    if last is not None and not _for_drives(world, line, last[1]):  # a message that has begun to leave
-        stops = [each for each in world.history.stops if each.at <= stop.at and line in each.own]
-        before = stops[stops.index(stop) - 1] if stops.index(stop) else stop
-        return before is not stop and before.at >= stop.at - UNDER_WAY
-    return last is not None and last[0] >= stop.at - UNDER_WAY and _is_stop(world, line, stop, last[1])
+    stops = [each for each in world.history.stops if stop.at - STILL <= each.at <= stop.at and line in each.own]
+    earlier = stops[: stops.index(stop)]
+    begins = earlier[-1].own[line][0] if earlier else 0
+    for index in range(stop.own[line][0] - 1, begins - 1, -1):
+        at, name, _ = world.history.written[index]
+        if at < stop.at - STILL:
+            break
+        if name == line and (left := _written(world, line, index)):
+            return _is_stop(stop, line, left)
+    return bool(earlier)  # nothing of it has left yet
 
 
-def _for_drives(world: World, line: str, written: bytes) -> bytes:
-    try:
-        return for_drives(world.place(line[:2]).kind, written)
-    except Garbled:  # the rest of a message
-        return written
-
-
-def _is_stop(world: World, line: str, stop: Stop, written: bytes) -> bool:
-    """Whether a write is of a stop, or a part of one."""
-    data = _for_drives(world, line, written)
-    return any(data and (data.endswith(each) or data in each) for each in stop.parts[line])
+def _is_stop(stop: Stop, line: str, left: bytes) -> bool:
+    """Whether what left is of a stop, or a part of one."""
+    return any(left.endswith(each) or left in each for each in stop.parts[line])
 
 
 def stop_bytes(world: World, line: str, stop: Stop, until: float) -> bytes:
@@ -158,9 +161,10 @@ def stop_bytes(world: World, line: str, stop: Stop, until: float) -> bytes:
     first = max((index for at, name, index in history.opened if name == line and at <= stop.at), default=0)
     begins = stop.own[line][0]
     for index in range(begins - 1, first - 1, -1):
-        at, name, data = history.written[index]
+        at, name, _ = history.written[index]
         if name == line:
-            if at < stop.at - UNDER_WAY or not _is_stop(world, line, stop, data):
+            left = _written(world, line, index)
+            if at < stop.at - UNDER_WAY or (left and not _is_stop(stop, line, left)):
                 break
             begins = index
     whole, before = (
@@ -173,6 +177,8 @@ def stop_bytes(world: World, line: str, stop: Stop, until: float) -> bytes:
         return whole[len(before) :]
 
 
+STILL = 2.0
+"""The time, s, in which a stop may still be on its way, although the loop has written nothing since."""
 UNDER_WAY = 0.2
 """The longest time, s, between two pieces of a stop, but for the pause before its repetition."""
 LOST = re.compile(r"l\d: .* was lost|l\d: .*; trying again")

@@ -66,8 +66,8 @@ class Plant:
             await self.session.open(f"{served.endpoint}?{LINES[each.name][0]}", each.name)
         stack.push_async_callback(self.session.close)
         for name, line in self.session.buses.items():
-            for each in line.all_drives:
-                await self.session.run(f"@{name}:{each.address} {LINES[name][1]}")
+            for known in line.all_drives:
+                await self.session.run(f"@{name}:{known.address} {LINES[name][1]}")
             self.forms[name] = stop_forms(line.roster)
             self._watch(name, line.link.transport)
 
@@ -107,7 +107,12 @@ async def test_every_drive_of_every_line_is_sent_its_stop_while_the_loop_does_no
     keyboard, session = Keyboard(terminal, signals=False), plant.session
     stops: list[str] = []
     keyboard.stop_ahead = session.stop_ahead
-    keyboard.stop = lambda dropped: (stops.append(dropped), session.stop())[0]
+
+    def stop(dropped: str) -> None:
+        stops.append(dropped)
+        session.stop()
+
+    keyboard.stop = stop
 
     def press() -> None:
         for _ in range(keys):
