@@ -369,7 +369,8 @@ class Workspace(Channel):
         """The state of every drive since the last stop, as far as it was read."""
         at = self.wall(self.stopped_at if self.stops else self.now())
         opening = _still_opening(self.opening, self.stops)
-        return stop_report.of_buses(self.buses.values(), at, self.stopped_at, len(self.buses) > 1, opening)
+        buses = [bus for bus, record in self._open.items() if not record.searched]  # the search has its port
+        return stop_report.of_buses(buses, at, self.stopped_at, len(self.buses) > 1, opening)
 
     # Activity
 

@@ -488,7 +488,7 @@ class MultidropApp(Dressed):
         self.stop_all()
 
     async def action_quit(self) -> None:
-        await self.leaving.key()
+        self.leaving.key()
 
     def _unsaved(self) -> list[str]:
         return [text.name for text in self.texts.unsaved()]
