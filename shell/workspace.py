@@ -67,8 +67,8 @@ class OpenBus:
     """The error of the configuration that took its names, units or guards; it is read only until a person agrees."""
     probe: bool = False
     """A search has opened it for a moment, so that a stop reaches it; a person did not."""
-    searched: bool = False
-    """Its port is being searched for drives, by a search that has taken it over."""
+    searched_until: float = float("-inf")
+    """The end of a search for drives that has taken over its port, s: until then it is not lost."""
     port: str = ""
     """The name of its port, the same in every session; empty for a simulated one."""
     selected: Drive | None = None
@@ -181,8 +181,8 @@ class Workspace(Channel):
         return [bus for bus, each in self._open.items() if not each.probe]
 
     def missing(self, bus: Bus) -> bool:
-        """True if a bus is lost; while its port is searched for drives it is not."""
-        return bus.lost is not None and not self._open[bus].searched
+        """True if a bus is lost; while its port is searched for drives, or just was, it is not."""
+        return bus.lost is not None and self.now() >= self._open[bus].searched_until
 
     @property
     def raw(self) -> dict[str, RawLine]:
@@ -369,7 +369,8 @@ class Workspace(Channel):
         """The state of every drive since the last stop, as far as it was read."""
         at = self.wall(self.stopped_at if self.stops else self.now())
         opening = _still_opening(self.opening, self.stops)
-        buses = [bus for bus, record in self._open.items() if not record.searched]  # the search has its port
+        # While a search has the port of a line, the stop reaches it there.
+        buses = [bus for bus, record in self._open.items() if record.searched_until < float("inf")]
         return stop_report.of_buses(buses, at, self.stopped_at, len(self.buses) > 1, opening)
 
     # Activity
