@@ -83,6 +83,22 @@ class OpenBus:
     """The observation of a drive's program, for the verbs that do that."""
 
 
+class Tabs:
+    """The buses as a screen lists them: those that a person has opened, and which of them are lost."""
+
+    def __init__(self, workspace: Workspace) -> None:
+        self._workspace = workspace
+
+    @property
+    def shown(self) -> list[Bus]:
+        """The buses that a person has opened, in their order; a search opens others for a moment."""
+        return [bus for bus in self._workspace.buses.values() if not self._workspace.of(bus).probe]
+
+    def missing(self, bus: Bus) -> bool:
+        """True if a bus is lost; while its port is searched for drives, or just was, it is not."""
+        return bus.lost is not None and self._workspace.now() >= self._workspace.of(bus).searched_until
+
+
 class Workspace(Channel):
     """The open buses and the selection. Needs a running event loop, and belongs to its thread."""
 
@@ -93,6 +109,7 @@ class Workspace(Channel):
         self.buses: dict[str, Bus] = {}
         """By name, in their order."""
         self._open: dict[Bus, OpenBus] = {}
+        self.tabs = Tabs(self)
         self.selected_bus = ""
         """The name of the selected bus; empty while nothing is open."""
         self.latched = False
@@ -174,15 +191,6 @@ class Workspace(Channel):
 
     def of(self, bus: Bus) -> OpenBus:
         return self._open[bus]
-
-    @property
-    def shown(self) -> list[Bus]:
-        """The buses that a person has opened, in their order; a search opens others for a moment."""
-        return [bus for bus, each in self._open.items() if not each.probe]
-
-    def missing(self, bus: Bus) -> bool:
-        """True if a bus is lost; while its port is searched for drives, or just was, it is not."""
-        return bus.lost is not None and self.now() >= self._open[bus].searched_until
 
     @property
     def raw(self) -> dict[str, RawLine]:
