@@ -187,10 +187,6 @@ class DriveState:
             self.last_error, self.last_error_at = code, math.inf
             self.errors.add(code)
 
-    def date_error(self, now: float) -> None:
-        """Give an error that was just read its time: a conversation has no clock."""
-        self.last_error_at = min(self.last_error_at, now)
-
     # Reference
 
     def reference_lost(self, axes: Iterable[str]) -> None:

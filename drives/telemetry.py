@@ -174,12 +174,8 @@ class _Poller(Generic[Thing]):
             due.at = now + self.retry
             return self._set_timer(now)
         due.at = max(due.at + self.periods[thing], now)
-        trouble: list[str] = []
-        with isolated(f"polling {thing} on {self._link.name}", trouble):
+        with self._isolated(thing, due, f"polling {thing} on {self._link.name}", FAILED, again=False):
             self._begin(thing, due, drive)
-        if trouble:
-            self._busy = False
-            self._put_off(thing, due, FAILED.format(trouble[0]))
 
     def _held_up(self, now: float) -> float:
         """Seconds for which the next poll of a party line waits after a print. What people ask for never waits.
@@ -245,22 +241,17 @@ class _Poller(Generic[Thing]):
                 due.at = self._link.now() + self.retry
 
     @contextmanager
-    def _isolated(self, thing: Thing, due: _Due, what: str, report: str) -> Iterator[None]:
-        """Report a defect and put the thing off; then set the timer."""
+    def _isolated(self, thing: Thing, due: _Due, what: str, report: str, again: bool = True) -> Iterator[None]:
+        """Report a defect and put the thing off; then set the timer, without a defect if `again`."""
         trouble: list[str] = []
         with isolated(what, trouble):
             yield
         if trouble:
-            self._put_off(thing, due, report.format(trouble[0]))
-        else:
+            due.at, self._busy = self._link.now() + AFTER_DEFECT, self._busy and again
+            drive = self._drive(thing)
+            self._link.notify(f"{drive.shown}: {report.format(trouble[0])}", drive.address, warning=True)
+        if trouble or again:
             self._set_timer(self._link.now())
-
-    def _put_off(self, thing: Thing, due: _Due, report: str) -> None:
-        """Report a defect, and read the thing again after a pause."""
-        due.at = self._link.now() + AFTER_DEFECT
-        drive = self._drive(thing)
-        self._link.notify(f"{drive.shown}: {report}", drive.address, warning=True)
-        self._set_timer(self._link.now())
 
     def _back_off(self, due: _Due) -> None:
         due.silences += 1

@@ -9,6 +9,7 @@ from collections.abc import Callable, Coroutine, Iterator, Sequence
 from dataclasses import replace
 from functools import partial
 from itertools import count
+from math import inf
 from typing import Any, TypeVar
 
 from multidrop.dialects import Diagnostic, DriveError, NoAnswer
@@ -45,6 +46,8 @@ def described(bus: Bus) -> str:
 Failed = Callable[[int, BaseException], None]
 """Takes the number of a URL, from 0, and the failure to open it."""
 SIMULATED = "sim"
+REOPENED = 2.0
+"""The time in which a line is open again after a search of its port, s: later it is lost."""
 CUT = (
     "the last session on this port was interrupted while it sent '{}'; a drive may hold a part of it, which the next "
     "terminator executes"
@@ -186,12 +189,12 @@ class Openings:
         searching = Scanning(workspace, beside, connection, lambda found: workspace.output(found.words()))
         url = ""
         try:
-            record.searched = True
+            record.searched_until = inf
             await workspace.reconnections.remove(bus.name)
             await bus.link.detach(TransportLost(f"{bus.name} is being searched for drives"))
             await searching.run([], False)
         finally:
-            record.searched = False
+            record.searched_until = workspace.now() + REOPENED
             if bus.name in workspace.buses:
                 if searching.found:
                     url, before = url_of(searching.found), connection

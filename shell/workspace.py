@@ -67,8 +67,8 @@ class OpenBus:
     """The error of the configuration that took its names, units or guards; it is read only until a person agrees."""
     probe: bool = False
     """A search has opened it for a moment, so that a stop reaches it; a person did not."""
-    searched: bool = False
-    """Its port is being searched for drives, by a search that has taken it over."""
+    searched_until: float = float("-inf")
+    """The end of a search for drives that has taken over its port, s: until then it is not lost."""
     port: str = ""
     """The name of its port, the same in every session; empty for a simulated one."""
     selected: Drive | None = None
@@ -83,6 +83,22 @@ class OpenBus:
     """The observation of a drive's program, for the verbs that do that."""
 
 
+class Tabs:
+    """The buses as a screen lists them: those that a person has opened, and which of them are lost."""
+
+    def __init__(self, workspace: Workspace) -> None:
+        self._workspace = workspace
+
+    @property
+    def shown(self) -> list[Bus]:
+        """The buses that a person has opened, in their order; a search opens others for a moment."""
+        return [bus for bus in self._workspace.buses.values() if not self._workspace.of(bus).probe]
+
+    def missing(self, bus: Bus) -> bool:
+        """True if a bus is lost; while its port is searched for drives, or just was, it is not."""
+        return bus.lost is not None and self._workspace.now() >= self._workspace.of(bus).searched_until
+
+
 class Workspace(Channel):
     """The open buses and the selection. Needs a running event loop, and belongs to its thread."""
 
@@ -93,6 +109,7 @@ class Workspace(Channel):
         self.buses: dict[str, Bus] = {}
         """By name, in their order."""
         self._open: dict[Bus, OpenBus] = {}
+        self.tabs = Tabs(self)
         self.selected_bus = ""
         """The name of the selected bus; empty while nothing is open."""
         self.latched = False
@@ -174,15 +191,6 @@ class Workspace(Channel):
 
     def of(self, bus: Bus) -> OpenBus:
         return self._open[bus]
-
-    @property
-    def shown(self) -> list[Bus]:
-        """The buses that a person has opened, in their order; a search opens others for a moment."""
-        return [bus for bus, each in self._open.items() if not each.probe]
-
-    def missing(self, bus: Bus) -> bool:
-        """True if a bus is lost; while its port is searched for drives it is not."""
-        return bus.lost is not None and not self._open[bus].searched
 
     @property
     def raw(self) -> dict[str, RawLine]:
@@ -371,7 +379,9 @@ class Workspace(Channel):
         """The state of every drive since the last stop, as far as it was read."""
         at = self.wall(self.stopped_at if self.stops else self.now())
         opening = _still_opening(self.opening, self.stops)
-        return stop_report.of_buses(self.buses.values(), at, self.stopped_at, len(self.buses) > 1, opening)
+        # While a search has the port of a line, the stop reaches it there.
+        buses = [bus for bus, record in self._open.items() if record.searched_until < float("inf")]
+        return stop_report.of_buses(buses, at, self.stopped_at, len(self.buses) > 1, opening)
 
     # Activity
 

@@ -41,7 +41,7 @@ CTRL_C = "Ctrl+Q quits, Ctrl+X stops all drives"
 
 def names_of(session: Session) -> list[str]:
     """The names of the buses that have tabs."""
-    return [bus.name for bus in session.shown]
+    return [bus.name for bus in session.tabs.shown]
 
 
 @dataclass

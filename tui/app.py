@@ -20,22 +20,17 @@ from typing import Any, ClassVar
 from rich.console import RenderableType
 from textual import events
 from textual._compositor import ChopsUpdate, LayoutUpdate
-from textual._context import active_message_pump
 from textual.binding import BindingType
-from textual.dom import DOMNode
 from textual.driver import Driver
 from textual.geometry import Size
 from textual.message import Message
 from textual.screen import Screen
-from textual.widget import Widget
-from textual.widgets import Static
 
 from multidrop.dialects import Diagnostic
 from multidrop.drives.events import Unsolicited
 from multidrop.shell.configuration import DEFAULT_LOOK, Look
 from multidrop.shell.events import Failed, OnBus, Printed, SessionEvent, StateChanged
 from multidrop.shell.session import Session
-from multidrop.tui import boundary
 from multidrop.tui.actions import Actions, Parts
 from multidrop.tui.assist import Assist
 from multidrop.tui.boundary import Boundary
@@ -55,7 +50,7 @@ from multidrop.tui.screens.questions import Questions
 from multidrop.tui.screens.start import Opener, Start
 from multidrop.tui.session_hooks import Hooks
 from multidrop.tui.terminal.keyboard import Keyboard
-from multidrop.tui.texts import Texts
+from multidrop.tui.texts import Texts, unsaved_of
 from multidrop.tui.tour import Tour
 from multidrop.tui.typist import Selection, Typist, Unsent
 from multidrop.tui.widgets.bars import Banner, Footer
@@ -94,11 +89,14 @@ class MultidropApp(Dressed):
         look: Look = DEFAULT_LOOK,
         model: ScreenModel | None = None,
     ) -> None:
+        self._is_composed = False
+        """The main screen has its parts: they can be painted."""
         super().__init__(look, driver)
         self.session, self.urls, self.assist = session, list(urls), assist
         figures, named = partial(figures_at, session), partial(name_at, session)
         self.model = model or ScreenModel(lambda: session.selected_bus, lambda: session.buses, figures, named)
-        self.boundary = Boundary(session.settings.state, self._tell_defect)
+        self.boundary = Boundary(session.settings.state, partial(self.show_line, mark="x"))
+        self.boundary.own(self, lambda: self._is_composed)
         self._end_boundary: Callable[[], None] = lambda: None
         self.polling, self.macros = Polling(), FunctionKeys()
         self.keymap = keymap(bindings(), look.keys)
@@ -124,17 +122,16 @@ class MultidropApp(Dressed):
             session, self.main, self.assist, self.outbox, self.selection, self.unsent, self.keyboard, self.questions
         )
         self.texts = Texts(self.assist.drafts())
+        unsaved = partial(unsaved_of, self.texts)
         self.leaving = Leaving(
-            self, session, self.keyboard, self.outbox, self.questions, self.stop_all, self._unsaved, self._warn
+            self, session, self.keyboard, self.outbox, self.questions, self.stop_all, unsaved, self._warn
         )
         self._inbox: list[SessionEvent] = []
         self._unsubscribe = session.subscribe(self._receive)
         self._stops = session.stops
         self.stops_to_the_end = False
-        """The reading of the terminal goes on after the app, until `release`: the stop key works until then."""
+        """The reading of the terminal goes on after the app, until `Terminal.release`, for the stop key."""
         self._own_task: asyncio.Task[Any] | None = None
-        self._is_composed = False
-        """The main screen has its parts: they can be painted."""
         self.frames = Frames(self._paint, self.call_later, lambda: self.presenter.behind)
         self.dress(look)
         self.model.look.ink = ink_of(self.signs.font)
@@ -249,7 +246,7 @@ class MultidropApp(Dressed):
     def on_mount(self) -> None:
         self._end_boundary = self.boundary.look_at(asyncio.get_running_loop())
         self.set_interval(AGEING, self.frames.age)
-        self.set_interval(AGEING, self._try_again)
+        self.set_interval(AGEING, lambda: self.boundary.try_again(self.screen_stack))
 
     async def on_ready(self) -> None:
         """Open what was named, or ask. The main screen exists: keys that were typed before count from here on."""
@@ -285,55 +282,11 @@ class MultidropApp(Dressed):
         self.polling.end()
         self._end_boundary()
 
-    def release(self) -> list[str]:
-        """Give the terminal back, at the end of the process. Name what was typed and not sent, in lines for it."""
-        release = getattr(self._driver, "release", None)
-        if release is not None:
-            release()
-        return self.leaving.named()
-
     def interrupted(self) -> None:
         """Stop what automation moves, and end: a signal came, or the terminal is gone."""
         self.session.interrupt()
         self.leaving.accept()
         self.exit(INTERRUPTED)
-
-    # Defects
-
-    async def _dispatch_message(self, message: Message) -> None:
-        """Handle a message of the app's own queue, which goes on whatever a handler raises."""
-        if not self._is_composed:
-            await super()._dispatch_message(message)
-            return
-        with self.boundary.at(f"the screen, {type(message).__name__}"):
-            await super()._dispatch_message(message)
-
-    def _register_child(self, parent: DOMNode, child: Widget, before: int | None, after: int | None) -> None:
-        self.boundary.guard(child)
-        super()._register_child(parent, child, before, after)
-
-    def _handle_exception(self, error: Exception) -> None:
-        """Take a defect that Textual reports: of a timer, a worker, a composition, a layout. See `tui.boundary`."""
-        if boundary.RAISES or not self._is_composed:
-            super()._handle_exception(error)
-            return
-        widget = active_message_pump.get(None)
-        text = self.boundary.caught(f"{type(widget).__name__}, {getattr(widget, 'id', None) or 'a part'}", error)
-        if isinstance(widget, Widget) and widget.is_attached and not widget.children and isinstance(widget, Screen):
-            widget.mount(Static(text, markup=False))  # it could not be composed
-
-    def _tell_defect(self, text: str) -> None:
-        self.show_line(text, "x")
-        if self.screen_stack and isinstance(self.screen, Over):
-            self.screen.tell(text)
-
-    def _try_again(self) -> None:
-        """Render widgets again that could not be rendered: the cause may be gone."""
-        if self.boundary.failing:
-            for screen in self.screen_stack:
-                screen.refresh()
-                for widget in screen.query("*"):
-                    widget.refresh()
 
     # Frames
 
@@ -489,10 +442,7 @@ class MultidropApp(Dressed):
         self.stop_all()
 
     async def action_quit(self) -> None:
-        await self.leaving.key()
-
-    def _unsaved(self) -> list[str]:
-        return [text.name for text in self.texts.unsaved()]
+        self.leaving.key()
 
 
 def bindings() -> list[BindingType]:

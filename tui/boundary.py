@@ -14,17 +14,22 @@ import logging
 import os
 import sys
 import traceback
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from pathlib import Path
 from types import TracebackType
 from typing import Any, TypeVar
 
 from rich.segment import Segment
+from textual._context import active_message_pump
+from textual.app import App
+from textual.dom import DOMNode
 from textual.geometry import Region
 from textual.message import Message
+from textual.screen import Screen
 from textual.strip import Strip
 from textual.widget import Widget
+from textual.widgets import Static
 from textual.worker import WorkerFailed
 
 from multidrop.drives.events import LOG
@@ -145,6 +150,47 @@ class Boundary:
             return self.do(place, lambda: render(crop), lambda text: _strips(text, crop))
 
         vars(widget).update(_dispatch_message=guarded, render_lines=rendered)
+        if isinstance(widget, Screen):
+            focus = widget.set_focus
+
+            def focused(part: Widget | None, *arguments: Any, **named: Any) -> None:
+                there = part is None or part.is_attached  # else the keys of the screen would be missing with it
+                focus(part if there else None, *arguments, **named)
+
+            vars(widget).update(set_focus=focused)
+
+    def own(self, app: App[Any], composed: Callable[[], bool]) -> None:
+        """Keep an app alive once it is composed: its queue, what its timers and workers raise, and all its widgets."""
+        dispatch, register, handle = app._dispatch_message, app._register_child, app._handle_exception
+
+        async def guarded(message: Message) -> None:
+            if not composed():
+                await dispatch(message)
+                return
+            with self.at(f"the screen, {type(message).__name__}"):
+                await dispatch(message)
+
+        def registered(parent: DOMNode, child: Widget, before: int | None, after: int | None) -> None:
+            self.guard(child)
+            register(parent, child, before, after)
+
+        def handled(failure: Exception) -> None:
+            if RAISES or not composed():
+                handle(failure)
+                return
+            pump = active_message_pump.get(None)
+            text = self.caught(f"{type(pump).__name__}, {getattr(pump, 'id', None) or 'a part'}", failure)
+            if isinstance(pump, Screen) and pump.is_attached and not pump.children:
+                pump.mount(Static(text, markup=False))  # it could not be composed
+
+        vars(app).update(_dispatch_message=guarded, _register_child=registered, _handle_exception=handled)
+
+    def try_again(self, screens: Sequence[Screen[Any]]) -> None:
+        """Render all parts again after a defect: the cause may be gone."""
+        for screen in screens if self.failing else ():
+            screen.refresh()
+            for widget in screen.query("*"):
+                widget.refresh()
 
     def look_at(self, loop: asyncio.AbstractEventLoop) -> Callable[[], None]:
         """Catch what the event loop and the subscribers of events report; call what is returned to end that."""

@@ -144,7 +144,10 @@ def _release(app: MultidropApp) -> None:
     """Give the terminal back, at the very end: until then the stop key works. Name what was typed and not sent."""
     from multidrop.shell.streams.stdout import write
 
-    for line in app.release():
+    release = getattr(app._driver, "release", None)
+    if release is not None:
+        release()
+    for line in app.leaving.named():
         write(sys.stderr, line)
 
 

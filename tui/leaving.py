@@ -8,10 +8,9 @@ terminal once the screen is gone. Only the stop key works until the process ends
 
 from __future__ import annotations
 
-import asyncio
 import re
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 from textual.app import App
 
@@ -43,16 +42,12 @@ class Leaving:
     over: bool = False
     """The app ends."""
     _deciding: bool = False
-    _known: asyncio.Event = field(default_factory=asyncio.Event)
-    """The current quit is decided, or its question is shown."""
 
-    async def key(self) -> None:
-        """Quit on the key. Return once that is decided, or its question has the focus: later keys wait that long."""
-        if self._deciding or self.over:
-            return
-        self._known = asyncio.Event()
-        self._app.run_worker(self._quit())
-        await self._known.wait()
+    def key(self) -> None:
+        """Quit on the key. Later keys wait until that is decided, or its question has the focus; frames do not."""
+        if not (self._deciding or self.over):
+            self._keyboard.hold(self)
+            self._app.run_worker(self._quit())
 
     async def _quit(self) -> None:
         if await self.ask():
@@ -60,8 +55,10 @@ class Leaving:
 
     async def ask(self) -> bool:
         """Return True if the app may end; nothing that is typed is sent from then on."""
-        if self._deciding or isinstance(self._app.screen, Confirm):
-            self._known.set()
+        if self._deciding:
+            return False
+        if isinstance(self._app.screen, Confirm):
+            self._keyboard.release(self)
             return False
         self._deciding = True
         self._keyboard.hold(self)
@@ -80,7 +77,6 @@ class Leaving:
             if not accepted:
                 for text in not_sent(_lines(self._keyboard.take_dropped()), DECLINED):
                     self._warn(text)
-            self._known.set()
         return accepted
 
     async def _decide(self) -> bool:
@@ -98,7 +94,6 @@ class Leaving:
     def _shown(self) -> None:
         """Let keys answer the question, which has the focus now."""
         self._keyboard.release(self)
-        self._known.set()
 
     def accept(self) -> None:
         """Take nothing from now on: the app ends, also after a signal."""

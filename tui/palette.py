@@ -96,8 +96,8 @@ def _choices(session: Session, macros: FunctionKeys, keymap: Keymap) -> Iterator
             "Next page of keys", f"F2 to F12; now page {macros.page}", "act.macro_page", keymap.shown("macro-page")
         )
     yield Command("Choose a drive", "the one that plain text goes to", "act.choose_drive", keymap.shown("drive"))
-    for number, bus in enumerate(session.shown, 1):
-        if len(session.shown) > 1:
+    for number, bus in enumerate(session.tabs.shown, 1):
+        if len(session.tabs.shown) > 1:
             key = keymap.shown(f"tab-{number}")
             yield Command(f"Show bus {bus.name}", "its transcript and drives", _call("act.select", "", bus.name), key)
         for drive in bus.drives.values():

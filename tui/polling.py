@@ -111,7 +111,7 @@ def _awaited(session: Session, model: ScreenModel) -> list[Series]:
 
 
 def _open(session: Session) -> list[Bus]:
-    return [bus for bus in session.shown if bus.lost is None]
+    return [bus for bus in session.tabs.shown if bus.lost is None]
 
 
 def _drives(session: Session, model: ScreenModel, plotted: Sequence[Series], rest: float) -> Wanted:

@@ -67,8 +67,8 @@ class Presenter:
 
     def tabs(self, now: float) -> list[Tab]:
         tabs: list[Tab] = []
-        for number, bus in enumerate(self.session.shown, 1):
-            facts, drives, lost = self.model.buses.get(bus.name), list(bus.drives), self.session.missing(bus)
+        for number, bus in enumerate(self.session.tabs.shown, 1):
+            facts, drives, lost = self.model.buses.get(bus.name), list(bus.drives), self.session.tabs.missing(bus)
             state = State.SILENT if bus.silent and not lost else bus_state(facts, drives, lost)
             selected, old = bus.name == self.session.selected_bus, bus_old(facts, drives, now)
             tabs.append(Tab(number, bus.name, state, selected, old, trouble_mark(facts, drives, lost)))
@@ -87,7 +87,7 @@ class Presenter:
         self._paint_frame(main, now)
         if page is not None:
             self._paint_frame(page, now)
-            page.show_guarded(view)
+            _show_page(page, view)
             return
         main.set_label(self.boundary.do("the label", self.label, lambda _: ((" ▸ ", "error"),)))
         with self.boundary.at("the heading of the other half"):
@@ -124,12 +124,12 @@ class Presenter:
         bus = self.session.buses.get(self.session.selected_bus)
         lost = self.loss(bus) if bus is not None else ""
         if self.session.latched and not lost:
-            lost = next(filter(None, map(self.loss, self.session.shown)), "")
+            lost = next(filter(None, map(self.loss, self.session.tabs.shown)), "")
         return banner_row(self.session.tally() if self.session.latched else None, lost, width)
 
     def loss(self, bus: Bus) -> str:
         """The reason of a loss, and whether the bus is being tried again; empty while it is not lost."""
-        if not self.session.missing(bus):
+        if not self.session.tabs.missing(bus):
             return ""
         return f"{bus.lost}{TRYING}" if bus.name in self.session.reconnections.trying else str(bus.lost)
 
@@ -168,7 +168,7 @@ class Presenter:
         if self.session.selected_bus in self.session.raw:
             return ((f" {self.session.selected_bus} raw, /raw off ends ▸ ", "motion"),)
         drive = self.session.selected
-        bus = self.session.selected_bus if len(self.session.shown) > 1 else ""
+        bus = self.session.selected_bus if len(self.session.tabs.shown) > 1 else ""
         where = ":".join(filter(None, (bus, drive.label or drive.address if drive is not None else "")))
         if drive is not None and drive.programming:
             return ((f" {where} ◆ stores ▸ ", "motion"),)
@@ -192,6 +192,16 @@ class Presenter:
                 "the status", lambda: narrow_rows(view, main.size.width), lambda text: [_trouble_row(text)]
             )
             main.lines("status").put_all(status)
+
+
+def _show_page(page: Page, view: View) -> None:
+    """Show a page; after a defect nothing but that: what it showed before may no longer be true."""
+    with view.boundary.at(f"the page {type(page).__name__}") as attempt:
+        page.show(view)
+    if attempt.trouble != page.trouble and page.is_attached:
+        page.body.visible = not attempt.trouble
+        page.tell(attempt.trouble)
+        page.trouble = attempt.trouble
 
 
 def _trouble_row(text: str) -> Row:

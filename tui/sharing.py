@@ -118,7 +118,7 @@ def shared(app: MultidropApp) -> Shared:
     """The state of an app's session."""
     session, presenter = app.session, app.presenter
     buses, readouts = list[SharedBus](), list[SharedReadout]()
-    for bus in session.shown:
+    for bus in session.tabs.shown:
         drives = tuple(
             SharedDrive(
                 each.address,

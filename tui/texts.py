@@ -117,3 +117,8 @@ class Texts:
             except Diagnostic as problem:
                 failures.append(str(problem))
         return failures
+
+
+def unsaved_of(texts: Texts) -> list[str]:
+    """The names of the files with a text that was not saved."""
+    return [text.name for text in texts.unsaved()]

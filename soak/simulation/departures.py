@@ -75,6 +75,19 @@ def _nothing_before(world: World) -> Iterator[str]:
             yield f"{_words(each)}, stop at {stop.at:.3f}, written after it"
 
 
+def _after_a_quit(world: World) -> Iterator[str]:
+    """Bytes of a command that was typed after an accepted quit leave, or a drive executes it."""
+    history = world.history
+    for quit_ in (each for each in history.told.quits if each.accepted < inf):
+        for each in quit_.after:
+            line = each.line + each.who
+            left = b"".join(data for at, port, data in history.written if port == line and at >= quit_.at)
+            left = left.replace(b"\xff\xff", b"\xff") if world.place(each.line).kind == "rfc2217" else left
+            key = each.line, each.drive, each.text
+            if _left(world, each, left) or any((one.line, one.drive, one.text) == key for one in history.executed):
+                yield f"{_words(each)}, behind a quit that was accepted at {quit_.accepted:.3f}"
+
+
 def _never_again(world: World) -> Iterator[str]:
     """The bytes of a command leave on two connections."""
     connections = [*_connections(world)]
@@ -187,6 +200,7 @@ TAKEN_OVER = 1e-9
 PROMISE = "What a stop promises"
 DEPARTURES = (
     Rule("after a stop", "Nothing that was typed before a stop leaves after it.", PROMISE, _nothing_before),
+    Rule("quit", "Nothing that is typed after an accepted quit leaves.", PROMISE, _after_a_quit),
     Rule("repeated", "A stop leaves again, piece by piece, once its line is quiet.", PROMISE, _repeated),
     Rule("sent again", "No command leaves again on another connection.", "What is never done twice", _never_again),
     Rule("owed", "What leaves first on a line that was lost at a stop is the stop.", PROMISE, _owed),

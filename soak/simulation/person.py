@@ -50,6 +50,9 @@ class Person:
         self._line = ""
         self._at = 0.0
         session.front.ask = lambda question: at_keyboard(self.keyboard, question)
+        session.front.before_quit = self._may_quit
+        self.quits: Callable[[], None] = lambda: None
+        """Called once the session ends by a quit."""
         self.keyboard.listen(self._listen)
         self._stops = session.stops
         session.subscribe(self._noticed)
@@ -156,7 +159,14 @@ class Person:
         self._session.stop(why, follows=why == "Ctrl+X")
         self.lines.show_unsent("a stop came", lines)
 
+    async def _may_quit(self) -> bool:
+        """Decide a quit as the prompt does; the person does not ask twice."""
+        with self.lines.deciding():
+            return not await self._session.in_motion()
+
     def _noticed(self, event: object) -> None:
+        if isinstance(event, StateChanged) and self._session.quitting:
+            self.quits()
         if isinstance(event, StateChanged) and self._stops != self._session.stops:
             self._stops = self._session.stops
             self.lines.stopped()

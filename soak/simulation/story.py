@@ -22,6 +22,7 @@ from soak.simulation.acts.files import FILES
 from soak.simulation.acts.hand import HAND
 from soak.simulation.acts.meetings import HELD_UP, MEETINGS
 from soak.simulation.acts.operators import OPERATORS
+from soak.simulation.acts.quitting import QUITTING
 from soak.simulation.acts_kill import files, kill, power_cut
 from soak.simulation.bounds import sample
 from soak.simulation.cut_ins import drawn_aim
@@ -161,19 +162,21 @@ AT_ONCE = 0.25
 CREW, LAST = 200, 5
 """The number of the first step with one, and how many there are."""
 AFTER = CREW + LAST
-"""The number of the first step of `AFTER_CREWS`."""
+"""The number of the first step of the acts that end it."""
+AT_LAST = (*AFTER_CREWS, *QUITTING)
+"""Those acts, each once."""
 
 
 def whole(seed: int, steps: int) -> tuple[int, ...]:
     """The steps of a whole story: so many, and those of the crews, if it ends with them."""
-    crews = range(CREW, AFTER + len(AFTER_CREWS)) if Random(f"{seed} crews").random() < AT_ONCE else ()
+    crews = range(CREW, AFTER + len(AT_LAST)) if Random(f"{seed} crews").random() < AT_ONCE else ()
     return (*range(steps), *crews)
 
 
 def _drawn(world: World, step: int, rng: Random) -> Act:
     """Draw the act of a step."""
     if step >= AFTER:
-        return AFTER_CREWS[step - AFTER]
+        return AT_LAST[step - AFTER]
     if step >= CREW:
         return rng.choices(CREWS, [each.weight for each in CREWS])[0]
     act = rng.choices(ACTS, [each.weight for each in ACTS])[0]

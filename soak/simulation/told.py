@@ -7,6 +7,11 @@ of a macro that plays several times, which `Told.repeated` has with the number o
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from math import inf
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from soak.simulation.history import Command
 
 Line = tuple[str, str, str]
 """A line of drives, a drive on it, and a text."""
@@ -80,6 +85,16 @@ class Put:
 
 
 @dataclass
+class Quit:
+    """A quit that was typed, and the commands that were typed right after it."""
+
+    at: float
+    after: list[Command]
+    accepted: float = inf
+    """When the session ended by it; infinite: it went on."""
+
+
+@dataclass
 class Told:
     """All of it, in its order."""
 
@@ -100,6 +115,7 @@ class Told:
     """When the thread of a stop had done its work, and when `/resume` or the next session let automation run again."""
     awaited: list[Awaited] = field(default_factory=list)
     """What scripts waited for whose motions may have failed."""
+    quits: list[Quit] = field(default_factory=list)
     halts: list[float] = field(default_factory=list)
     """When everything was stopped."""
     stored: list[Put] = field(default_factory=list)

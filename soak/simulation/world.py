@@ -273,6 +273,7 @@ class World:
         writer.begin(self.session)
         rng = Random(f"{self.seed} person {self.history.lives}")
         self.person = Person(self.session, self.loop, rng, self._typed, self.cut_ins, process)
+        self.person.quits = self.quit
 
     def kill(self, operations: int, moment: str, power: bool = False, of: str = "") -> None:
         """Kill the session at an operation from now; `power`: the PC loses its power there. `of`: see `Process.arm`."""
@@ -442,6 +443,18 @@ class World:
             self.history.deaths.append(self.loop.now)
             self.history.note(self.loop.now, "hang-up", "")
             self.person.hang_up(lambda: self._start(self._hung_up()))
+
+    def quit(self) -> None:
+        """End the session by a quit: as a hang-up, but the terminal stays, and what is typed still arrives."""
+        if self.ready.is_set() and not (self.process.dead or self.ending):
+            self.ready.clear()
+            self.cut_ins.hurry()
+            self.cut_ins.end()
+            self.history.deaths.append(self.loop.now)
+            self.history.note(self.loop.now, "quit", "")
+            for each in self.history.told.quits[-1:]:
+                each.accepted = min(each.accepted, self.loop.now)
+            self._start(self._hung_up())
 
     async def _hung_up(self) -> None:
         process, rng = self.process, Random(f"{self.seed} hang-up {self.history.lives}")

@@ -162,6 +162,18 @@ class FakeUnits(Units):
         return not drive.unreferenced & {axis, ""}
 
 
+class FakeTabs:
+    def __init__(self, session: FakeSession) -> None:
+        self._session = session
+
+    @property
+    def shown(self) -> list[FakeBus]:
+        return list(self._session.buses.values())
+
+    def missing(self, bus: FakeBus) -> bool:
+        return bus.lost is not None
+
+
 class FakeSession:
     """A session whose `lines` were run; a line in `refuses` fails; `gate` holds every line until it is set."""
 
@@ -171,6 +183,7 @@ class FakeSession:
         """What a person was shown of the files of the lines that were started with it."""
         self.selected_bus = buses[0].name if buses else ""
         self.addresses = {bus.name: next(iter(bus.drives), "") for bus in buses}
+        self.tabs = FakeTabs(self)
         self.reconnections = SimpleNamespace(trying=[])
         self.openings = SimpleNamespace(url_of=lambda bus: f"sim:#{bus.name}")
         self.units = FakeUnits()
@@ -214,13 +227,6 @@ class FakeSession:
     def place(self) -> Place:
         selected = self.selected
         return Place(self.selected_bus, selected.address if selected is not None else "")
-
-    @property
-    def shown(self) -> list[FakeBus]:
-        return list(self.buses.values())
-
-    def missing(self, bus: FakeBus) -> bool:
-        return bus.lost is not None
 
     def of_demo(self, bus: str) -> str:
         return bus if bus in self.buses else ""

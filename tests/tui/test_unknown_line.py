@@ -32,7 +32,10 @@ def told(app: Any) -> str:
     return "\n".join(record.text for page in app.main.pages.values() for record in page.records)
 
 
-async def test_open_see_why_not_search_and_talk_are_three_keys(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("size", [(80, 24), (120, 40)], ids=["narrow", "wide"])
+async def test_open_see_why_not_search_and_talk_are_three_keys(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, size: tuple[int, int]
+) -> None:
     floor = RunningFloor(Floor(read(bus("b", drive("LMDCM"), baud=4800), "cell.toml")))
 
     async def transport(connection: Any, *_: Any, **given: Any) -> Any:
@@ -44,19 +47,26 @@ async def test_open_see_why_not_search_and_talk_are_three_keys(tmp_path: Path, m
     session = Session(settings, reconnect=True)
     app: Any = MultidropApp(session, [], Assist(session, settings))
     try:
-        async with app.run_test(size=(80, 24)) as pilot:
+        async with app.run_test(size=size) as pilot:
             await until(pilot, lambda: isinstance(app.screen, Start))
             await pilot.press(*"/dev/ttyUSB9?baud=115200", "enter")
             await until(pilot, lambda: "Enter alone begins it" in told(app))
             await until(pilot, lambda: app.screen is app.main and "? silent" in app.main.lines("top").plain)
             assert "search (about " in told(app) and "no drive replies" in told(app)
-            began = session.now()
+            began, tops, top = session.now(), set[str](), app.presenter._top_row
+
+            def noted(screen: Any, now: float) -> Any:
+                tops.add("".join(text for text, _ in top(screen, now)))
+                return top(screen, now)
+
+            monkeypatch.setattr(app.presenter, "_top_row", noted)
             await pilot.press("enter")
             await until(pilot, lambda: isinstance(app.screen, GoOn) and app.screen.focused is not None)
             await settle(pilot)
             readable(pilot)
             await pilot.press("y")
             await until(pilot, lambda: session.selected is not None)
+            assert tops and not any("search" in each or "✗" in each for each in tops), tops
             assert session.now() - began < 30
             await pilot.press(*'PR "talks"', "enter")
             await until(pilot, lambda: "\ntalks" in told(app))

@@ -150,7 +150,7 @@ def drives_rows(view: View, width: int, height: int) -> list[Row]:
     shown = kept(view.glances, height if len(view.glances) <= height else height - 1)
     rows = [_panel_row(glance, view.now, width) for glance in shown]
     left = len(view.glances) - len(shown)
-    for bus in view.session.shown:
+    for bus in view.session.tabs.shown:
         if bus.name == view.session.selected_bus:
             continue
         if left or len(rows) + len(bus.drives) > height:

@@ -85,7 +85,7 @@ def cards_rows(view: View, width: int, height: int) -> list[Row]:
     """Every line with its URL, and a card for each of its drives but the selected one, which has a panel."""
     rows: list[Row] = []
     session = view.session
-    buses = sorted(session.shown, key=lambda bus: bus.name != session.selected_bus)
+    buses = sorted(session.tabs.shown, key=lambda bus: bus.name != session.selected_bus)
     for number, bus in enumerate(buses):
         if len(rows) >= height:
             rows[height - 1 :] = [((f" {len(buses) - number} more lines; ^A shows all drives", "dim"),)]
@@ -93,7 +93,7 @@ def cards_rows(view: View, width: int, height: int) -> list[Row]:
         drives = f"{len(bus.drives)} drives " if len(bus.drives) != 1 else "1 drive "
         url = "" if session.watching else url_without_secrets(session.openings.url_of(bus))
         left: Row = ((f" {bus.name} ", "accent"), (url, "text"))
-        if session.missing(bus):
+        if session.tabs.missing(bus):
             drives = f"✗ lost: {bus.lost} "
         elif bus.lost is not None:
             drives = "being searched for drives "

@@ -98,7 +98,7 @@ def glances_of(session: Session, model: ScreenModel, bus: Bus) -> list[Glance]:
             readout=facts.readout(address),
             selected=chosen is not None and drive.address == chosen.address,
             storing=drive.programming,
-            lost=session.missing(bus),
+            lost=session.tabs.missing(bus),
             unreferenced=drive.state.unreferenced,
             stranger=drive.state.stranger,
         )

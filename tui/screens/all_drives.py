@@ -84,7 +84,7 @@ def worst_first(view: View, filtered: str) -> list[Place]:
 
     A single letter is looked for at the beginning of names only: nearly every row has one in its state or its product.
     """
-    buses = view.session.shown
+    buses = view.session.tabs.shown
     places = [Place(bus.name, each) for bus in buses for each in glances_of(view.session, view.model, bus)]
     wanted = filtered.casefold().split()
     found = [place for place in places if all(_has(place, word, view.now) for word in wanted)]
@@ -158,7 +158,7 @@ class AllDrives(ListPage):
             self.action_step(0)  # it stays the chosen one when another gets worse
         now, width = view.now, self.size.width
         part = self.lines("chosen")
-        drives = sum(len(bus.drives) for bus in view.session.shown)
+        drives = sum(len(bus.drives) for bus in view.session.tabs.shown)
         room = self.size.height - HEAD - max(FEWEST, drives)
         room = room if width >= WIDE and room >= LEAST else 0
         part.styles.height = room

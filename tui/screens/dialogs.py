@@ -17,7 +17,6 @@ from textual.app import ComposeResult
 from textual.binding import Binding, BindingType
 from textual.containers import Vertical, VerticalScroll
 from textual.screen import ModalScreen
-from textual.widget import Widget
 from textual.widgets import Input, OptionList, Static
 from textual.widgets.option_list import Option
 
@@ -113,11 +112,6 @@ class Over(Keyed, ModalScreen[T], Generic[T]):
         if self.is_attached:  # else it is closed already, as the app ends
             self.mount(StopSign())
             self.tell(self.told)
-
-    def set_focus(self, widget: Widget | None, scroll_visible: bool = True, from_app_focus: bool = False) -> None:
-        """Focus a part, unless it is missing because of a defect: the keys of the screen would be missing, too."""
-        there = widget if widget is None or widget.is_attached else None
-        super().set_focus(there, scroll_visible, from_app_focus)
 
     def tell(self, text: str) -> None:
         """Tell in the box what became of a key; an empty text removes that."""

@@ -14,7 +14,6 @@ from typing import ClassVar, NamedTuple
 from textual.app import ComposeResult
 from textual.containers import Vertical
 from textual.screen import Screen
-from textual.widget import Widget
 
 from multidrop.dialects import Diagnostic
 from multidrop.dialects.on_demand import imported
@@ -52,11 +51,6 @@ class Framed(Keyed, Screen[None]):
 
     def lines(self, name: str) -> Lines:
         return self._parts[name]
-
-    def set_focus(self, widget: Widget | None, scroll_visible: bool = True, from_app_focus: bool = False) -> None:
-        """Focus a part, unless it is missing because of a defect: the keys of the screen would be missing, too."""
-        there = widget if widget is None or widget.is_attached else None
-        super().set_focus(there, scroll_visible, from_app_focus)
 
     def tell(self, text: str) -> None:
         """Show a line above the footer, in rows of its own; an empty one gives them back."""
@@ -119,7 +113,8 @@ class Page(Framed):
     def __init__(self, host: Host) -> None:
         super().__init__()
         self.host = host
-        self._trouble = ""
+        self.trouble = ""
+        """What it shows in its place after a defect; empty: there was none."""
 
     def compose(self) -> ComposeResult:
         yield self.lines("top")
@@ -143,15 +138,6 @@ class Page(Framed):
 
     def show(self, view: View) -> None:
         raise NotImplementedError
-
-    def show_guarded(self, view: View) -> None:
-        """Show it, or, after a defect, nothing but what happened: what it showed before may no longer be true."""
-        with view.boundary.at(f"the page {type(self).__name__}") as attempt:
-            self.show(view)
-        if (attempt.trouble != self._trouble) and self.is_attached:
-            self.body.visible = not attempt.trouble
-            self.tell(attempt.trouble)
-            self._trouble = attempt.trouble
 
     def part(self, name: str) -> Lines:
         """Make a part that is rows; `lines` finds it by its name."""

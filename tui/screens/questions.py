@@ -115,7 +115,7 @@ def drive_choices(session: Session, glances: Callable[[Bus], list[Glance]]) -> t
     now = session.now()
     options: list[Offer] = []
     current = ""
-    for bus in sorted(session.shown, key=lambda bus: bus.name != session.selected_bus):
+    for bus in sorted(session.tabs.shown, key=lambda bus: bus.name != session.selected_bus):
         for glance in glances(bus):
             key = f"{bus.name}\n{glance.address}"
             current = key if glance.selected else current

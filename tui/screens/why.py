@@ -150,7 +150,7 @@ def facts(view: View, glance: Glance, drive: Drive) -> Iterator[tuple[str, str, 
     """What is known besides the conditions: a label, a text and its role."""
     readout, state, wall = glance.readout, drive.state, view.session.wall
     bus = view.session.buses[view.session.selected_bus]
-    if view.session.missing(bus):
+    if view.session.tabs.missing(bus):
         yield "lost", str(bus.lost), "error"
     elif readout.silent_since is not None:
         yield "silent", SILENT.format(f"{wall(readout.silent_since):%H:%M:%S}"), "error"
