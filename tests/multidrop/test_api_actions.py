@@ -153,7 +153,7 @@ async def test_an_error_is_known_and_only_one_call_clears_it(family: str, sessio
     else:
         await a.run_at(100000)
         while await a.moving():  # to the limit; a wait would read the error for its reason
-            pass
+            await asyncio.sleep(0.1)
         found = await a.error()
         assert found == Fault(None, "an error is set; read_error() reads and clears its number")
         assert await a.error() == found

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import AsyncIterator
 from pathlib import Path
 
@@ -46,7 +47,7 @@ async def test_the_next_move_of_a_failed_motion_raises(session: AsyncSession) ->
     axis = session.drive("a")
     await axis.move_to(90000)
     while await axis.moving():
-        pass
+        await asyncio.sleep(0.1)
     with pytest.raises(MotionFailed, match="'MA 0' was not sent"):
         await axis.move_to(0)
     await axis.move_to(0)  # it was reported once

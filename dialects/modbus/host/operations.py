@@ -14,6 +14,7 @@ from multidrop.dialects.codec import End, Kind, Priority, Procedure, Reply, Requ
 from multidrop.dialects.errors import Inexpressible, NoAnswer, Refused
 from multidrop.dialects.exchange import unanswered
 from multidrop.dialects.family import Hints, Motion
+from multidrop.dialects.mcode.host.classify import starts_motion
 from multidrop.dialects.mcode.host.state import described, earlier_error, report_error, who
 from multidrop.dialects.mcode.manual import grammar
 from multidrop.dialects.mcode.manual.errors import BY_ITSELF
@@ -132,7 +133,7 @@ def carried_out(state: ModbusState, text: str, pdu: bytes) -> Procedure[bytes]:
         if not clear:
             old = f"{described(code, state)}; it may be older than '{text}', as the flag could not be read before"
             raise NoAnswer(f"{who(state)}: {old}: it is not known whether '{text}' was executed; it was sent once")
-        if code in BY_ITSELF and not state.codec.starts_motion(text):  # the reply confirms the write
+        if code in BY_ITSELF and not starts_motion(text):  # the reply confirms the write
             state.note(f"{who(state)}: '{text}' was executed, and meanwhile: {described(code, state)}, now cleared")
             return answer
         if code in BY_ITSELF:

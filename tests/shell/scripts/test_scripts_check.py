@@ -124,7 +124,7 @@ def test_what_is_wrong_is_said_with_its_place(text, said, check):
 @pytest.mark.parametrize("text", ["stoped", "stopped x", "I1", "I1=on", '"done" -1', "stopped 1 2", "{HOW} 2"])
 def test_a_wait_for_nothing_that_there_is_is_found_beforehand(text, check):
     (said,) = check(f"MR 1\n/wait {text}\n", HOW="halted")
-    assert said.startswith("s.txt:2: /wait: ") and "usage: /wait stopped|idle [SECONDS]" in said
+    assert said.startswith("s.txt:2: /wait: ") and "usage: /wait stopped|idle|ended [SECONDS]" in said
 
 
 def test_every_error_is_said_at_once(check):
