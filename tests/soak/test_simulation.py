@@ -55,10 +55,16 @@ def test_the_acts_of_several_callers_follow_a_story_that_is_the_same_without_the
 
 @pytest.mark.parametrize(
     ("seed", "act", "times"),
-    [(2, "second host at USB", 1), (7, "second host at USB", 0), (7, "same question", 1), (3, "same question", 0)],
+    [
+        (2, "second host at USB", 1),
+        (7, "second host at USB", 0),
+        (7, "same question", 1),
+        (3, "same question", 0),
+        (3, "marks in lines", 1),
+    ],
 )
 def test_what_ends_the_story_of_the_crews_happens_where_the_machine_has_it(seed: int, act: str, times: int) -> None:
-    life = Life(seed, (0, AFTER, AFTER + 1))
+    life = Life(seed, (0, AFTER, AFTER + 1, AFTER + 2))
     assert lived(seed, life.steps).history.counts.get(act, 0) == times
     assert not result(life).breaches
 
