@@ -58,12 +58,18 @@ class ErrorsRead:
 
     def __init__(self) -> None:
         self.count = 0
+        self.at = -math.inf
+        """When the last one was read, s; infinite until the conversation that has read it goes on."""
         self.moving = False
         """A motion was begun whose end was not judged yet."""
         self._last: tuple[int, ...] = ()
 
     def add(self, code: int) -> None:
-        self._last, self.count = (*self._last[1 - KEPT_ERRORS :], code), self.count + 1
+        self._last, self.count, self.at = (*self._last[1 - KEPT_ERRORS :], code), self.count + 1, math.inf
+
+    def date(self, now: float) -> None:
+        """Give an error that was just read its time: a conversation has no clock."""
+        self.at = min(self.at, now)
 
     def since(self, count: int) -> tuple[int, ...]:
         """The numbers that were read since `count` had this value, newest last, as far as they are kept."""
@@ -94,8 +100,6 @@ class DriveState:
     """The drive's error flag is set from before, or may be; the next refusal must be distinguished from it."""
     last_error: int = 0
     """The number of the last error that was read of it, which cleared it; 0: none was read."""
-    last_error_at: float = -math.inf
-    """When that was, s; infinite until the conversation that has read it goes on."""
     errors: ErrorsRead = field(default_factory=ErrorsRead)
     """The errors that were read of it."""
     reply_pending: bool = False
@@ -184,7 +188,7 @@ class DriveState:
         """Record the error flag. `code`: the number of the error, which the drive cleared as it was read."""
         self.error = flag
         if code:
-            self.last_error, self.last_error_at = code, math.inf
+            self.last_error = code
             self.errors.add(code)
 
     # Reference
@@ -196,7 +200,7 @@ class DriveState:
     def follows(self, before: DriveState) -> None:
         """Take over what is known of the same drive from before a lost connection."""
         self.reference_lost(before.unreferenced)
-        self.last_error, self.last_error_at = before.last_error, before.last_error_at
+        self.last_error, self.errors.at = before.last_error, before.errors.at
 
     def referenced(self, *axes: str) -> None:
         """Record that a homing of these axes has ended, or that their position was set; none: of all axes."""

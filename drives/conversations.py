@@ -121,8 +121,8 @@ class Conversations:
 
     def publish_notes(self, state: DriveState) -> None:
         """Publish what conversations have noted about a drive."""
-        if state.last_error_at == math.inf:  # it was just read: a conversation has no clock
-            state.last_error_at = self.link.now()
+        if state.errors.at == math.inf:
+            state.errors.date(self.link.now())
         if not (state.notes or state.remarks):
             return
         notes, remarks = state.take_messages()

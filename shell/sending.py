@@ -96,7 +96,7 @@ def _has_error(drive: Drive, before: _Before, failure: BaseException, at: float)
     """Whether a drive has shown an error that may have started its routine for errors."""
     if not _has_routine(drive) or drive.requests == before.requests:
         return False
-    return isinstance(failure, Refused) or drive.state.last_error_at > at
+    return isinstance(failure, Refused) or drive.state.errors.at > at
 
 
 async def _after_error(automations: Automations, automation: Automation, drive: Drive) -> None:

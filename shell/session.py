@@ -371,7 +371,7 @@ class LinePath:
         """Ask before a guarded line. Raises Diagnostic where it is not agreed to, and by a script or a macro."""
         if drive.stores:
             return
-        if drive.starts(text):
+        if drive.state.stranger and not _only_asks(drive, text):
             await self.agreed_to_write(drive, text.strip(), by)
         what = self._session.settings.guards.what(drive.family, drive.state, text)
         if what:
@@ -428,6 +428,11 @@ class LinePath:
     def _allow(self, by: By) -> None:
         if self._session.latched and by is not By.OPERATOR:
             raise Stopped(LATCHED)
+
+
+def _only_asks(drive: Drive, text: str) -> bool:
+    guards = drive.family.guards
+    return guards is not None and guards.only_reads(text)
 
 
 def _only_reads(drive: Drive, text: str) -> bool:

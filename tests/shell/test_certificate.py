@@ -139,10 +139,10 @@ async def test_a_planted_deviation_is_found_by_its_question(tmp_path, family, qu
         before = await asked(cell, question.name)
         assert (before.unasked, before.unlike) == ({}, []), before
         (tmp_path / "r.toml").write_text(before.text())
-        assert not await compare(cell.session, drive, file)
+        assert not await compare(cell.session, drive, file, load(file))
         planted.begun = question.shows != BYTES or family == "tmcl"
         with contextlib.nullcontext() if planted.begun else other_bytes(question):
-            assert await compare(cell.session, drive, file)
+            assert await compare(cell.session, drive, file, load(file))
         assert cell.printed()[-1].startswith(f"{question.name}: here ")
 
 
@@ -349,9 +349,9 @@ async def test_a_report_has_no_serial_number_and_no_name_and_is_compared(cell, t
     few = load(file)
     few.answers = {name: few.answers[name] for name in ("echo-full", "checksum-echo", "division")}
     (tmp_path / "r.toml").write_text(few.text())
-    assert await compare(session, session.drive("w", "b"), file) is False
+    assert await compare(session, session.drive("w", "b"), file, load(file)) is False
     (tmp_path / "r.toml").write_text(few.text().replace('division = ["ok", "-3"]', 'division = ["ok", "-4"]'))
-    assert await compare(session, session.drive("w", "b"), file) is True
+    assert await compare(session, session.drive("w", "b"), file, load(file)) is True
     assert cell.printed()[-1] == f"division: here ok // -3; in {file} ok // -4"
 
 
@@ -383,9 +383,9 @@ async def test_a_report_of_another_family_is_refused_and_a_question_that_is_gone
     file = tmp_path / "r.toml"
     file.write_text('[drive]\nfamily = "mcode"\n[answers]\nbits = ["ok"]\n')
     with pytest.raises(Diagnostic, match="has answers of the family mcode"):
-        await compare(cell.session, cell.session.drive("w"), str(file))
+        await compare(cell.session, cell.session.drive("w"), str(file), load(str(file)))
     file.write_text('[drive]\nfamily = "pmx"\n[answers]\ngone = ["ok"]\n')
-    assert await compare(cell.session, cell.session.drive("w"), str(file)) is True
+    assert await compare(cell.session, cell.session.drive("w"), str(file), load(str(file))) is True
     assert cell.printed() == ["gone: not compared: no question to PMX-2ED-SA"]
 
 

@@ -55,7 +55,7 @@ def facts_of(view: View, bus: Bus, glance: Glance) -> Iterator[tuple[str, str]]:
     now = next(
         (axis.conditions for axis in readout.axes if axis.conditions is not None and axis.conditions.error), None
     )
-    failure, read = readout.failure, (f"error {drive.state.last_error}", drive.state.last_error_at)
+    failure, read = readout.failure, (f"error {drive.state.last_error}", drive.state.errors.at)
     if drive.state.last_error and (failure is None or failure[1] + 1.0 < read[1] < math.inf):
         failure = read
     for word, last, nothing in (

@@ -160,7 +160,7 @@ def facts(view: View, glance: Glance, drive: Drive) -> Iterator[tuple[str, str, 
     if lines and actions.error:
         yield "EF=1", "an error is set; its number is not read, as that clears it", "strong"
     if state.last_error:
-        yield "last error", f"{wall(state.last_error_at):%H:%M:%S}: {meaning(drive, state.last_error)}", "text"
+        yield "last error", f"{wall(state.errors.at):%H:%M:%S}: {meaning(drive, state.last_error)}", "text"
     elif actions.no_error and not lines:
         yield "error", actions.no_error.partition(";")[0], "dim"
     if glance.unreferenced:

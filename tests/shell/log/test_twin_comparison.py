@@ -107,7 +107,7 @@ async def test_a_difference_in_a_log_has_its_cause(
 
 
 async def test_typed_positions_are_compared_without_polls(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    lines = ("MR 16000", "/wait stopped", "/sleep 0.3", "PR P", "/sleep 0.3")
+    lines = ("MR 16000", "/wait ended", "/sleep 0.3", "PR P", "/sleep 0.3")
     log = await recorded(tmp_path, bus("press", encoder(world="stall_at = 20000")), *lines, polled=False)
     told = await replayed(tmp_path, log, bus("press", encoder()))
     assert "steps from the simulated drive since" in capsys.readouterr().out
