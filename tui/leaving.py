@@ -41,11 +41,14 @@ class Leaving:
     _warn: Callable[[str], None]
     over: bool = False
     """The app ends."""
+    undecided: bool = False
+    """A quit was asked for, and it is neither decided nor is its question shown: keys wait."""
     _deciding: bool = False
 
     def key(self) -> None:
         """Quit on the key. Later keys wait until that is decided, or its question has the focus; frames do not."""
         if not (self._deciding or self.over):
+            self.undecided = True
             self._keyboard.hold(self)
             self._app.run_worker(self._quit())
 
@@ -58,16 +61,17 @@ class Leaving:
         if self._deciding:
             return False
         if isinstance(self._app.screen, Confirm):
+            self.undecided = False
             self._keyboard.release(self)
             return False
-        self._deciding = True
+        self._deciding = self.undecided = True
         self._keyboard.hold(self)
         self._outbox.pause()
         accepted = False
         try:
             accepted = await self._decide()
         finally:
-            self._deciding = False
+            self._deciding = self.undecided = False
             if accepted:
                 self.accept()
                 self._app.exit(0)
@@ -93,6 +97,7 @@ class Leaving:
 
     def _shown(self) -> None:
         """Let keys answer the question, which has the focus now."""
+        self.undecided = False
         self._keyboard.release(self)
 
     def accept(self) -> None:

@@ -43,7 +43,7 @@ class PtyScreen:
     def at_rest(self) -> bool:
         """True if everything written has been done."""
         app, keys = self.app, driver_of(self.app).keys
-        done = app.keyboard.idle and app.outbox.idle and not app.message_queue_size
+        done = app.keyboard.idle and app.outbox.idle and not app.message_queue_size and not app.leaving.undecided
         return bool(self.taken >= self.written and keys.idle and done)
 
     def write(self, data: bytes) -> None:

@@ -185,7 +185,7 @@ def test_every_dialog_is_planted() -> None:
     assert {each for each in subclasses(dialogs.Over) if each is not dialogs.Dialog} == {*DIALOGS}
 
 
-@pytest.mark.parametrize("part", ["compose", "on_mount"])
+@pytest.mark.parametrize("part", ["compose", "begin"])
 async def test_a_defect_in_any_dialog_is_shown_in_its_place(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, part: str
 ) -> None:

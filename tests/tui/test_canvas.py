@@ -17,7 +17,6 @@ from textual.strip import Strip
 
 from multidrop.tui.app import MultidropApp
 from multidrop.tui.terminal.canvas import Canvas, FrontCompositor, Pens, pieces_of
-from multidrop.tui.widgets.transcript import Transcript
 from tests.support.fake_session import demo_session, make_app, press, settle
 
 WIDTH, HEIGHT = 30, 8
@@ -250,8 +249,8 @@ async def test_a_widget_whose_rows_are_not_painted_is_not_rendered(monkeypatch: 
     app, rendered = make_app(demo_session()), []
     async with app.run_test(size=(120, 40)) as pilot:
         await settle(pilot)
-        render = Transcript.render_lines
-        monkeypatch.setattr(Transcript, "render_lines", lambda self, crop: (rendered.append(1), render(self, crop))[1])
+        render = app.main.transcript.render_lines
+        monkeypatch.setattr(app.main.transcript, "render_lines", lambda crop: (rendered.append(1), render(crop))[1])
         picture(app, FrontCompositor, app.screen.size.region, {0, 39})
         assert rendered == []
         picture(app, FrontCompositor, app.screen.size.region, {5})

@@ -101,7 +101,7 @@ async def pressed(app: MultidropApp, key: str) -> None:
     """Press a key, and let it do what it does."""
     app.post_message(events.Key(key, key if len(key) == 1 else None))
     for _ in range(2000):
-        if app.keyboard.idle:
+        if app.keyboard.idle and not app.leaving.undecided:
             return
         await asyncio.sleep(0)
 

@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from textual import constants
 
 from multidrop.tui.app import MultidropApp
+from multidrop.tui.terminal import keyboard
 from multidrop.tui.widgets.entry import Draft
 from multidrop.tui.widgets.lines import width_of
 from tests.support.examples import examples
@@ -61,6 +62,10 @@ class Bench:
         session.busy, session.latched, session.recording, session.stops = busy, False, "", 0
         session.time += 1  # a key pressed again is no held key
         app._stops = 0
+        app.leaving.over = app.keyboard._closed = app.outbox._closed = session.quitting = (
+            False  # no exit is carried out
+        )
+        app.keyboard._deaf_until = 0.0
         app.selection.follow()
         app.main.take_lines()
         app.outbox.drop()
@@ -112,9 +117,11 @@ class Bench:
 def bench() -> Iterator[Bench]:
     before = constants.ESCAPE_DELAY
     constants.ESCAPE_DELAY = 60.0  # type: ignore[misc]  # a busy machine makes no Escape of a divided sequence
+    pause, keyboard.PAUSE = keyboard.PAUSE, 1e6  # nor a pause after a question
     made = Bench()
     yield made
     made.close()
+    keyboard.PAUSE = pause
     constants.ESCAPE_DELAY = before  # type: ignore[misc]
 
 

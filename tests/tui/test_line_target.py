@@ -233,7 +233,10 @@ async def test_to_quit_right_behind_the_enter_that_opens_a_bus_is_to_quit() -> N
 
 
 @pytest.mark.parametrize("opened", [b"\x0f", b"\x1bOP", b"\x11"], ids=["selector", "help", "quit"])
-async def test_a_paste_into_what_takes_no_text_is_not_asked_about_later(opened: bytes) -> None:
+async def test_a_paste_into_what_takes_no_text_is_not_asked_about_later(
+    opened: bytes, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("multidrop.tui.terminal.keyboard.PAUSE", 0.0)
     session = demo_session()
     session.busy = True
     async with demo(session) as (screen, _, _):

@@ -83,6 +83,8 @@ async def test_it_stops_under_the_questions_too() -> None:
     session.busy = True
     async with on_screen(session) as (pilot, app, _):
         await pilot.press("ctrl+q")
+        while app.leaving.undecided:
+            await pilot.pause()
         assert isinstance(app.screen, Confirm)
         await pilot.press("ctrl+x")
         assert session.stops == 1

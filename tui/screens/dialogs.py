@@ -109,9 +109,13 @@ class Over(Keyed, ModalScreen[T], Generic[T]):
             keys.update(f"{self.hint}{f'   ▼ {rows} below' if rows > 0 else ''}" if self.hint else keys.content)
 
     def on_mount(self) -> None:
-        if self.is_attached:  # else it is closed already, as the app ends
+        if self.is_attached:  # else it is closed already, by a stop or as the app ends
             self.mount(StopSign())
             self.tell(self.told)
+            self.begin()
+
+    def begin(self) -> None:
+        """Fill in what the box shows, and give the focus to a part of it. Its parts are there."""
 
     def tell(self, text: str) -> None:
         """Tell in the box what became of a key; an empty text removes that."""
@@ -144,7 +148,7 @@ class Ask(Dialog[str]):
             yield Field(self._entered, self.value)
             yield Hint(self.hint)
 
-    def on_mount(self) -> None:
+    def begin(self) -> None:
         self.set_focus(self.query_one(Field))
 
     def _entered(self, text: str) -> None:
@@ -173,7 +177,7 @@ class Confirm(Dialog[str]):
             yield Options([text for _, text in self.answers], self._taken)
             yield Hint(hint("answers"))
 
-    def on_mount(self) -> None:
+    def begin(self) -> None:
         self.query_one(Options).highlighted = 0
         self.set_focus(self.query_one(Options))
 
@@ -214,7 +218,7 @@ class GoOn(Dialog[bool]):
         for box in self.query(".box"):
             self._room(box.outer_size.height + 1)
 
-    def on_mount(self) -> None:
+    def begin(self) -> None:
         self.query_one(Options).highlighted = 0
         self.set_focus(self.query_one(Options))
 
@@ -259,7 +263,7 @@ class Search(Dialog[str]):
             yield options
             yield Hint(self.hint)
 
-    def on_mount(self) -> None:
+    def begin(self) -> None:
         self.set_focus(self.query_one(Field))
         self._narrow("")
 
@@ -363,7 +367,7 @@ class Form(Dialog[dict[str, str]]):
             yield Static("", id="wrong", markup=False)
             yield Hint(hint("form"))
 
-    def on_mount(self) -> None:
+    def begin(self) -> None:
         needed = [number for number, each in enumerate(self.wanted) if each.default is None]
         self._go(needed[0] if needed else 0)
 

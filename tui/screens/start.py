@@ -75,7 +75,7 @@ class Start(Over[None]):
             self.hint = hint("start").replace("Esc close", "^Q quit" if self.only else "Esc close")
             yield Hint(self.hint)
 
-    def on_mount(self) -> None:
+    def begin(self) -> None:
         """Show what is known at once; add the ports when they are found."""
         self._fill()
         self.set_focus(self.query_one(Field))
