@@ -449,6 +449,8 @@ def merged(pending: Sequence[StopPiece], added: Sequence[StopPiece], keep: bool 
     So stops in quick succession go round, and do not begin with the first drive each time. `keep`: the new stop is for
     some drives alone, and the pieces for others stay.
     """
+    if not pending:
+        return [*added]
     before, again = divided(pending)
     soon, late = divided(added)
     first = [each for each in before if _taken_from(soon, each) or keep]
@@ -458,8 +460,10 @@ def merged(pending: Sequence[StopPiece], added: Sequence[StopPiece], keep: bool 
 
 def divided(pieces: Sequence[StopPiece]) -> tuple[list[StopPiece], list[StopPiece]]:
     """Pieces before and behind the pause of a stop."""
-    at = next((at for at, each in enumerate(pieces) if each.quiet > PAUSE), len(pieces))
-    return [*pieces[:at]], [*pieces[at:]]
+    for at, each in enumerate(pieces):
+        if each.quiet > PAUSE:
+            return [*pieces[:at]], [*pieces[at:]]
+    return [*pieces], []
 
 
 def _taken_from(added: list[StopPiece], piece: StopPiece) -> bool:

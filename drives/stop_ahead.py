@@ -90,7 +90,8 @@ class StopAhead:
         """Write the stop, or move on the one that is on its way. Does nothing where the transport cannot do that."""
         forms, transport = self._forms(), self._link.transport
         self._last = forms
-        if not transport.follow(partial(self._again, forms), key=True):
+        on_its_way = self._begun is not None or self._link.line.only_stop  # else the lock need not be asked for
+        if not (on_its_way and transport.follow(partial(self._again, forms), key=True)):
             transport.preempt(forms.framed, partial(self._begin, forms))
         self._pace()
 

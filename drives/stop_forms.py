@@ -84,8 +84,9 @@ def stop_forms(roster: Roster, only: Iterable[Drive] | None = None) -> StopForms
                 invalidate.append(harmless)
         if failed:
             missed += drives
-    by_turns = (each for pieces in zip_longest(*soon) for each in pieces if each is not None)
-    repeats = (*by_turns, *late, *(roster.sweep if only is None else ()))
+    if len(soon) > 1:
+        soon = [[each for pieces in zip_longest(*soon) for each in pieces if each is not None]]
+    repeats = (*(soon[0] if soon else ()), *late, *(roster.sweep if only is None else ()))
     joined = b"".join
     return StopForms(joined(immediate), joined(unterminated), repeats, joined(invalidate), framed, tuple(missed), gap)
 

@@ -228,7 +228,8 @@ class DescriptorPipe(Pipe):
                 self._preempted += key
                 self._pending += [memoryview(data)] if data else ()
                 problem = self._push()
-        self._loop.call_soon_threadsafe(self._after_push, problem)
+        if data is not None or problem is not None:
+            self._loop.call_soon_threadsafe(self._after_push, problem)
         return data is not None
 
     def yielded(self, note: Callable[[bool], None] = lambda last: None) -> bool:
