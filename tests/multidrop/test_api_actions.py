@@ -10,7 +10,17 @@ from typing import Any
 
 import pytest
 
-from multidrop import AsyncSession, Diagnostic, DriveError, Fault, Inexpressible, Limits, Timeout, connect_async
+from multidrop import (
+    AsyncSession,
+    Diagnostic,
+    DriveError,
+    Fault,
+    Inexpressible,
+    Limits,
+    MotionFailed,
+    Timeout,
+    connect_async,
+)
 from multidrop.drives.events import Traffic
 from multidrop.shell.events import OnBus
 from tests.support.cell_session import bus, drive, pmx
@@ -146,7 +156,8 @@ async def test_an_error_is_known_and_only_one_call_clears_it(family: str, sessio
     assert await a.error() is None and await a.read_error() is None
     if family == "pmx":
         await a.run_at(-20000)
-        await a.wait()
+        with pytest.raises(MotionFailed, match="minus limit"):
+            await a.wait()
         fault = await a.error()
         assert fault is not None and "limit" in fault.text
         assert await a.error() == fault == await a.read_error()

@@ -25,7 +25,7 @@ def cell(tmp_path_factory):
 def test_two_controllers_on_a_pty(cell):
     done = cell.run(
         "send", "./stages.tty?dialect=pmx&drives=00,07",
-        "HSPD=5000", "X1000", "@07 HSPD=5000", "@07 JX+", "/wait stopped", "PX", "@07 PX", "@07 MSTX", "/status 07",
+        "HSPD=5000", "X1000", "@07 HSPD=5000", "@07 JX+", "/wait ended", "PX", "@07 PX", "@07 MSTX", "/status 07",
         "@07 CLRX", "@* STOP",
     )  # fmt: skip
     assert done.returncode == 0, done.stderr

@@ -133,14 +133,15 @@ async def test_a_drive_that_does_not_obey_its_own_stop_gets_that_of_the_line(tmp
         assert [text for text in shop.warned() if text.startswith("stop sent to a and any other drive on this line: ")]
 
 
-async def test_a_silent_drive_has_an_unknown_fate_and_is_stopped(tmp_path):
+async def test_a_line_that_waited_for_a_silent_drive_was_not_sent_and_stops_nothing(tmp_path):
     async with CellSession(tmp_path, press()) as shop:
         await typed(shop.session, "@press:b SL 50000", "@press:a PR P")
         shop.world("/sim power a off")
         shop.events.clear()
-        with pytest.raises(NoAnswer):
+        with pytest.raises(NoAnswer, match="'SL 50000' was not sent"):
             await sent(shop.session, "@press:a SL 50000")
-        assert b"\x1b" in shop.written("press") and shop.moving() == set()
+        assert b"SL 50000" not in shop.written("press") and b"\x1b" not in shop.written("press")
+        assert shop.moving() == {"press:b"}
 
 
 async def test_a_routine_for_errors_that_moves_the_drive_is_stopped(tmp_path):

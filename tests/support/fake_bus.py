@@ -7,6 +7,7 @@ from multidrop.dialects import Motion
 from multidrop.dialects.families import DEFAULT, FAMILIES
 from multidrop.dialects.mcode.host.codec import MCode
 from multidrop.dialects.mcode.host.state import MCodeState
+from multidrop.drives.motion_record import MotionRecord
 from multidrop.drives.stopping import Halt
 
 
@@ -22,13 +23,25 @@ class FakeDrive:
     family: object = FAMILIES[DEFAULT]
     state: object = field(default_factory=lambda: MCodeState(MCode()))
 
-    seen = running = None
-    commands = starting = stops = 0
+    seen = running = noted = None
+    commands = requests = starting = stops = 0
+    missing = transferring = False
     started_at = commanded_at = float("-inf")
+
+    def __post_init__(self):
+        self.motions = MotionRecord()
 
     @property
     def link(self):
         return self.bus
+
+    @property
+    def codec(self):
+        return self.state.codec
+
+    @property
+    def recipients(self):
+        return [self]
 
     def check_line(self, text):
         pass
@@ -60,6 +73,9 @@ class FakeBus:
     @property
     def all_drives(self):
         return list(self.drives.values())
+
+    def stamp(self):
+        return asyncio.get_running_loop().time()
 
     def watch(self, watcher):
         return lambda: None

@@ -115,7 +115,7 @@ async def test_typed_positions_are_compared_without_polls(tmp_path: Path, capsys
 
 
 async def test_a_first_position_after_a_motion_is_compared(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    log = await recorded(tmp_path, bus("press", encoder()), "MR 16000", "/wait stopped", "PR P", polled=False)
+    log = await recorded(tmp_path, bus("press", encoder()), "MR 16000", "/wait ended", "PR P", polled=False)
     told = await replayed(tmp_path, log, bus("press", encoder(world="stall_at = 20000")), as_json=True)
     found = [json.loads(each) for each in capsys.readouterr().out.splitlines()]
     (diverged,), summary = [each for each in found if "diverged" in each], found[-1]

@@ -70,7 +70,7 @@ async def test_a_copy_is_on_no_key(session: Session, folder: Path) -> None:
 
 async def test_a_note_is_changed_and_nothing_else(session: Session, folder: Path) -> None:
     await run(session, """/macro describe m it's "the press" ä""".replace("it's", "its"))
-    assert (folder / "m.toml").read_text(encoding="utf-8") == HAND.replace("'to and fro'", '"its the press ä"')
+    assert (folder / "m.toml").read_text(encoding="utf-8") == HAND.replace("'to and fro'", r'"its \"the press\" ä"')
 
 
 async def test_a_macro_beside_the_project_hides_the_users(session: Session, folder: Path) -> None:

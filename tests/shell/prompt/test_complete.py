@@ -217,7 +217,7 @@ def test_a_usage_is_read_as_its_forms(usage, lines):
         ("/sim power b o", "/sim power DRIVE on|off   switch the whole drive on or off"),
         ("/sim p", "/sim push DRIVE STEPS | power DRIVE on|off | plug BUS   Act"),
         ("/sim shake", f"{VERBS['/sim'].usage}   Act"),
-        ("/wait idle", "/wait stopped|idle [SECONDS]   until all drives stand and no program runs"),
+        ("/wait idle", "/wait stopped|idle|ended [SECONDS]   the same, and no program is running"),
         ("/record ", "/record [MACRO [--replace] | stop [--waits]]"),
     ],
 )
