@@ -74,8 +74,10 @@ class FakeBus:
     def all_drives(self):
         return list(self.drives.values())
 
-    def stamp(self):
+    def now(self):
         return asyncio.get_running_loop().time()
+
+    stamp = now
 
     def watch(self, watcher):
         return lambda: None
