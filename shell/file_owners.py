@@ -9,29 +9,29 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
-if sys.platform != "win32":
+if sys.platform == "win32":
+
+    def other_writer(path: Path) -> str:
+        """Who else can change a file, in words; empty: no one, as the profile of a user is private there."""
+        return ""
+
+else:
     import grp
     import pwd
 
-
-def other_writer(path: Path) -> str:
-    """Who else can change a file, or put another one in its place, in words; empty: only its owner and root can."""
-    if sys.platform == "win32":
-        return ""  # the profile of a user is private there
-    for each in (path, path.parent):
-        state = os.stat(each)
-        if state.st_uid not in (0, os.geteuid()):
-            return f"account {_name(pwd.getpwuid, state.st_uid)}, who owns {each}"
-        if state.st_mode & stat.S_ISVTX:  # as /tmp: a file there is its owner's
-            continue
-        if state.st_mode & stat.S_IWOTH:
-            return f"every account (mode {stat.S_IMODE(state.st_mode):o} of {each})"
-        if state.st_mode & stat.S_IWGRP and (group := _shared_group(state.st_gid)):
-            return f"group {group} (mode {stat.S_IMODE(state.st_mode):o} of {each})"
-    return ""
-
-
-if sys.platform != "win32":
+    def other_writer(path: Path) -> str:
+        """Who else can change a file, or put another one in its place, in words; empty: only its owner and root can."""
+        for each in (path, path.parent):
+            state = os.stat(each)
+            if state.st_uid not in (0, os.geteuid()):
+                return f"account {_name(pwd.getpwuid, state.st_uid)}, who owns {each}"
+            if state.st_mode & stat.S_ISVTX:  # as /tmp: a file there is its owner's
+                continue
+            if state.st_mode & stat.S_IWOTH:
+                return f"every account (mode {stat.S_IMODE(state.st_mode):o} of {each})"
+            if state.st_mode & stat.S_IWGRP and (group := _shared_group(state.st_gid)):
+                return f"group {group} (mode {stat.S_IMODE(state.st_mode):o} of {each})"
+        return ""
 
     def _shared_group(number: int) -> str:
         """The name of a group unless this account alone is in it, as in a group of its own; empty: it is alone."""
