@@ -30,6 +30,8 @@ pytestmark = [pytest.mark.pty, pytest.mark.slow]
 HELD_UP = 4.0
 """How long the loop is held up, s: longer than the whole stop of each line takes."""
 SECOND = 1.0
+LATE = 0.005
+"""How much later than its clock was read a thread writes on a busy computer, s; in virtual time the gaps are exact."""
 REPEAT = 1 / 30
 CELL = (
     bus("carousel", *(pmx(number) for number in ("01", "02", "03")), serve=TCP)
@@ -75,8 +77,9 @@ class Plant:
         left, write = self.left.setdefault(name, []), transport._endpoint.write
 
         def noted(data: bytes | memoryview) -> int:
+            at = time.monotonic()  # before the call, behind which this thread may wait for its turn
             taken = int(write(data))
-            left.append((time.monotonic(), bytes(data[:taken])))
+            left.append((at, bytes(data[:taken])))
             return taken
 
         transport._endpoint.write = noted
@@ -141,7 +144,7 @@ async def test_every_drive_of_every_line_is_sent_its_stop_while_the_loop_does_no
             writes = [(at, data) for at, data in plant.left[name] if at <= begin + HELD_UP]
             if forms.gap:
                 gaps = [after - at for (at, _), (after, _) in zip(writes, writes[1:], strict=False)]
-                assert min(gaps) >= forms.gap, f"{name}: replies would collide"
+                assert min(gaps) >= forms.gap - LATE, f"{name}: replies would collide"
                 if keys == 1:
                     assert [data for _, data in writes] == [forms.immediate, *(each.data for each in forms.repeats)]
         await until(lambda: len(stops) == keys)
