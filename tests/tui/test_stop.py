@@ -78,7 +78,8 @@ async def stopped_from(pilot: Pilot[int], app: MultidropApp, name: str) -> None:
 
 
 @pytest.mark.tui
-async def test_it_stops_under_the_questions_too() -> None:
+async def test_it_stops_under_the_questions_too(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("multidrop.tui.terminal.keyboard.PAUSE", 0.0)
     session = demo_session()
     session.busy = True
     async with on_screen(session) as (pilot, app, _):
