@@ -116,6 +116,8 @@ class Access(Generic[S]):
     """Read ER, which clears it; None: it could not be read."""
     handles_errors: Callable[[S], Procedure[bool]]
     """Whether the program in the drive has an OE routine."""
+    check: Callable[[S, str], object] = lambda state, text: None
+    """Raise Inexpressible for a line that no frame can carry, before anything is asked for it."""
 
 
 def motions(access: Access[S]) -> Motions[S]:
@@ -141,7 +143,15 @@ def motions(access: Access[S]) -> Motions[S]:
     def judge(state: S, axis: str, evidence: Evidence) -> Procedure[Ending | None]:
         return (yield from _judge(access, state, evidence))
 
-    return Motions(effect=effect, signs=signs, old=old, place=_place, judge=judge, fails=errors.BY_ITSELF.__contains__)
+    def effect_of(state: S, text: str) -> Effect:
+        found = effect(state, text)
+        if found.begins:
+            access.check(state, text)
+        return found
+
+    return Motions(
+        effect=effect_of, signs=signs, old=old, place=_place, judge=judge, fails=errors.BY_ITSELF.__contains__
+    )
 
 
 def _place(found: Signs, axis: str) -> int | None:
@@ -257,4 +267,8 @@ def _handles_errors(state: MCodeState) -> Procedure[bool]:
     return any(re.search(r"(?<![\w\"])OE\b", line, re.I) for line in lines)
 
 
-MOTIONS = motions(Access(_values, exchange.read_error, _handles_errors))
+def _check(state: MCodeState, text: str) -> None:
+    state.codec.encode(state.codec.request(state.address, text))
+
+
+MOTIONS = motions(Access(_values, exchange.read_error, _handles_errors, _check))

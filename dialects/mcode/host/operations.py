@@ -303,14 +303,13 @@ def perform(state: MCodeState, text: str) -> Procedure[tuple[str, ...]]:
 
 
 def check(state: MCodeState, text: str) -> None:
-    """Raise Inexpressible for a line with a number in groups of digits, a comment, or what cannot be sent."""
+    """Raise Inexpressible for a line with a number in groups of digits, or with a comment."""
     try:
         grammar.check_groups(text)
     except grammar.LineError as error:
         raise Inexpressible(f"'{text}': {error.why}; nothing was sent") from None
     if why := commented(text):
         raise Inexpressible(f"'{text}': {why}")
-    state.codec.encode(state.codec.request(state.address, text))  # raises for what no frame can carry
 
 
 def immediate(state: MCodeState, request: Request) -> Procedure[tuple[str, ...]]:

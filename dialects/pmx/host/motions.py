@@ -13,6 +13,7 @@ import re
 from dataclasses import replace
 
 from multidrop.dialects.codec import Procedure
+from multidrop.dialects.family import ADDRESSES
 from multidrop.dialects.motions import NOTHING, Effect, Ending, Evidence, Motions, Move, MoveKind, Outcome, Signs
 from multidrop.dialects.pmx.host.codec import PmxState
 from multidrop.dialects.pmx.host.operations import PROGRAMS, number, who
@@ -46,8 +47,14 @@ FAILED_PROGRAM = 4
 
 
 def effect(state: PmxState, text: str) -> Effect:
-    """What a typed command does to the motions of its controller."""
-    line = text.strip()
+    """What a typed command does to the motions of its controller. Raises Inexpressible for what no frame can carry."""
+    found = _effect(text.strip())
+    if found.begins and state.address not in ADDRESSES:
+        state.codec.encode(state.codec.request(state.address, text))  # before anything is asked for it
+    return found
+
+
+def _effect(line: str) -> Effect:
     if (found := PLACE.fullmatch(line)) is not None:
         targets = zip("xyxy", found.groups(), strict=True)
         moves = [Move(MoveKind.POSITION, axis, relative=int(value)) for axis, value in targets if value is not None]

@@ -111,7 +111,6 @@ def check(known: PmxState, text: str) -> None:
         wrong = "; begins a comment, which only program files have; leave it out"
     if wrong:
         raise Inexpressible(f"'{text}': {wrong}; nothing was sent")
-    known.codec.encode(known.codec.request(known.address, text))  # raises for what no frame can carry
 
 
 def motion(known: PmxState, priority: Priority) -> Procedure[tuple[Motion, ...]]:
