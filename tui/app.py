@@ -217,6 +217,7 @@ class MultidropApp(Dressed):
         """Drop what was typed before a stop, from whatever source the stop came."""
         self.unsent.stopped(self.main.entry.unsent if self.focused is self.main.entry else None)
         self.outbox.drop()
+        self.keyboard.hear()
         if asyncio.current_task() is self._own_task:
             self._cancel()  # a key stopped: the keys that wait were typed after it
             return

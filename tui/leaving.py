@@ -50,14 +50,18 @@ class Leaving:
         if not (self._deciding or self.over):
             self.undecided = True
             self._keyboard.hold(self)
-            self._app.run_worker(self._quit())
+            self._app.run_worker(self._quit(self._session.stops))
 
-    async def _quit(self) -> None:
-        if await self.ask():
+    async def _quit(self, stops: int) -> None:
+        if await self.ask(stops):
             self._session.quit()
 
-    async def ask(self) -> bool:
-        """Return True if the app may end; nothing that is typed is sent from then on."""
+    async def ask(self, stops: int | None = None) -> bool:
+        """Return True if the app may end; nothing that is typed is sent from then on.
+
+        `stops` is the session's count as the quit was asked for, if that was before: a later stop cancels it.
+        """
+        stops = self._session.stops if stops is None else stops
         if self._deciding:
             return False
         if isinstance(self._app.screen, Confirm):
@@ -69,7 +73,7 @@ class Leaving:
         self._outbox.pause()
         accepted = False
         try:
-            accepted = await self._decide()
+            accepted = await self._decide(stops)
         finally:
             self._deciding = self.undecided = False
             if accepted:
@@ -83,10 +87,11 @@ class Leaving:
                     self._warn(text)
         return accepted
 
-    async def _decide(self) -> bool:
-        lines, answers = unfinished(
-            self._session, await self._session.in_motion(), self._outbox.waiting, self._unsaved()
-        )
+    async def _decide(self, stops: int) -> bool:
+        moving = await self._session.in_motion()
+        if self._session.stops != stops:
+            return False
+        lines, answers = unfinished(self._session, moving, self._outbox.waiting, self._unsaved())
         if not lines:
             self._keyboard.drop()
             return True

@@ -220,3 +220,28 @@ async def test_keys_wait_while_a_quit_is_decided_whatever_their_reads() -> None:
         await screen.until(lambda: screen.exits == [0])
         assert session.sent == []
         assert screen.app.leaving.named()[0] == "not sent, as multidrop is ending: SL 200000"
+
+
+async def test_a_stop_cancels_a_quit_that_is_being_decided_and_what_is_typed_after_it_counts() -> None:
+    session = Closing(*demo_session().buses.values())
+    session.asked, session.busy = asyncio.Event(), True
+    async with demo(session) as (screen, _, _):
+        screen.write(b"\x11")
+        await screen.read_all()
+        screen.write(b"SL 2")
+        await screen.read_all()
+        screen.write(b"\x18PR P\r")
+        await screen.until(lambda: session.stops == 1)
+        session.asked.set()
+        await screen.rest()
+        assert (screen.app.screen, screen.exits) == (screen.app.main, [])
+        assert session.sent == ["press:a PR P"]
+
+
+async def test_keys_count_at_once_behind_a_stop_that_closed_the_question_of_a_quit() -> None:
+    async with demo() as (screen, session, _):
+        session.busy = True
+        screen.write(b"\x11")
+        await screen.until(lambda: isinstance(screen.app.screen, Confirm))
+        await screen.type(b"\x18PR P\r")
+        assert (session.stops, session.sent, screen.exits) == (1, ["press:a PR P"], [])

@@ -133,6 +133,10 @@ class Keyboard:
         if len(self._waiting) < len(waited):
             self._not_heard()
 
+    def hear(self) -> None:
+        """Let keys count at once: a stop closed what had appeared under them."""
+        self._deaf_until = 0.0
+
     def _not_heard(self) -> bool:
         if time.monotonic() >= self._deaf_until:
             return False
