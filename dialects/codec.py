@@ -100,6 +100,8 @@ class Reply:
     """The damage, for DAMAGED."""
     raw: bytes = b""
     """The bytes of the reply; set by the line."""
+    took: float = 0.0
+    """The time from the last byte of the request to the end of its reply, s; set by the line."""
     body: bytes = b""
     """The reply's content where it is binary."""
     flagged: bool = False

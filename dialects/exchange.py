@@ -14,6 +14,7 @@ from typing import Generic, TypeVar
 from multidrop.dialects.codec import End, Kind, Procedure, Reply, Request
 from multidrop.dialects.errors import NoAnswer, Refused, Stopped
 from multidrop.dialects.state import DriveState
+from multidrop.dialects.text import visible
 
 S = TypeVar("S", bound=DriveState)
 T = TypeVar("T")
@@ -85,6 +86,43 @@ def unsent_if_stopped(who: str, request: Request, steps: Procedure[T]) -> Proced
         return (yield from steps)
     except Stopped:
         raise Stopped(f"{who}: stopped; '{request.text}' was not sent") from None
+
+
+LONGEST = 6.0
+"""The longest time, s, for which a drive is looked for in what comes without a pause."""
+SHOWN = 40
+"""Most characters that are shown of that."""
+
+
+def limited(who: str, text: str, fate: str, steps: Procedure[T], longest: float = LONGEST) -> Procedure[T]:
+    """Look for a drive, as long as silence lasts, but not in endless bytes. Raises NoAnswer, which says what came.
+
+    `text`: the line that waits for it; `fate`: what has become of that line.
+    """
+    spent, heard = 0.0, b""
+    try:
+        asked = next(steps)
+        while True:
+            try:
+                if spent > longest:
+                    raise NoAnswer(f"{who} was looked for in {spent:.0f} s of other bytes: '{text}' {fate}")
+                reply = yield asked
+                if reply.raw:
+                    spent, heard = spent + reply.took, reply.raw
+            except GeneratorExit:
+                steps.close()
+                raise
+            except BaseException as error:
+                asked = steps.throw(error)
+            else:
+                asked = steps.send(reply)
+    except StopIteration as end:
+        result: T = end.value
+        return result
+    except NoAnswer as error:
+        if came := visible(heard[:SHOWN].decode("latin-1").strip()):
+            raise NoAnswer(f"{error}; what came is no reply ('{came}'): check dialect, baud and the line") from None
+        raise
 
 
 def unanswered(who: str, request: Request, reply: Reply | None = None) -> NoAnswer:

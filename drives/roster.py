@@ -29,6 +29,10 @@ from multidrop.transports import TransportLost
 
 SLOW = 1.0
 """The time that a slow drive gets to reply before its silence is given a cause, s."""
+OPENING, OPENING_PLACE, REPAIRS, SLOW_BAUD = 8.0, 4.0, 60.0, 4800
+"""The time limit of a search, s: for itself, for each address, for what is owed to drives; at this baud rate and above
+with a timeout of 1 s."""
+NEVER_OVER = "nothing that came is a reply"
 PAUSE = 0.25
 """Seconds between two looks at a line that is away, or at a drive that homes."""
 BOOT = 1.0
@@ -275,7 +279,11 @@ class Roster:
         unknown = family.new_state(family.codec, "")
         with self.link.received() as heard:
             try:
-                return await self.conversations.run(family.identify(hints), unknown, searching=True)
+                async with asyncio.timeout(limit := self._limit(hints)):
+                    return await self.conversations.run(family.identify(hints), unknown, searching=True)
+            except TimeoutError:
+                came = seen(bytes(heard), family.name)
+                raise NoAnswer(f"no drive could be identified within {limit:.0f} s; {came or NEVER_OVER}") from None
             except NoAnswer as error:
                 if came := seen(bytes(heard), family.name):
                     raise NoAnswer(f"{error}; {came}") from None
@@ -283,6 +291,12 @@ class Roster:
                     raise
                 await asyncio.sleep(SLOW)
                 raise silent(error, self.link, family) from None
+
+    def _limit(self, hints: Hints) -> float:
+        """The longest time of a search, s: a device that sends all the time is asked no longer. Repairs take theirs."""
+        line, places = self.link.line, max(1, len(self.probing))
+        slow = max(1.0, line.timeout, SLOW_BAUD / line.baud if line.baud else 1.0)
+        return slow * (OPENING + OPENING_PLACE * places) + (REPAIRS if hints.cut or hints.owed else 0.0)
 
     async def search_again(self, hints: Hints) -> list[DriveState]:
         """Search where the drives were before the loss, then where they were at first. Raises as `search`."""

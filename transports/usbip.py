@@ -103,12 +103,15 @@ class Malformed(ValueError):
 
 
 class Transfers:
-    """Reads the messages of one side. `wanted`: the numbers of transfers that bring data to the host."""
+    """Reads the messages of one side.
+
+    `asked`: what a client waits for, by number, and the most bytes that each answer may bring it.
+    """
 
     def __init__(self, answers: bool) -> None:
         self._answers = answers
         self._buffer = bytearray()
-        self.wanted: set[int] = set()
+        self.asked: dict[int, int] = {}
 
     def feed(self, data: bytes) -> Iterator[Transfer]:
         """Take bytes; yield whole messages. Raises Malformed."""
@@ -134,14 +137,17 @@ class Transfers:
             (unlinked,) = struct.unpack_from(">I", rest)
         else:
             status, length, *_ = _RETURNED.unpack(rest)
-            size = length if kind == RET_SUBMIT and number in self.wanted else 0
-            if not 0 <= size <= 1 << 20:
-                raise Malformed(f"a transfer of {length} bytes")
+            if number not in self.asked:
+                raise Malformed(f"the server answers transfer {number}, which was not asked for")
+            most = self.asked.get(number, 0)
+            size = length if most and kind == RET_SUBMIT else 0
+            if not 0 <= size <= most:
+                raise Malformed(f"the server answers {length} bytes where {most} were asked for")
         if len(self._buffer) < _HEADER.size + size:
             return None
         data = bytes(self._buffer[_HEADER.size : _HEADER.size + size])
         del self._buffer[: _HEADER.size + size]
-        self.wanted.discard(number)
+        self.asked.pop(number, None)
         return Transfer(kind, number, endpoint | direction << 7, status, length, setup, data, unlinked)
 
 
@@ -248,6 +254,7 @@ class UsbipCarrier:
         with self._guard, contextlib.suppress(OSError):
             self._last += 1
             self._cancelled[self._last] = number
+            self._messages.asked[self._last] = 0
             self._write(Transfer(UNLINK, self._last, unlinked=number))
 
     def halt(self) -> None:
@@ -262,9 +269,8 @@ class UsbipCarrier:
     def _submit(self, endpoint: int, setup: bytes = bytes(8), data: bytes = b"") -> int:
         with self._guard:
             self._last += 1
-            if endpoint & 0x80:
-                self._messages.wanted.add(self._last)
             length = PACKET if endpoint & 0x80 else len(data)
+            self._messages.asked[self._last] = length if endpoint & 0x80 else 0
             self._write(Transfer(SUBMIT, self._last, endpoint, length=length, setup=setup, data=data))
             return self._last
 
@@ -297,8 +303,9 @@ class UsbipCarrier:
                     elif each.kind == RET_SUBMIT:
                         self._done(each.number, each.status, each.data)
                     elif (number := self._cancelled.pop(each.number, 0)) and each.status:  # 0: it had ended before
-                        self._messages.wanted.discard(number)
+                        self._messages.asked.pop(number, None)
                         self._done(number, each.status, b"")
+                await asyncio.sleep(0)  # a server that sends without a pause does not hold up the loop
             self._broken(None)
         except Malformed as error:
             self._broken(OSError(errno.EPROTO, str(error)))

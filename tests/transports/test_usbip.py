@@ -79,13 +79,13 @@ def test_what_a_host_sends_is_read_in_any_pieces(sent: list[Transfer], size: int
 def test_answers_are_read_in_any_pieces(answers: list[tuple[bool, bytes]], size: int) -> None:
     """Only those to transfers that bring data have any after the header; the header does not say which these are."""
     messages = Transfers(answers=True)
-    messages.wanted = {number for number, (wanted, _) in enumerate(answers, 1) if wanted}
+    messages.asked = {number: 64 * wanted for number, (wanted, _) in enumerate(answers, 1)}
     sent = [
         Transfer(RET_SUBMIT, number, length=len(data), data=data if wanted else b"")
         for number, (wanted, data) in enumerate(answers, 1)
     ]
     assert read(messages, b"".join(each.pack() for each in sent), size) == sent
-    assert messages.wanted == set()
+    assert messages.asked == {}
 
 
 @given(st.binary(max_size=200), st.booleans())
@@ -109,6 +109,31 @@ def test_garbage_is_refused_or_waits_for_more(data: bytes, answers: bool) -> Non
 def test_a_message_that_cannot_be_is_refused(data: bytes) -> None:
     with pytest.raises(Malformed):
         read(Transfers(answers=False), data)
+
+
+@for_each(
+    "answer, why",
+    [
+        (Transfer(RET_SUBMIT, 2), "transfer 2, which was not asked for"),
+        (Transfer(RET_UNLINK, 9), "transfer 9, which was not asked for"),
+        (Transfer(RET_SUBMIT, 1, length=65, data=b"x" * 65), "65 bytes where 64 were asked for"),
+        (Transfer(RET_SUBMIT, 1, length=1 << 20), "1048576 bytes where 64 were asked for"),
+        (Transfer(RET_SUBMIT, 1, length=-1), "-1 bytes where 64"),
+    ],
+)
+def test_an_answer_of_more_than_was_asked_is_refused_before_its_data(answer: Transfer, why: str) -> None:
+    messages = Transfers(answers=True)
+    messages.asked = {1: 64}
+    with pytest.raises(Malformed, match=why):
+        read(messages, answer.pack()[:48])
+
+
+def test_an_answer_counts_once() -> None:
+    messages = Transfers(answers=True)
+    messages.asked = {1: 64}
+    answer = Transfer(RET_SUBMIT, 1, length=2, data=b"7\0").pack()
+    with pytest.raises(Malformed, match="transfer 1, which was not asked for"):
+        read(messages, answer * 2)
 
 
 # The client
@@ -234,6 +259,15 @@ async def test_a_cancelled_transfer_ends_once(serve: Serve, in_time: bool) -> No
     assert await ear.next() == ((number, CANCELLED, b"") if in_time else (number, 0, b"7\0"))
     writer.close()
     assert await ear.next() is None
+    carrier.close()
+
+
+async def test_a_flood_of_answers_is_a_break_and_is_not_kept(serve: Serve) -> None:
+    carrier, ear, (_, writer) = await attached(serve)
+    number = carrier.receive()
+    writer.write(Transfer(RET_SUBMIT, number, length=2, data=b"7\0").pack() * 20000)
+    assert await ear.next() == (number, 0, b"7\0")
+    assert f"transfer {number}, which was not asked for" in str(await ear.next())
     carrier.close()
 
 

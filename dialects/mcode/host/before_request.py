@@ -11,7 +11,7 @@ from dataclasses import replace
 
 from multidrop.dialects.codec import End, Kind, Procedure, Request
 from multidrop.dialects.errors import Inexpressible, NoAnswer
-from multidrop.dialects.exchange import unanswered
+from multidrop.dialects.exchange import limited, unanswered
 from multidrop.dialects.mcode.host import classify
 from multidrop.dialects.mcode.host.codec import MCode
 from multidrop.dialects.mcode.host.exchange import printed_value, question, read_error, refused, synchronise, value
@@ -27,9 +27,9 @@ def before_request(state: MCodeState, request: Request) -> Procedure[Request]:
     Returns the request in the drive's present form. Raises NoAnswer where the request was not sent.
     """
     if state.unconfirmed is not None:
-        yield from confirm_drive(state, request.text, "was not sent")
+        yield from _confirmed(state, request.text, "was not sent")
     elif state.settings_unknown:
-        yield from find_again(state, request)
+        yield from limited(who(state), request.text, "was not sent", find_again(state, request))
     elif state.reply_pending:
         if not (yield from synchronise(state, request.priority)):
             yield from find_again(state, request)
@@ -48,6 +48,10 @@ def value_of(state: MCodeState, items: str, form: str) -> Procedure[str]:
     """Print values for the host's own use; `form` is a regular expression for them."""
     yield from before_request(state, question(state, items, form))
     return (yield from printed_value(state, items, form))
+
+
+def _confirmed(state: MCodeState, text: str, fate: str) -> Procedure[None]:
+    return (yield from limited(who(state), text, fate, confirm_drive(state, text, fate)))
 
 
 def confirm_drive(state: MCodeState, text: str, fate: str) -> Procedure[None]:
@@ -162,7 +166,7 @@ def first_print(state: MCodeState, request: Request) -> Procedure[tuple[str, ...
     if expected is None or request.kind is not Kind.PRINT or pattern is None or not _fits(state, request):
         return None
     if not expected.replied:
-        place = yield from _present(state, expected.place)
+        place = yield from limited(who(state), request.text, "was not sent", _present(state, expected.place))
         if place is None:
             return None
         expected = replace(expected, place=place, replied=True)
@@ -172,7 +176,7 @@ def first_print(state: MCodeState, request: Request) -> Procedure[tuple[str, ...
     if said:
         state.expected(expected)
         return (said,)
-    yield from confirm_drive(state, request.text, "was sent once, and it is not known whether it was executed")
+    yield from _confirmed(state, request.text, "was sent once, and it is not known whether it was executed")
     if not (state.codec.party == form.party and (state.codec.checksum > 0) == (form.checksum > 0)):
         return None
     if state.error:

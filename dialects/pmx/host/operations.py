@@ -235,8 +235,10 @@ def find(state: PmxState) -> Procedure[PmxState | None]:
     """Identify one controller; None where it is silent."""
     text = ""
     for tried in range(TRIES):
-        if tried and not text.startswith("?"):  # a gateway's greeting came in its place: the controller's reply is late
-            yield from _mark(state, state.codec.request(state.address, "ID"), False)
+        # A gateway's greeting came in its place: the controller's reply is late.
+        late = tried and not text.startswith("?")
+        if late and (yield from _mark(state, state.codec.request(state.address, "ID"), False)) is None:
+            return None
         text = yield from _ask(state, "ID")
         if not text or PRODUCT.search(text):
             break

@@ -73,8 +73,7 @@ class Client:
 
     async def submit(self, endpoint: int, data: bytes = b"", request: bytes = bytes(8), length: int = 64) -> int:
         self.last += 1
-        if endpoint & 0x80:
-            self.messages.wanted.add(self.last)
+        self.messages.asked[self.last] = length if endpoint & 0x80 else 0
         size = length if endpoint & 0x80 else len(data)
         await self.say(Transfer(SUBMIT, self.last, endpoint, length=size, setup=request, data=data).pack(0x10002))
         return self.last
@@ -218,11 +217,13 @@ async def test_an_unlinked_transfer_takes_no_reply(shop: Shop) -> None:
     client = await shop.attached()
     waiting = await client.submit(0x82)
     client.last += 1
+    client.messages.asked[client.last] = 0
     await client.say(Transfer(UNLINK, client.last, unlinked=waiting).pack())
     assert (await client.answer()).status == CANCELLED
-    client.messages.wanted.discard(waiting)
+    client.messages.asked.pop(waiting)
     assert await client.ask("DN") == "2ED00"
     client.last += 1
+    client.messages.asked[client.last] = 0
     await client.say(Transfer(UNLINK, client.last, unlinked=waiting).pack())
     assert (await client.answer()).status == 0  # it had ended before
 
