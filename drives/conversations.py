@@ -16,10 +16,22 @@ from dataclasses import replace
 from typing import Any, Generic, TypeVar
 from weakref import WeakKeyDictionary
 
-from multidrop.dialects import DriveState, End, Inexpressible, Kind, Owed, Procedure, Refused, Request, Stopped
+from multidrop.dialects import (
+    DriveState,
+    End,
+    Inexpressible,
+    Kind,
+    NoAnswer,
+    Owed,
+    Procedure,
+    Refused,
+    Request,
+    Stopped,
+)
 from multidrop.drives.events import Concluded, Outcome, Transaction, Witnesses
 from multidrop.drives.link import Link, LostInFlight
 from multidrop.drives.port_journal import GLOBAL, Keeper
+from multidrop.drives.silence import explained
 from multidrop.transports import TransportLost
 
 T = TypeVar("T")
@@ -319,6 +331,10 @@ class Conversation(Generic[T]):
     # The end
 
     def _end(self, result: tuple[T, ...] = (), error: BaseException | None = None) -> None:
+        if isinstance(error, NoAnswer):
+            error = explained(error, self._link, self._state.codec.family)
+        elif (error is None or isinstance(error, Refused)) and self._last is not None and not self._searching:
+            self._link.heard.replied()
         self._outcome = Outcome(result, error, self._first, self._last)
         self._leave()
 

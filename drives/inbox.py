@@ -18,6 +18,7 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 from multidrop.dialects import Codec, End, Kind, Reply, Request
+from multidrop.drives.echoes import LONGEST_TAIL, TERMINATORS, EchoWatch, LocalEcho
 
 # Late replies, debris of a stop, and what a session before left.
 #
@@ -31,7 +32,6 @@ from multidrop.dialects import Codec, End, Kind, Reply, Request
 
 LATE = 10.0
 """How long a missing reply may still come and be taken for another, s."""
-TERMINATORS = (b"\r", b"\n")
 MOST_EVIDENCE = 8
 """Most lines kept after a doubtful reply: one is enough as evidence against it."""
 
@@ -250,80 +250,12 @@ class Leftovers:
         return any(line.endswith(each) and not line.removesuffix(each).strip(PROMPT) for each in self._sent)
 
 
-class LocalEcho:
-    """Waits for the repetition of the last write."""
-
-    def __init__(self) -> None:
-        self.own = b""
-        """The bytes whose repetition is awaited; empty: none."""
-        self.held = b""
-        """Bytes received while the repetition is incomplete."""
-
-    def wrote(self, data: bytes) -> bytes:
-        """Wait for these bytes from now on; return what was held for the write before."""
-        held, self.own, self.held = self.held, data, b""
-        return held
-
-    def sift(self, data: bytes) -> tuple[bytes, bytes]:
-        """Take received bytes; return what preceded the repetition and what followed, nothing while incomplete."""
-        if not self.own:
-            return b"", data
-        self.held += data
-        at = self.held.find(self.own)
-        if at < 0:
-            return b"", b""
-        before, after = self.held[:at], self.held[at + len(self.own) :]
-        self.forget()
-        return before, after
-
-    def forget(self) -> bytes:
-        return self.wrote(b"")
-
-
-WATCHED = 24
-"""Requests of an opening in which the repetition of our own bytes is looked for."""
-ENOUGH = 4
-"""Fewer bytes than these prove nothing where others came before them."""
-
-
-class EchoWatch:
-    """Looks for an adapter that repeats what it sends, in the first requests on a port.
-
-    A drive may repeat a line, too: the codec of the request says which of the two it was.
-    """
-
-    def __init__(self) -> None:
-        self._left = WATCHED
-        self._codec: Codec | None = None
-        self._sent = self._heard = b""
-
-    def wrote(self, data: bytes, codec: Codec | None) -> None:
-        """Look for these bytes from now on. `codec`: that of a request; None: they are not looked for."""
-        self._left -= codec is not None
-        self._codec = codec if self._left >= 0 else None
-        self._sent, self._heard = data, b""
-
-    def repeated(self, data: bytes, over: bool = False) -> bytes:
-        """Take received bytes; return ours once it is certain that the adapter repeats them, else nothing.
-
-        `over`: no more is expected.
-        """
-        if self._codec is None or not self._sent:
-            return b""
-        self._heard = (self._heard + data)[:LONGEST_TAIL]
-        at = self._heard.find(self._sent)
-        line_begins = self._heard[:at].endswith(TERMINATORS) and len(self._sent) >= ENOUGH
-        if at < 0 or (at and not line_begins):  # a drive may repeat what it refuses, after a sign of its own
-            return b""
-        return self._sent if self._codec.repeated(self._sent, self._heard[at + len(self._sent) :], over) else b""
-
-
+CERTAINLY_OVER = 0.018
+"""The silence, s, after which no line feed of a drive follows the CR that it repeats; adapters hold bytes for 16 ms."""
 TAIL = 0.05
 """Quiet time after which no more of an unterminated line is awaited, s."""
 NEVER_QUIET = 1.0
 """Longest wait for a quiet wire, s: a program may print without a pause, and a stop must be repeated."""
-LONGEST_TAIL = 4096
-"""Longest unsolicited line without an end, in characters; a longer one is published in pieces."""
 
 
 class Inbox:
@@ -343,7 +275,7 @@ class Inbox:
         self.received_at = float("-inf")
         """When the last bytes came."""
         self.echo = LocalEcho() if local_echo else None
-        self.watch = EchoWatch()
+        self.watch, self._found = EchoWatch(), False
         self._begun_at = float("-inf")
         self._tail = b""
         """The beginning of a line that was published before its end came: its check byte covers both parts."""
@@ -394,13 +326,19 @@ class Inbox:
 
     def notice_echo(self, data: bytes, now: float, over: bool = False) -> None:
         """Remove our own bytes from now on, once it is certain that the adapter repeats them. `over`: as in it."""
-        own = b"" if self.echo else self.watch.repeated(data, over)
+        quiet = over and now >= self.received_at + CERTAINLY_OVER
+        own = b"" if self.echo else self.watch.repeated(data, quiet)
         if not own:
             return
-        self.echo = LocalEcho()
+        self.echo, self._found = LocalEcho(), True
         before, _, self.buffer = self.buffer.partition(own)
         self._publish_rest(before, now)
         self.on_echo()
+
+    def doubt_echo(self) -> None:
+        """Look again for the repetition, where one that was found by itself did not come: another adapter, perhaps."""
+        if self._found:
+            self.echo, self._found, self.watch = None, False, EchoWatch()
 
     # Stops
 

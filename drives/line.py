@@ -24,8 +24,9 @@ from typing import NamedTuple
 
 from multidrop.dialects import Codec, Decoded, End, Kind, Priority, Reply, Request, StopPiece
 from multidrop.dialects.codec import copy_with
+from multidrop.drives.echoes import LocalEcho
 from multidrop.drives.events import Transaction, Unsolicited
-from multidrop.drives.inbox import NEVER_QUIET, TAIL, Doubt, Inbox, LocalEcho
+from multidrop.drives.inbox import NEVER_QUIET, TAIL, Doubt, Inbox
 
 DEFAULT_TIMEOUT = 1.0
 """Longest wait for a reply after the last byte, s, unless a URL gives `timeout`."""
@@ -415,6 +416,7 @@ class Line:
         if now < flight.times(self.inbox.buffer, self.timeout)[1]:
             return None
         held = echo.forget().decode("latin-1")
+        self.inbox.doubt_echo()
         if not held:
             return flight.request.codec.on_timeout(flight.request, b"")
         return Decoded(Reply(end=End.DAMAGED, detail=f"echo=local, but our own bytes came back as {held[:48]!r}"), 0)

@@ -12,7 +12,8 @@ from math import inf, nextafter
 
 from multidrop.dialects import End, Kind, Priority, Request, StopPiece
 from multidrop.drives import events
-from multidrop.drives.inbox import TERMINATORS, Debris, Leftovers
+from multidrop.drives.echoes import TERMINATORS, Heard
+from multidrop.drives.inbox import Debris, Leftovers
 from multidrop.drives.line import EchoFound, Finished, Line, Write, divided
 from multidrop.drives.port_journal import GLOBAL, Departure, Keeper
 from multidrop.transports import Transport, TransportLost
@@ -69,7 +70,7 @@ class Link:
         self.departure = Departure(keeper)
         """The note on the command that is on its way."""
         self._keeper = keeper
-        self.debris = Debris()
+        self.debris, self.heard = Debris(), Heard()
         self.leftovers = Leftovers()
         self._counted = 0
         self._came_unasked, self._unasked_said = 0, -inf
@@ -246,6 +247,7 @@ class Link:
     def _received(self, data: bytes) -> None:
         now, self.unheard = self.now(), False
         self._news.collect(events.Traffic(now, False, data))
+        self.heard.received(data)
         self.line.receive(data, now)
         self.advance()
 
@@ -255,6 +257,7 @@ class Link:
             self.line.not_written(now)
             return
         self.line.accepted()
+        self.heard.wrote(data)
         if request is None:
             self.debris.stop_written(b"", self.line.transmitted)
             self.publish(events.Traffic(now, True, data, stop=True))

@@ -17,7 +17,7 @@ from functools import partial
 from typing import Any
 
 from multidrop.dialects import DriveError, DriveState, Family, Hints, NoAnswer, StopPiece
-from multidrop.dialects.families import FAMILIES, family_of, seen
+from multidrop.dialects.families import FAMILIES, family_of
 from multidrop.dialects.values import Value
 from multidrop.drives.conversations import Conversations
 from multidrop.drives.drive import Drive, still
@@ -25,6 +25,7 @@ from multidrop.drives.events import isolated
 from multidrop.drives.link import Link
 from multidrop.drives.port_journal import GLOBAL, Keeper
 from multidrop.drives.protected_units import protection, silent
+from multidrop.drives.silence import explained
 from multidrop.transports import TransportLost
 
 SLOW = 1.0
@@ -32,7 +33,6 @@ SLOW = 1.0
 OPENING, OPENING_PLACE, REPAIRS, SLOW_BAUD = 8.0, 4.0, 60.0, 4800
 """The time limit of a search, s: for itself, for each address, for what is owed to drives; at this baud rate and above
 with a timeout of 1 s."""
-NEVER_OVER = "nothing that came is a reply"
 PAUSE = 0.25
 """Seconds between two looks at a line that is away, or at a drive that homes."""
 BOOT = 1.0
@@ -185,6 +185,8 @@ class Roster:
 
     def found(self, state: DriveState) -> None:
         self.drives[state.address] = Drive(self.conversations, self, state)
+        if state.product and not state.settings_unknown:
+            self.link.heard.replied()
         self._follow()
 
     def settings_may_have_changed(self, drives: Iterable[Drive]) -> None:
@@ -277,20 +279,17 @@ class Roster:
         self.family = family = FAMILIES[hints.family or self.family.name]
         self.probing = hints.drives or (*hints.tried, *(each.address for each in hints.remembered))
         unknown = family.new_state(family.codec, "")
-        with self.link.received() as heard:
-            try:
-                async with asyncio.timeout(limit := self._limit(hints)):
-                    return await self.conversations.run(family.identify(hints), unknown, searching=True)
-            except TimeoutError:
-                came = seen(bytes(heard), family.name)
-                raise NoAnswer(f"no drive could be identified within {limit:.0f} s; {came or NEVER_OVER}") from None
-            except NoAnswer as error:
-                if came := seen(bytes(heard), family.name):
-                    raise NoAnswer(f"{error}; {came}") from None
-                if hints.drives or hints.party or not self.link.unheard or protection(self.link, family) is None:
-                    raise
-                await asyncio.sleep(SLOW)
-                raise silent(error, self.link, family) from None
+        try:
+            async with asyncio.timeout(limit := self._limit(hints)):
+                return await self.conversations.run(family.identify(hints), unknown, searching=True)
+        except TimeoutError:
+            failure = NoAnswer(f"no drive could be identified within {limit:.0f} s")
+            raise explained(failure, self.link, family.name) from None
+        except NoAnswer as error:
+            if hints.drives or hints.party or not self.link.unheard or protection(self.link, family) is None:
+                raise
+            await asyncio.sleep(SLOW)
+            raise silent(error, self.link, family) from None
 
     def _limit(self, hints: Hints) -> float:
         """The longest time of a search, s: a device that sends all the time is asked no longer. Repairs take theirs."""

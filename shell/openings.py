@@ -15,7 +15,7 @@ from typing import Any, TypeVar
 from multidrop.dialects import Diagnostic, DriveError, NoAnswer
 from multidrop.drives.bus import Bus
 from multidrop.drives.drive import Drive
-from multidrop.drives.inbox import LocalEcho
+from multidrop.drives.echoes import LocalEcho
 from multidrop.drives.stopping import Halt
 from multidrop.shell.connect.opening import BAUDED, Naming, Opened, Opener, first, open_buses, port_name
 from multidrop.shell.connect.reconnect import Newcomer
@@ -382,6 +382,9 @@ class _Newcomers:
         label(bus, connection)
         workspace.identified(bus)
         workspace.notify(described(bus), bus=bus.name)
+        known = workspace.of(bus).connection
+        if known is not None and known.local_echo and not connection.local_echo:
+            _say_echo(workspace, bus)
         for each in workspace.on_opened if workspace.scaled and not opened.hints.lazy else ():
             await each(bus)
         for text in crash_marks.left(workspace.settings.state, workspace.of(bus).port):
@@ -399,8 +402,7 @@ class _Newcomers:
         said, reason = bus.silent, str(failure)
         bus.unanswered(reason)
         if said != reason:
-            heard = "nothing was received" if bus.link.unheard else ""
-            texts = filter(None, (reason, heard, "it is asked again every 5 s" if again else ""))
+            texts = filter(None, (reason, "it is asked again every 5 s" if again else ""))
             workspace.notify(f"{bus.name}: {'; '.join(texts)}", bus=bus.name, warning=True)
             workspace.notify(f"{bus.name}: {self._way_on(connection)}/raw on shows all that comes", bus=bus.name)
         workspace.changed()
@@ -424,11 +426,19 @@ ECHO = (
 
 
 def _echo_found(workspace: Workspace, bus: Bus) -> None:
-    """Say that the adapter repeats what it sends, once, and keep that with the connection."""
+    """Keep with the connection that the adapter repeats what it sends; say it as soon as drives are listed."""
     record = workspace.of(bus)
+    known = record.connection is None or record.connection.local_echo
     if record.connection is not None:
         record.connection = with_echo(record.connection)
-        text = ECHO.format(url_without_secrets(record.connection.text))
+    if bus.drives and not known:
+        _say_echo(workspace, bus)
+
+
+def _say_echo(workspace: Workspace, bus: Bus) -> None:
+    connection = workspace.of(bus).connection
+    if connection is not None:
+        text = ECHO.format(url_without_secrets(connection.text))
         workspace.notify(f"{bus.name}: {text}", bus=bus.name, warning=True)
 
 

@@ -18,6 +18,7 @@ from multidrop.dialects.families import DEFAULT, FAMILIES, spoken
 from multidrop.dialects.scanning import WINDOW, Reach, Scan
 from multidrop.drives.bus import Bus
 from multidrop.drives.protected_units import silent
+from multidrop.drives.silence import explained
 from multidrop.drives.stopping import Halt
 from multidrop.shell import stop_report
 from multidrop.shell.channel import Job, running
@@ -380,10 +381,12 @@ class Scanning:
     def nothing(self, stages: Sequence[Stage], advice: str = "") -> NothingFound:
         """Make the failure that names what was tried."""
         found = NothingFound(
-            f"no drive replies on {self.port} ({listed(stages)}; {stages[0].scan.asked(self._reach())}); check power, "
-            f"wiring (are A and B swapped?) and the adapter{advice}"
+            f"no drive replies on {self.port} ({listed(stages)}; {stages[0].scan.asked(self._reach())}){advice}"
         )
-        return silent(found, self._first.link, self._first.roster.family) if self._first is not None else found
+        if self._first is None:
+            return found
+        link, family = self._first.link, self._first.roster.family
+        return silent(explained(found, link, family.name), link, family)
 
     def _reach(self, distance: float = 0.0, hasty: bool = False) -> Reach:
         """The manner of the search. `distance`: the time of the network to a drive and back, s."""

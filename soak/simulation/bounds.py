@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from multidrop.dialects import StopPiece
-from multidrop.drives.inbox import LONGEST_TAIL
+from multidrop.drives.echoes import LONGEST_TAIL
 from multidrop.drives.line import Flight
 from soak.simulation.terminal import LIMIT
 

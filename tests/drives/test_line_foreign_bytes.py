@@ -9,8 +9,9 @@ from hypothesis import strategies as st
 
 from multidrop.dialects import End, Kind, Priority, Request, StopPiece
 from multidrop.dialects.mcode.host.codec import MCode
+from multidrop.drives.echoes import LONGEST_TAIL
 from multidrop.drives.events import Unsolicited
-from multidrop.drives.inbox import LATE, LONGEST_TAIL
+from multidrop.drives.inbox import LATE
 from multidrop.drives.line import LONGEST_LIST, NEVER_QUIET, Finished, Line, Write
 from tests.support.examples import examples
 from tests.support.line_run import LineRun
@@ -351,3 +352,21 @@ def test_after_many_requests_nothing_is_taken_for_an_adapters_repetition():
     LineRun(line, 9.0, answers)
     line.ask(request("PR P", MCode(em=1)))
     assert LineRun(line, 30.0, {20.0: OWN + b"\r\n" + VALUE}, 19.0).echoes == 0
+
+
+def test_a_short_silence_behind_a_repeated_cr_proves_nothing():
+    """A search waits less than the byte time of a slow line, and the drive's LF comes behind that."""
+    line = Line(MCode())
+    asked = Request("", "PR VR", Kind.QUIET, MCode(), settle=0.002, body=b"PR VR\r")
+    line.ask(asked)
+    assert LineRun(line, 1.0, {0.01: b"PR VR\r", 0.015: b"\nLMDCM\r\n>"}).echoes == 0
+
+
+def test_an_echo_that_stays_away_is_looked_for_again():
+    line = Line(MCode(em=1))
+    for _ in range(3):
+        line.ask(request("PR P", MCode(em=1)))
+    answers = {0.01: OWN + b"\r\n" + VALUE, 0.1: b"\r\n" + VALUE, 1.5: b"\r\n" + VALUE}
+    run = LineRun(line, 9.0, answers)
+    assert run.finished[0] == run.finished[2] == ("PR P", End.DONE, ("5",))
+    assert run.finished[1][1] is not End.DONE

@@ -127,8 +127,8 @@ def _look_around(hints: Hints) -> Procedure[list[MCodeState]]:
             return [alone]
         if party is False:
             raise NoAnswer(
-                "no drive replies (MCode outside of party mode was tried); check power, baud and wiring, or give "
-                f"party=1 and drives=NAMES; {SEARCH}"
+                "no drive replies (MCode outside of party mode was tried); party=1 and drives=NAMES open a party line; "
+                f"{SEARCH}"
             )
     yield from _wake(TO_PARTY)
     found = []
@@ -182,8 +182,8 @@ def _no_reply(hints: Hints, party: bool | None) -> str:
     guesses = ", ".join(dict.fromkeys((*_tried(hints), *_last_names(hints), UNNAMED)))
     forms += [] if names else [f"as {guesses} in party mode"]
     how = f" (MCode {' and '.join(forms)} was tried)" if forms else ""
-    advice = " or give party=0 where it is alone and not in party mode" if party and hints.party is None else ""
-    return f"{tried}{how}; check power, baud and names (drives=a,b,... for a party line){advice}; {SEARCH}"
+    advice = ", party=0 where it is alone and not in party mode" if party and hints.party is None else ""
+    return f"{tried}{how}; drives=a,b,... names those of a party line{advice}; {SEARCH}"
 
 
 def _by_name_first(hints: Hints) -> Procedure[MCodeState | None]:

@@ -210,7 +210,7 @@ def identify(hints: Hints) -> Procedure[list[PmxState]]:
     if not hints.addressed:
         alone = yield from find(PmxState(Pmx(addressed=False)))
         if alone is None:
-            raise NoAnswer("no controller replies without an address; check power, wiring and the gateway")
+            raise NoAnswer("no controller replies without an address")
         return [alone]
     if wrong := [name for name in hints.drives if not re.fullmatch(r"\d\d", name, re.ASCII)]:
         raise Inexpressible(f"no device number '{wrong[0]}'; valid: 00 to 99, as in drives=00,01")
@@ -228,7 +228,7 @@ def identify(hints: Hints) -> Procedure[list[PmxState]]:
         if alone is not None:
             return [alone]
     tried = ", ".join(state.address for state in found)
-    raise NoAnswer(f"no controller replies at {tried}; check power, baud and numbers (drives=00,01,...); {SEARCH}")
+    raise NoAnswer(f"no controller replies at {tried}; drives=00,01,... names others; {SEARCH}")
 
 
 def find(state: PmxState) -> Procedure[PmxState | None]:

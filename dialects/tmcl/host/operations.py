@@ -386,7 +386,7 @@ def identify(hints: Hints) -> Procedure[list[TmclState]]:
         yield from repaired(state, hints.owed, partial(perform, state))
     if not any(state.product for state in found):
         tried = ", ".join(state.address for state in found)
-        raise NoAnswer(f"no module replies at {tried}; check power, baud and addresses (drives=1,2,...)")
+        raise NoAnswer(f"no module replies at {tried}; drives=1,2,... names others")
     return found
 
 

@@ -97,7 +97,7 @@ def test_several_modules_are_found_and_one_that_is_absent_is_named():
 
 
 def test_nobody_answers():
-    with pytest.raises(NoAnswer, match=r"no module replies at 3; check power, baud and addresses"):
+    with pytest.raises(NoAnswer, match=r"no module replies at 3; drives=1,2,"):
         Shop().open("3")
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
 import itertools
 from typing import Any
 
@@ -12,43 +11,13 @@ from multidrop.dialects import DriveError
 from multidrop.shell.configuration import Settings
 from multidrop.shell.connect import opening
 from multidrop.shell.session import Session
-from multidrop.transports import Transport, TransportLost
+from multidrop.transports import TransportLost
 from tests.support.cases import for_each
+from tests.support.talker import Talker
 
 pytestmark = pytest.mark.virtual
 FOLDERS = itertools.count()
 PORT = "/dev/ttyUSB9"
-
-
-class Talker(Transport):
-    """A device that sends the same again and again, whatever it is asked."""
-
-    name, gathers = "port", False
-
-    def __init__(self, says: bytes, every: float) -> None:
-        self.says, self.every = says, every
-        self._task: Any = None
-
-    def start(self, received: Any, lost: Any) -> None:
-        async def talk() -> None:
-            while True:
-                await asyncio.sleep(self.every)
-                received(self.says)
-
-        self._task = asyncio.ensure_future(talk())
-
-    def write(self, data: bytes) -> bool:
-        return True
-
-    def preempt(self, whole: bool, make: Any) -> bool:
-        return True
-
-    def discard(self, whole: bool = False) -> int:
-        return 0
-
-    async def close(self) -> None:
-        if self._task is not None:
-            self._task.cancel()
 
 
 URLS = [

@@ -1,0 +1,35 @@
+"""A line on which no drive has replied in this session: what came on it, and what may be the cause.
+
+One place for every front end and family. It explains each failure until the first reply; from then on the line works.
+"""
+
+from __future__ import annotations
+
+from typing import TypeVar
+
+from multidrop.dialects.families import seen
+from multidrop.drives.link import Link
+
+E = TypeVar("E", bound=Exception)
+WIRING = "the baud rate, A and B (exchanged?), the termination, and an adapter that switches its direction late"
+SERIAL = f"check power, the drive's name or address, {WIRING}"
+NETWORK = f"check power, network, and the drive's name or address; behind a gateway also {WIRING}"
+NOISE = "; also check A and B (exchanged?) and the termination"
+ECHO = "only our own bytes came back (an adapter that repeats what it sends), and no reply"
+
+
+def explained(error: E, link: Link, family: str) -> E:
+    """Return the failure, with what came and the likely causes where no drive of the link has replied yet."""
+    if link.heard.answered:
+        return error
+    return type(error)(f"{error}; {reason(link, family)}")
+
+
+def reason(link: Link, family: str) -> str:
+    """Say what came in place of replies, and what to check."""
+    check = NETWORK if link.transport.network else SERIAL
+    came, echoed = link.heard.foreign(), link.heard.came
+    if not came:
+        return f"{ECHO if echoed else 'nothing was received'}; {check}"
+    text = seen(came, family)
+    return text + NOISE if text.endswith("another baud rate?") else f"{text}; {check}"

@@ -1,0 +1,82 @@
+"""A line that does not reply says what came and the causes, known or not, in every family and front end."""
+
+from __future__ import annotations
+
+import itertools
+from typing import Any
+
+import pytest
+
+from multidrop.dialects import DriveError
+from multidrop.dialects.state import Remembered
+from multidrop.shell.configuration import Settings
+from multidrop.shell.connect import opening
+from multidrop.shell.connect.opening import port_name
+from multidrop.shell.connect.urls import parse
+from multidrop.shell.session import Session
+from multidrop.shell.state.port_state import PortState
+from tests.support.cases import for_each
+from tests.support.talker import Talker
+
+pytestmark = pytest.mark.virtual
+FOLDERS = itertools.count()
+PORT = "/dev/ttyUSB9"
+CAUSES = ("power", "name", "baud", "A and B", "termination", "direction")
+LAST = Remembered("a", "a", "LMDCM", "LMDCM 6.002", "LMDCM571", "1", True, 0, 1)
+URLS = [
+    PORT,
+    f"{PORT}?drives=a",
+    f"{PORT}?party=1&drives=a",
+    f"{PORT}?party=0",
+    f"{PORT}?dialect=pmx",
+    f"{PORT}?dialect=pmx&drives=07",
+    f"{PORT}?dialect=tmcl&drives=3",
+    "tcp://10.0.0.5?dialect=pmx",
+    "tcp://10.0.0.5?party=1&drives=a",
+]
+
+
+async def failure(folder: Any, patch: Any, url: str, lazy: bool, remembered: bool, **device: Any) -> str:
+    async def transport(connection: Any, port: str = "", within: Any = None, baud: Any = None) -> Any:
+        return Talker(network=connection.scheme == "tcp", **device)
+
+    patch.setattr(opening, "_transport", transport)
+    folder = folder / str(next(FOLDERS))
+    if remembered:
+        kept = PortState(folder / "s", port_name(parse(url)), 9600)
+        kept.remember({"a": LAST})
+        kept.close()
+    session: Any = Session(Settings({}, folder / "c", folder / "s", data=folder / "d"), lazy=lazy)
+    try:
+        with pytest.raises(DriveError) as caught:
+            await session.open(url)
+            await session.run("PX" if "pmx" in url else "GAP 1, 0" if "tmcl" in url else "PR P")
+    finally:
+        await session.close()
+    return str(caught.value)
+
+
+@for_each("url, lazy, remembered", itertools.product(URLS, (False, True), (False, True)))
+async def test_a_silent_line_names_every_cause(tmp_path, monkeypatch, url, lazy, remembered):
+    text = await failure(tmp_path, monkeypatch, url, lazy, remembered)
+    assert text.count("nothing was received") == 1
+    assert [each for each in CAUSES if each not in text] == []
+    assert text.count("power") == 1 and "\n" not in text
+
+
+@for_each("url, lazy", itertools.product(URLS, (False, True)))
+async def test_noise_is_told_from_text_and_from_our_own_bytes(tmp_path, monkeypatch, url, lazy):
+    noise = await failure(tmp_path, monkeypatch, url, lazy, False, says=b"\xff\xfe\x80", every=0.2)
+    assert "bytes came, none of them readable: another baud rate?" in noise and "A and B" in noise, noise
+    own = await failure(tmp_path, monkeypatch, url, lazy, False, repeats=True)
+    assert "only our own bytes came back" in own and "power" in own, own
+
+
+async def test_a_line_that_has_replied_is_not_doubted(tmp_path):
+    from tests.support.cell_session import CellSession, bus, party
+
+    async with CellSession(tmp_path, bus("b", party("a"), party("c"))) as cell:
+        cell.world("power c off")
+        with pytest.raises(DriveError) as caught:
+            await cell.session.run("@c PR P")
+        assert "A and B" not in str(caught.value)
