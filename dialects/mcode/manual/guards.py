@@ -15,10 +15,10 @@ from collections.abc import Callable, Mapping
 
 from multidrop.dialects.family import ADDRESSES, EVERYONE, Guard, Protection, to_all
 from multidrop.dialects.files import rows
-from multidrop.dialects.mcode.manual.grammar import LineError, Number, parse, parsed
+from multidrop.dialects.mcode.manual.grammar import LineError, Name, Number, parse, parsed
 from multidrop.dialects.mcode.manual.mnemonic import ETHERNET
 from multidrop.dialects.mcode.manual.program_file import bare
-from multidrop.dialects.mcode.manual.table import lookup
+from multidrop.dialects.mcode.manual.table import MNEMONICS, lookup, words
 
 _ROWS = list(rows(__file__, "guards.csv"))
 AT_ONCE: Mapping[str, str] = {row["word"]: row["what"] for row in _ROWS if not row["value"]}
@@ -53,14 +53,36 @@ def find(text: str, *, address: str, party: bool, product: str, starts: Callable
         return None
     if word in AT_ONCE or (word in SETTINGS and value != "" and value not in HARMLESS.get(word, ())):
         meaning = AT_ONCE.get(word) or SETTINGS[word]
-        if word == "CP" and value == 1:
-            meaning = "erases the program and every user variable"
+        if word == "CP":
+            meaning = _erased(line.removeprefix(name), product) or meaning
         return Guard(word, f"'{line}' {meaning}")
     if name in ADDRESSES or address in ADDRESSES:
         stops = word in STOPS_AT_0 and value == 0
         sent = line.removeprefix(name) if name in ADDRESSES else line
         return to_all(line) if starts(sent) and not stops else None
     return None
+
+
+def _erased(line: str, product: str) -> str:
+    """Say what CP with parameters erases; empty for CP alone, and where the drive would refuse it.
+
+    From a label on means to the end of memory, the programs behind it too. An MDrivePlus takes only a place.
+    """
+    statement = parsed(line)
+    arguments = statement.arguments if statement is not None else ()
+    option, places = None, arguments
+    if words(product) is MNEMONICS and (len(arguments) == 2 or arguments in ((Number(0),), (Number(1),), (Name("S"),))):
+        option, places = arguments[0], arguments[1:]
+    what = "the program"
+    match places:
+        case (Name(word),):
+            what = f"everything from {word} to the end of program memory"
+        case (Number(value),):
+            what = f"everything from address {value} to the end of program memory"
+        case (_, *_):
+            return ""
+    more = {Number(1): " and every user variable", Name("S"): ", and saves that"}
+    return f"erases {what}{more.get(option, '') if isinstance(option, (Name, Number)) else ''}" if arguments else ""
 
 
 def acts(text: str) -> bool:

@@ -1,5 +1,6 @@
 """Which lines of MCode need a person's yes, in every form in which a drive executes them."""
 
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -61,6 +62,27 @@ def test_every_form_of_a_guarded_line_is_guarded():
 
 def test_what_a_line_does_is_said_with_the_line():
     assert FAMILY.guards.find(ALONE, "cp 1 'all").what == "'cp 1' erases the program and every user variable"
+
+
+@pytest.mark.parametrize(
+    ("product", "line", "erased"),
+    [
+        ("", "CP", "the program"),
+        ("LMDCM", "CP 0", "the program"),
+        ("LMDCM", "CP S", "the program, and saves that"),
+        ("LMDCM", "CP P1", "everything from P1 to the end of program memory"),
+        ("LMDCM", "CP 0, P1", "everything from P1 to the end of program memory"),
+        ("LMDCM", "aCP 1,P1", "everything from P1 to the end of program memory and every user variable"),
+        ("LMDCM", "CP 0,100", "everything from address 100 to the end of program memory"),
+        ("MDI", "CP 1", "everything from address 1 to the end of program memory"),
+        ("MDI", "CP S", "everything from S to the end of program memory"),
+        ("LMDCM", "CP P1,P2,P3", "the program"),
+    ],
+)
+def test_the_question_says_all_that_cp_erases(product, line, erased):
+    state = MCodeState(MCode(party=True), "a")
+    state.identified(product, "")
+    assert FAMILY.guards.find(state, line).what == f"'{line}' erases {erased}"
 
 
 def test_other_lines_are_free():
