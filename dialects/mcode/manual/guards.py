@@ -85,6 +85,17 @@ def _erased(line: str, product: str) -> str:
     return f"erases {what}{more.get(option, '') if isinstance(option, (Name, Number)) else ''}" if arguments else ""
 
 
+def addressed(text: str, product: str) -> tuple[str, str] | None:
+    """Split a line into a drive's name and a command, where it is one only so (`bMR 5`, as manuals have it)."""
+    line = bare(text)
+    if (found := _NAMED.match(line)) is None or _read(line, product) is not None:
+        return None
+    rest = line[1:]
+    statement = parsed(rest)
+    known = statement is not None and lookup(statement.word, product) is not None
+    return (found[1], rest) if known else None
+
+
 def acts(text: str) -> bool:
     """Whether a line starts motion or a program at once; a setting, OE and what ends a motion do not.
 
