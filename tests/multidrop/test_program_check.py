@@ -279,3 +279,40 @@ def test_nothing_is_said_of_a_set_up_that_the_drive_may_take(check: Check, lines
 def test_trips_on_position_that_exclude_each_other_are_named_at_the_line_that_enables_both(check: Check) -> None:
     _, _, found = check("PG 1\nLB Ga\nTP=5,Ga\nTR=5,Ga\nTE=2\nTE=16\nTE=19\nTE=0\nE\nPG\n")
     assert [each.partition(": warning: ")[0] for each in found if "error 39" in each] == ["a.mxt:7:1"]
+
+
+# -- what one unit lacks
+
+
+UNIT = """[[bus]]
+name = "line"
+[[bus.drive]]
+name = "a"
+party = true
+[bus.drive.identity]
+version = "LMDOM 5.007, Hw: 3.2"
+part = "LMDOM421"
+"""
+
+
+def test_a_drive_of_a_cell_decides_which_commands_there_are(check: Check, home: Home) -> None:
+    cell = home.file("unit.toml", UNIT.replace('name = "a"', 'name = "a"\npersonality = "LMDOM"'))
+    text = "PG 1\nLS=0,5,1\nO1=1\nPR AF\nE\nPG\n"
+    code, _, found = check(text, "--cell", f"{cell}#line:a")
+    assert code == 1  # an LMDOM has no AF
+    assert found == [
+        "a.mxt:2:1: warning: LS needs firmware 6, and this drive has 5.007; this drive refuses it",
+        "a.mxt:3:1: warning: O1 is not on a NEMA 17 (LMDOM421); this drive refuses it",
+        *[each for each in found if "AF" in each],
+    ]
+    code, _, (told,) = check(text, "--cell", f"{cell}#line:x")
+    assert code == 2 and "no such drive" in told
+
+
+def test_a_download_warns_of_what_the_drive_lacks_by_what_it_reports(home: Home) -> None:
+    cell = home.file("unit.toml", UNIT.replace('name = "a"', 'name = "a"\npersonality = "LMDOM"'))
+    file = home.file("a.mxt", "PG 1\nLB G1\nLS=0,5,1\nE\nPG\n")
+    code, _, err = home.run("program", "download", f"sim:{cell}", file)
+    assert code == 0 and f"{file}:3:1: warning: LS needs firmware 6, and this drive has 5.007" in err
+    code, out, err = home.run("send", f"sim:{cell}", f"/check {file}")
+    assert code == 0 and "LS needs firmware 6, and this drive has 5.007" in err

@@ -15,7 +15,7 @@ from collections.abc import Callable, Mapping
 
 from multidrop.dialects.family import ADDRESSES, EVERYONE, Guard, Protection, to_all
 from multidrop.dialects.files import rows
-from multidrop.dialects.mcode.manual.grammar import LineError, Name, Number, parse, parsed
+from multidrop.dialects.mcode.manual.grammar import LineError, Name, Number, Text, parse, parsed
 from multidrop.dialects.mcode.manual.mnemonic import ETHERNET
 from multidrop.dialects.mcode.manual.program_file import bare
 from multidrop.dialects.mcode.manual.table import MNEMONICS, lookup, words
@@ -25,7 +25,13 @@ AT_ONCE: Mapping[str, str] = {row["word"]: row["what"] for row in _ROWS if not r
 """Instructions, with or without a value."""
 SETTINGS: Mapping[str, str] = {row["word"]: row["what"] for row in _ROWS if row["value"]}
 """Settings, where a value is written."""
-NAMES: Mapping[str, str] = {**AT_ONCE, **SETTINGS, EVERYONE: "can start every drive of the line"}
+RESETS = "prints Ctrl+C: every drive of the party line that hears it resets"
+NAMES: Mapping[str, str] = {
+    **AT_ONCE,
+    **SETTINGS,
+    "PR": rf"with \c {RESETS}",
+    EVERYONE: "can start every drive of the line",
+}
 """Every guard, and what its lines do."""
 HARMLESS: Mapping[str, frozenset[int]] = {
     row["word"]: frozenset(map(int, row["harmless"].split())) for row in _ROWS if row["harmless"]
@@ -36,7 +42,8 @@ STOPS_AT_0 = frozenset({"SL", "JE", "DE", "AS", "TQ"})
 VELOCITIES = frozenset({"SL", "JE"})
 """Those of them that leave the torque on."""
 _WORD = re.compile(r"\s*([A-Za-z]{2})(?![A-Za-z0-9])\s*=?\s*(.*)", re.DOTALL)
-_ANY = re.compile("|".join((*AT_ONCE, *SETTINGS)), re.IGNORECASE)
+_ANY = re.compile("|".join((*AT_ONCE, *SETTINGS, r"\\c")), re.IGNORECASE)
+_RESET = re.compile(r"(?<!\\)(?:\\\\)*\\c")
 _NAMED = re.compile(r"([!-~])(?=[A-Za-z])")
 
 
@@ -51,6 +58,8 @@ def find(text: str, *, address: str, party: bool, product: str, starts: Callable
     name, word, value = _head(line, product)
     if word == "PY" and not (party or name):
         return None
+    if word == "PR" and (party or name) and prints_reset(line):
+        return Guard(word, f"'{line}' {RESETS}")
     if word in AT_ONCE or (word in SETTINGS and value != "" and value not in HARMLESS.get(word, ())):
         meaning = AT_ONCE.get(word) or SETTINGS[word]
         if word == "CP":
@@ -61,6 +70,13 @@ def find(text: str, *, address: str, party: bool, product: str, starts: Callable
         sent = line.removeprefix(name) if name in ADDRESSES else line
         return to_all(line) if starts(sent) and not stops else None
     return None
+
+
+def prints_reset(line: str) -> bool:
+    """Whether a PR has Ctrl+C in a text (5.1.102): other drives of a party line may take it for theirs (5.1.19)."""
+    statement = parsed(line)
+    texts = [each.value for each in statement.arguments if isinstance(each, Text)] if statement is not None else [line]
+    return any(_RESET.search(each) for each in texts)
 
 
 def _erased(line: str, product: str) -> str:
@@ -121,7 +137,7 @@ def only_ends(text: str) -> bool:
 def only_reads(text: str) -> bool:
     """Whether a line only asks for values. Asking for ER clears it (section 5.1.41)."""
     word = _head(bare(text), "")[1]
-    return word == "PR" and not re.search(r"\bER\b", text.upper())
+    return word == "PR" and not re.search(r"\bER\b", text.upper()) and not prints_reset(bare(text))
 
 
 def _head(line: str, product: str) -> tuple[str, str, int | str]:

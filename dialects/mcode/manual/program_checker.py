@@ -159,6 +159,8 @@ def _when_executed(read: Read, product: str) -> Iterator[Problem]:
     for line, statement in read:
         column = line.column + statement.column
         if line.section == "program":
+            if statement.word == "PR" and guards.prints_reset(line.text):
+                yield Problem(line.number, column, f"it {guards.RESETS}", "print another character", warning=True)
             if product in EVERY and (valid := out_of_range(statement, product)):
                 what = f"{line.text} is out of range: a drive refuses it when it executes it (error 21)"
                 yield Problem(line.number, line.column, what, valid, warning=True)

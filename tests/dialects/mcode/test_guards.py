@@ -23,6 +23,7 @@ GUARDED = {
     "BD": ["BD=19", "bd 96", "BD19"],
     "DN": ['DN="a"', "dn=a", 'DN "b"', "DN=65", 'DN="', "DN b"],
     "LK": ["LK=1", "lk 1", "LK1", "LK=R1"],
+    "PR": [r'PR "\c"', r'pr P,"a\c"', r'PR "\\\c";', r'PR "a\c'],
     "PY": ["PY=0", "py 0", "PY0", "PY=R1", "PY=!1"],
 }
 FREE = [
@@ -30,6 +31,9 @@ FREE = [
         "PR FD",
         "PR CP",
         'PR "CP"',
+        r'PR "\\c"',
+        r'PR "\r\n\t"',
+        r"PR P ' \c",
         "PR DN",
         "DN",
         "BD",
@@ -54,7 +58,7 @@ def named(state, text):
 
 
 def test_every_form_of_a_guarded_line_is_guarded():
-    assert set(GUARDED) == {*AT_ONCE, *SETTINGS} == set(NAMES) - {"*"}
+    assert set(GUARDED) == {*AT_ONCE, *SETTINGS, "PR"} == set(NAMES) - {"*"}
     for name, texts in GUARDED.items():
         for text in texts:
             assert named(PARTY, text) == name, text
@@ -92,6 +96,12 @@ def test_other_lines_are_free():
 
 def test_leaving_party_mode_is_guarded_on_a_party_line_only():
     assert (named(PARTY, "PY=0"), named(ALONE, "PY=0")) == ("PY", "")
+
+
+def test_ctrl_c_in_a_print_is_guarded_on_a_party_line_only_and_is_never_a_mere_question():
+    line = r'PR "\c"'
+    assert (named(PARTY, line), named(ALONE, line), named(ALONE, "a" + line)) == ("PR", "", "PR")
+    assert not FAMILY.guards.only_reads(line) and FAMILY.guards.only_reads("PR P")
 
 
 def test_a_line_to_all_that_can_start_a_drive_is_guarded():
