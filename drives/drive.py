@@ -346,6 +346,7 @@ class Drive:
         for drive in others:
             drive._disturbed(text)
             drive.calm = False  # what was read of it before says nothing of what is read next
+            drive.resting = (drive.resting[0], drive.commands - 1, {})
             drive.settings.clear()
             if self.state.settings_unknown:
                 drive.state.settings_may_have_changed()
