@@ -212,8 +212,21 @@ class Drive:
 
             for match in quantities(text):
                 raise Inexpressible(f"{self.shown}: '{text}': {match[0]} is not converted here; nothing was sent")
+        self.check_address(text)
         if self.state.address not in GLOBAL or self.codec.broadcasts:  # else each drive that the line is for checks it
             self.family.check_line(self.state, text)
+
+    def check_address(self, text: str) -> None:
+        """Raise Inexpressible for a line that begins with the address of a drive of this line, as on the wire."""
+        found = self.family.addressed(text, self.state.product)
+        if found is None:
+            return
+        name, line = found
+        addresses = {each.address: f"@{name} {line}" for each in self._neighbours.all_drives if each.address}
+        plain = {each.state.name: line for each in self._neighbours.all_drives if not each.address}
+        everyone = {each: f"@{each} {line}" for each in GLOBAL if addresses}
+        if (right := (everyone | plain | addresses).get(name)) is not None:
+            raise Inexpressible(f"{self.shown}: '{text}' is not a command: write {right}; nothing was sent")
 
     async def _send(self, text: str, check: Check | None) -> tuple[str, ...]:
         to_all = self.state.address in GLOBAL
@@ -333,6 +346,7 @@ class Drive:
         for drive in others:
             drive._disturbed(text)
             drive.calm = False  # what was read of it before says nothing of what is read next
+            drive.resting = (drive.resting[0], drive.commands - 1, {})
             drive.settings.clear()
             if self.state.settings_unknown:
                 drive.state.settings_may_have_changed()
