@@ -134,6 +134,7 @@ FIXED = {
     8000715: "a stop of the computer that lends the port, soon after one of its client (of the simulation itself)",
     300197: "the stop of an early end that was owed after a loss, which failed for a controller and a module",
     300003: "a stop of a half-sent line, which another key met on its way (of the simulation itself)",
+    300935: "a slow disk that kept the thread from writing the rest of a stop (of the simulation itself)",
     300170: "a stop on a line that was lost again as it came back (of the simulation itself)",
     8002337: "a stop of which a loop that was held up sent the other controllers nothing for four seconds",
 }
