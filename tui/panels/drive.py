@@ -10,7 +10,7 @@ import math
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
-from multidrop.dialects.values import UNREAD, Conditions, Lamp, Pace
+from multidrop.dialects.values import Conditions, Lamp, Pace
 from multidrop.tui.panels.view import NOT_REFERENCED, Glance, View, firmware_of, name_of
 from multidrop.tui.readout import READ, SWITCHES, Readout
 from multidrop.tui.text import age, at_words, fit
@@ -70,8 +70,7 @@ def lamp_groups(conditions: Conditions, old: bool) -> tuple[list[list[Span]], li
 def error_span(conditions: Conditions, old: bool) -> Span:
     if not conditions.error:
         return "error none", "dim"
-    number = "" if conditions.error == UNREAD else f" {conditions.error}"
-    text = f"✗ error{number}: {conditions.error_text}"
+    text = f"✗ {conditions.error_name}: {conditions.error_text}"
     return (f"{text} (old)", "dim") if old else (text, "error")
 
 
@@ -81,7 +80,7 @@ def trouble_of(axis: Readout) -> str:
     if axis.trouble or conditions is None or not conditions.error:
         return axis.trouble
     limits = [lamp.function for lamp in conditions.lamps if lamp.on and lamp.function in LIMITS]
-    return limits[0] if limits else "error" if conditions.error == UNREAD else f"error {conditions.error}"
+    return limits[0] if limits else conditions.error_name
 
 
 def program_words(readout: Readout, now: float) -> str:
