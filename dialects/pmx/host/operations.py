@@ -248,7 +248,9 @@ def identify(hints: Hints) -> Procedure[list[PmxState]]:
 def find(state: PmxState) -> Procedure[PmxState | None]:
     """Identify one controller; None where it is silent."""
     text = ""
-    for _ in range(TRIES):
+    for tried in range(TRIES):
+        if tried and not text.startswith("?"):  # a gateway's greeting came in its place: the controller's reply is late
+            yield from _mark(state, state.codec.request(state.address, "ID"), False)
         text = yield from _ask(state, "ID")
         if not text or PRODUCT.search(text):
             break
