@@ -11,9 +11,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 
-from multidrop.dialects.codec import Priority, Procedure
+from multidrop.dialects.codec import Priority, Procedure, Request
 from multidrop.dialects.errors import Diagnostic, Inexpressible, NoAnswer, Refused
 from multidrop.dialects.mcode.host import units
+from multidrop.dialects.mcode.host.classify import WHOLE
 from multidrop.dialects.mcode.host.state import who
 from multidrop.dialects.mcode.host.values import SNAPSHOT_WORDS, rows_of_list, snapshot_of
 from multidrop.dialects.mcode.manual import parameter_plan, points
@@ -33,7 +34,7 @@ from multidrop.dialects.modbus.host.operations import (
     sure,
     value,
 )
-from multidrop.dialects.modbus.manual.registers import REGISTERS
+from multidrop.dialects.modbus.manual.registers import AT, REGISTERS
 from multidrop.dialects.units import Basis, Units
 from multidrop.dialects.values import (
     Conditions,
@@ -234,4 +235,15 @@ def basis(state: ModbusState, axis: str, full_steps: int | None) -> Procedure[Ba
     return units.counted(state.product, values, full_steps)
 
 
-UNITS = Units(units.UNITS.axes, units.fields, units.UNITS.words, basis, units.disturbs, units.reads)
+def recounts(request: Request) -> bool:
+    """Whether it writes such a register, or one that restores all of them, by a word or by its number."""
+    if units.recounts(request):
+        return True
+    if request.body[:1] != bytes([framing.WRITE_REGISTERS]):
+        return False
+    first, count = int.from_bytes(request.body[1:3]), int.from_bytes(request.body[3:5])
+    written = (AT.get(address) for address in range(first, first + count))
+    return any(row.name in (*units.RESTS, *WHOLE) for row in written if row is not None)
+
+
+UNITS = Units(units.UNITS.axes, units.fields, units.UNITS.words, basis, units.disturbs, recounts, units.reads)
