@@ -81,7 +81,8 @@ def trouble_of(axis: Readout) -> str:
     if axis.trouble or conditions is None or not conditions.error:
         return axis.trouble
     limits = [lamp.function for lamp in conditions.lamps if lamp.on and lamp.function in LIMITS]
-    return limits[0] if limits else "error" if conditions.error == UNREAD else f"error {conditions.error}"
+    unnumbered = conditions.cause or "error"
+    return limits[0] if limits else unnumbered if conditions.error == UNREAD else f"error {conditions.error}"
 
 
 def program_words(readout: Readout, now: float) -> str:
