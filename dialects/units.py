@@ -18,7 +18,7 @@ from fractions import Fraction
 from functools import cached_property
 from typing import Any, Generic, NamedTuple, TypeVar
 
-from multidrop.dialects.codec import Procedure
+from multidrop.dialects.codec import Procedure, Request
 from multidrop.dialects.errors import Diagnostic
 from multidrop.dialects.state import DriveState
 
@@ -244,11 +244,15 @@ def _loads(own: Sequence[str]) -> tuple[str, ...]:
     return (*(name for name, (kind, _) in PLACES.items() if kind != MOTOR), *own)
 
 
+Settings = tuple[tuple[str, str], ...]
+"""Names and values."""
+
+
 @dataclass(frozen=True)
 class Basis:
     """What the counting of an axis rests on, as read from its drive."""
 
-    settings: tuple[tuple[str, str], ...] = ()
+    settings: Settings = ()
     """Names and values; where one differs later, no quantity is sent."""
     turn: Fraction | None = None
     """Counts of one turn of the motor; None where nothing tells."""
@@ -437,6 +441,8 @@ class Units(Generic[S]):
     """Read what the counting of an axis rests on; the last: its full steps a turn, where a person gave them."""
     disturbs: Callable[[S, str], Collection[str]]
     """The axes whose positions may count from elsewhere, or otherwise, after a line."""
+    recounts: Callable[[Request], bool]
+    """Whether a request, once executed, may change what the counting of an axis rests on."""
     reads: Callable[[S, str], tuple[str, Takes] | None]
     """What a question prints: its axis, and how that counts; None: no quantity."""
     setting: Callable[[S, str], tuple[str, Takes] | None] | None = None

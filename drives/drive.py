@@ -6,7 +6,7 @@ import asyncio
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Protocol, TypeVar
 
-from multidrop.dialects.codec import Codec, Priority, Procedure
+from multidrop.dialects.codec import Codec, Kind, Priority, Procedure, Request
 from multidrop.dialects.errors import (
     Differs,
     DriveError,
@@ -24,6 +24,7 @@ from multidrop.dialects.program_files import Held, ProgramFiles
 from multidrop.dialects.state import DriveState
 from multidrop.dialects.values import Value
 from multidrop.drives.conversations import ASKING, Conversation, Conversations, OnOver, awaited, refuse_stranger
+from multidrop.drives.counting import Counting
 from multidrop.drives.events import Changed, Outcome, Transaction
 from multidrop.drives.link import Link
 from multidrop.drives.motion_record import MotionRecord
@@ -80,6 +81,8 @@ class Drive:
         """Settings as last read, by the part of the conditions, and the number of `commands` then."""
         self.anchored: frozenset[str] = frozenset()
         """The axes whose positions are places of the machine: setting a position gives them no reference."""
+        self.counting = Counting()
+        """What the scales of its axes rest on."""
         self.missing = False
         """It did not reply to the last request; replies since then are not compared yet."""
         self.started_at = float("-inf")
@@ -393,6 +396,19 @@ class Drive:
 
         return self.start(family.motion(self.state, priority), over)
 
+    def scale_holds(self, axis: str) -> bool:
+        """Whether the scale of an axis rests on what was accepted, as far as is known."""
+        return self.counting.holds(axis, self.state.recounts)
+
+    def _noted(self, request: Request) -> None:
+        """Note a request, which may be executed, that may change what an axis counts."""
+        if request.kind is Kind.PROGRAM or self.state.programming:
+            return
+        meant = [each for each in self._meant if each.counting.axes]
+        if meant and self.family.units.recounts(request):
+            for each in meant:
+                each.state.counts_may_have_changed()
+
     async def rest(self) -> tuple[int, ...] | None:
         """Read whether it rests: None while it moves; else what a reading REST later must show again, too."""
         at = self.link.now()
@@ -427,6 +443,8 @@ class Drive:
             self.requests += transaction.sent
             if transaction.request.kind not in ASKING:
                 commanded, self.commands = True, self.commands + transaction.sent
+            if transaction.sent:
+                self._noted(transaction.request)
 
         def over(outcome: Outcome[T]) -> None:
             self._neighbours.conversation_ended(self, address, commanded or isinstance(outcome.error, Stopped))
@@ -435,6 +453,7 @@ class Drive:
                 self.missing = True
             elif self.missing and outcome.error is None and not state.programming:
                 self.missing = False
+                self.state.counts_may_have_changed()  # it may have been switched off and on
                 self._neighbours.replied_again(self)
             if (state.address, state.programming, state.codec) != before:
                 link.publish(Changed(link.now(), state.address))

@@ -109,6 +109,7 @@ class Restarts:
             signs.append(f"{_shown(name)} {_text(before[name])} before, {_text(settings[name])} now")
         more = f"; {len(signs) - NAMED} more differ" if len(signs) > NAMED else ""
         drive.state.reference_lost(axis.axis for axis in axes)
+        drive.state.counts_may_have_changed()
         drive.hold = f"it was restarted ({signs[0]})" if drive.strict else ""
         verb = f"/referenced {drive.address}".rstrip()
         self._link.notify(
@@ -261,6 +262,7 @@ class Roster:
             drive.state.restarted(alone=len(self.drives) == 1)
             if len(self.drives) == 1:
                 drive.motions.restarted()
+            drive.state.counts_may_have_changed()
         which = f"one of {', '.join(self.drives)}" if len(self.drives) > 1 else next(iter(self.drives), "")
         text = f"{which or 'the drive'} was restarted (sign-on); its settings are read before the next line"
         self.link.notify(text, warning=True)

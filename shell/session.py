@@ -336,6 +336,8 @@ class LinePath:
             session.changed()
         for each in printed:
             session.publish(Printed(session.now(), bus.name, drive.address, each, by))
+        if session.scaled:
+            await session.units.look(drive, text)
 
     async def _raw_text(self, raw: RawLine, parsed: DriveLine, by: By) -> None:
         session, name, typed = self._session, raw.bus.name, parsed.typed.strip()

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import partial
@@ -32,8 +33,10 @@ from multidrop.dialects.units import (
 )
 from multidrop.drives.drive import confirmed_motion
 from multidrop.drives.events import Unsolicited
-from multidrop.shell.events import OnBus, SessionEvent
+from multidrop.drives.recount import recount
+from multidrop.shell.events import OnBus, SessionEvent, SettingsRead
 from multidrop.shell.line_syntax import EVERYONE
+from multidrop.transports import TransportLost
 
 if TYPE_CHECKING:
     from multidrop.drives.bus import Bus
@@ -56,9 +59,16 @@ class Axis:
     """None: there is no basis yet, or the scale cannot be used (`problem`)."""
     problem: str = "what it rests on has not been read"
     sure: bool = False
-    """Nothing that could change what it rests on has run since it was read."""
+    """No program that could change what it rests on has run since it was read."""
+    holds: bool = True
+    """What it rests on is what was accepted, as far as is known; else the drive's own numbers are shown."""
     told: bool = False
     """It was said that moves are not checked."""
+
+    @property
+    def current(self) -> Measure | None:
+        """The measure to show numbers with; None: the drive's own are shown."""
+        return self.measure if self.holds else None
 
     def accept(self, basis: Basis) -> None:
         """Take what was read as what the scale rests on."""
@@ -96,6 +106,7 @@ class Units:
         """Positions are shown in units where an axis has a scale."""
         self._axes: WeakKeyDictionary[Drive, dict[str, Axis]] = WeakKeyDictionary()
         workspace.subscribe(self._overhear, Unsolicited)
+        workspace.subscribe(self._settings_read, SettingsRead)
 
     def _overhear(self, event: SessionEvent) -> None:
         """Note the commands of others that show: an echo of another master's, or a program's print for a drive."""
@@ -113,6 +124,13 @@ class Units:
                     drive.state.reference_lost(lost)
                     why = f"'{text}' of another sender: its places are not referenced"
                     self.workspace.notify(f"{self.name(drive, '')}: {why}", bus=bus.name, warning=True)
+
+    def _settings_read(self, event: SessionEvent) -> None:
+        """Take no scale to hold that settings which were read contradict."""
+        bus = self.workspace.buses.get(event.bus) if isinstance(event, SettingsRead) else None
+        drive = bus.drives.get(event.address) if bus is not None and isinstance(event, SettingsRead) else None
+        if drive is not None and isinstance(event, SettingsRead) and drive.counting.contradicted(event.readings.values):
+            drive.state.counts_may_have_changed()
 
     # Scales
 
@@ -149,8 +167,9 @@ class Units:
     def of(self, drive: Drive, axis: str = "") -> Axis | None:
         """The scale of an axis; None: it has none."""
         found = self.axes(drive).get(axis)
-        if found is not None and found.sure and _runs(drive):
-            found.sure = False
+        if found is not None:
+            found.sure = found.sure and not _runs(drive)
+            found.holds = drive.scale_holds(axis)
         return found
 
     def scales(self, drive: Drive) -> dict[str, Scale]:
@@ -158,19 +177,27 @@ class Units:
         return {name: axis.scale for name, axis in self.axes(drive).items()}
 
     def given(self, drive: Drive, axis: str, number: float, takes: Takes = Takes.PLACE) -> tuple[float, str] | None:
-        """A number of an axis in its unit, and the unit with `?` while that is not sure; None: it has no scale."""
+        """A number of an axis in its unit, and the unit with `?` while that is not sure.
+
+        None: it has no scale, or none that holds.
+        """
         found = self.of(drive, axis)
-        if found is None or found.measure is None or not found.measure.counts(takes):
+        measure = found.current if found is not None else None
+        if found is None or measure is None or not measure.counts(takes):
             return None
-        unit = found.measure.unit_for(takes)
-        return round(found.measure.value(number, takes), 9), unit if found.sure else f"{unit}?"
+        unit = measure.unit_for(takes)
+        return round(measure.value(number, takes), 9), unit if found.sure else f"{unit}?"
 
     def words(self, drive: Drive, axis: str, number: float, takes: Takes = Takes.PLACE) -> str:
-        """` (12.5 mm)`, to follow a number of an axis; empty where it has no scale, or a person wants no units."""
+        """` (12.5 mm)`, to follow a number of an axis.
+
+        Empty where it has no scale, or none that holds, or a person wants no units.
+        """
         found = self.of(drive, axis) if self.shown else None
-        if found is None or found.measure is None or not found.measure.counts(takes):
+        measure = found.current if found is not None else None
+        if found is None or measure is None or not measure.counts(takes):
             return ""
-        return f" ({found.measure.shown(number, takes)}{'' if found.sure else '?'})"
+        return f" ({measure.shown(number, takes)}{'' if found.sure else '?'})"
 
     def referenced(self, drive: Drive, axis: str) -> bool:
         """Whether places of the machine count."""
@@ -187,10 +214,27 @@ class Units:
     async def confirm(self, drive: Drive) -> None:
         """Read what the scales of a drive rest on, and take it as it is. Raises DriveError or TransportLost."""
         for name, axis in self.axes(drive).items():
-            axis.accept(await self.read(drive, name, axis.scale))
+            recounts, basis = drive.state.recounts, await self.read(drive, name, axis.scale)
+            axis.accept(basis)
+            drive.counting.accept(name, basis.settings, recounts)
             if _runs(drive):
                 axis.sure = False
         self.workspace.changed()
+
+    async def look(self, drive: Drive, text: str = "") -> None:
+        """Read again what the scales of a drive rest on if a line named one of the settings, or may have changed one.
+
+        An empty text: in any case. What cannot be read is not known, so the drive's own numbers are shown.
+        """
+        bus = self.workspace.buses.get(drive.link.name)
+        meant = bus.all_drives if bus is not None and drive.address in EVERYONE else [drive]
+        for each in meant if not drive.programming else ():
+            holds = all(map(each.scale_holds, each.counting.axes))
+            named = not text or any(re.search(rf"\b{name}\b", text, re.I) for name in each.counting.names)
+            if each.counting.axes and (named or not holds):
+                with suppress(DriveError, TransportLost):
+                    await recount(each)
+                self.workspace.changed()
 
     async def opened(self, bus: Bus) -> None:
         """Read what the scales of a bus rest on; say which of them are for no drive, or cannot be read."""
@@ -350,8 +394,10 @@ class Units:
 
     def _same(self, drive: Drive, name: str, measure: Measure, text: str) -> Procedure[None]:
         """Read what a scale rests on. Raises Differs where it is not what a measure was made with."""
+        recounts = drive.state.recounts
         found = yield from drive.family.units.basis(drive.state, name, measure.scale.full_steps)
         axis = self.axes(drive)[name]
+        drive.counting.saw(name, found.settings, recounts)
         if axis.scale != measure.scale:
             raise Differs(f"{drive.shown}: its scale was changed meanwhile; '{text}' was not sent")
         if found.settings != measure.basis.settings:

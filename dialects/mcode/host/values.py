@@ -24,6 +24,7 @@ from multidrop.dialects.mcode.host.exchange import (
     sign,
     value,
 )
+from multidrop.dialects.mcode.host.motions import cause
 from multidrop.dialects.mcode.host.operations import perform
 from multidrop.dialects.mcode.host.state import MCodeState, refuse_in_program, who
 from multidrop.dialects.mcode.manual import parameter_plan, points
@@ -283,14 +284,14 @@ def save(state: MCodeState) -> Procedure[None]:
 # known where the host sent the move: MA, or MR from a position that was read at rest.
 
 
-STATE = ("EF", "BY", "MV", "VC", "MP", "DE", "P", "IN", "I5", "AF")
+STATE = ("EF", "BY", "MV", "VC", "MP", "DE", "ST", "P", "IN", "I5", "AF")
 """What changes by itself, or by a program; the flags first, which need no separator."""
 SETTINGS = ("EE", "AS", "RC", "HC", "VI", "VM", "A", "D")
 POINTS = ("S1", "S2", "S3", "S4")
 """The set-ups of an MDrivePlus."""
 SETTLED = "IS1"
 """Among the facts once the set-ups were read."""
-UNSURE = frozenset({"EE", "AS", "AF", "I5"})
+UNSURE = frozenset({"EE", "AS", "AF", "I5", "ST"})
 """Words that not every Lexium has."""
 REFUSAL = "refuses to print its conditions"
 
@@ -299,7 +300,10 @@ def parts(state: MCodeState, facts: Facts) -> Sequence[Part[MCodeState]]:
     """The parts of a drive: its state, its settings, and its set-ups, which have another form on an MDrivePlus."""
     if state.codec.em == 3 or state.address in EVERY_DRIVE or state.programming:
         return ()
-    found = [Part("state", _state), Part("settings", partial(_values, names=SETTINGS), slow=True)]
+    found = [
+        Part("state", partial(_state, before=facts)),
+        Part("settings", partial(_values, names=SETTINGS), slow=True),
+    ]
     if facts.get("BY") and SETTLED in facts:
         return found  # a list has no signature, and a program prints lines, too
     if not (lists := manual.lists(state.product, state.version)):
@@ -307,8 +311,9 @@ def parts(state: MCodeState, facts: Facts) -> Sequence[Part[MCodeState]]:
     return found + [Part(word, partial(_list, word=word, numbers=rows), slow=True) for word, rows in lists.items()]
 
 
-def _state(state: MCodeState) -> Procedure[Facts]:
-    facts = yield from _values(state, STATE)
+def _state(state: MCodeState, before: Facts) -> Procedure[Facts]:
+    facts = dict((yield from _values(state, STATE)))
+    facts[points.CAUSE] = cause(facts, before)
     state.program_read(error=bool(facts["EF"]), running=bool(facts["BY"]))
     position = facts["P"]
     at_rest = isinstance(position, int) and not facts["MV"] and not facts["BY"]

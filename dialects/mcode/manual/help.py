@@ -82,7 +82,6 @@ def facts(row: Mnemonic, product: str = "") -> dict[str, str]:
     if product in EVERY and product not in row.products:
         here = f"not in an {product}: error 37" if product in row.reserved_on else f"a free name in an {product}"
         here = f"not in an {product}: it prints 0; error 37 for any value" if product in row.zero_on else here
-    more = {} if older else {each["label"]: each["text"] for each in details().get(row.name, ())}
     return {
         "syntax": row.syntax,
         "range": range_of(row),
@@ -94,14 +93,16 @@ def facts(row: Mnemonic, product: str = "") -> dict[str, str]:
         "size": "not on NEMA 17" if row.large else "",
         "here": here,
         "note": row.note,
-        **more,
         "manual": f"MCode reference of 2012, page {row.section}" if older else f"MCode reference {row.section}",
     }
 
 
 def page(row: Mnemonic, said: Mapping[str, str]) -> list[str]:
-    """Lay out the help on a word, with a line for each fact."""
-    lines = [f"  {label:<10} {fact}" for label, fact in said.items() if fact]
+    """Lay out the help on a word, with a line for each fact, and for each detail before the last fact."""
+    older = row.reserved_on <= MDRIVE_PLUS
+    *facts, manual = said.items()
+    more = [] if older else [(each["label"], each["text"]) for each in details().get(row.name, ())]
+    lines = [f"  {label:<10} {fact}" for label, fact in (*facts, *more, manual) if fact]
     return [f"{row.name}: {row.title} ({row.kind})", f"  {row.meaning}", *lines]
 
 
