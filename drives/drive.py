@@ -210,11 +210,13 @@ class Drive:
 
     def check_line(self, text: str) -> None:
         """Raise Inexpressible for a line that cannot be sent whole, or that its language lacks."""
-        if "{" in text:
-            from multidrop.dialects.units import quantities
+        if "{" in text or "}" in text:
+            from multidrop.dialects.units import quantities, strange_brace
 
             for match in quantities(text):
                 raise Inexpressible(f"{self.shown}: '{text}': {match[0]} is not converted here; nothing was sent")
+            if brace := strange_brace(text):
+                raise Inexpressible(f"{self.shown}: '{text}': {brace} is not a quantity; nothing was sent")
         if self.state.address not in GLOBAL or self.codec.broadcasts:  # else each drive that the line is for checks it
             self.family.check_line(self.state, text)
 

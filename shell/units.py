@@ -21,7 +21,6 @@ from multidrop.dialects import Diagnostic, DriveError, Procedure, Refused
 from multidrop.dialects.errors import Differs
 from multidrop.dialects.units import (
     PLACES,
-    QUANTITY,
     SHORT,
     Basis,
     Field,
@@ -30,6 +29,7 @@ from multidrop.dialects.units import (
     Takes,
     quantities,
     quantity,
+    strange_brace,
 )
 from multidrop.drives.drive import confirmed_motion
 from multidrop.drives.events import Unsolicited
@@ -43,8 +43,6 @@ if TYPE_CHECKING:
     from multidrop.drives.drive import Check, Drive
     from multidrop.shell.workspace import Workspace
 
-_BRACES = re.compile(r"\{\s*[+-]?[.,]?\d[^{}\"]*\s[^{}\"]*\}")
-"""Braces that hold a number and more: a quantity, or one that is written wrongly."""
 _BARE = re.compile(r"([+-]?(?:\d+[.,]?\d*|[.,]\d+)) ?([A-Za-z]\w*?(?:/(?:s2|s|min))?)(?![a-z0-9_/])", re.ASCII)
 _UNQUOTED = re.compile(r'"[^"]*(?:"|$)')
 
@@ -283,10 +281,11 @@ class Units:
         # A quantity that is written wrongly is refused before anything is converted.
         bare = _UNQUOTED.sub(lambda match: " " * len(match[0]), text)
         found = list(quantities(text))
-        for match in _BRACES.finditer(bare):
-            if QUANTITY.fullmatch(match[0]) is None:
-                quantity(match[0][1:-1], self.own)
-                raise Diagnostic(f"not a quantity: {match[0]}", "", "valid: {NUMBER SPACE UNIT}, as in {12.5 mm}")
+        if brace := strange_brace(text):
+            if re.search(r"\d,\d", brace):
+                quantity(brace.strip("{}"), self.own)
+            valid = "valid: {NUMBER SPACE UNIT}, as in {12.5 mm}; a script fills in {NAME}"
+            raise Diagnostic(f"{brace} is not a quantity; nothing was sent", text.strip(), valid)
         for unit in _BARE.finditer(bare):
             if unit[2].partition("/")[0] in (*PLACES, *SHORT, *self.own):
                 written = f"{{{unit[1].replace(',', '.')} {unit[2]}}}"
