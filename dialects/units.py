@@ -403,6 +403,14 @@ def strange_brace(text: str) -> str:
     return found[0].strip() if found is not None else ""
 
 
+def unsendable(text: str) -> str:
+    """The reason for which a line with braces must not go to a drive as it is; empty: its braces are in a text."""
+    for match in quantities(text):
+        return f"{match[0]} is not converted here"
+    brace = strange_brace(text)
+    return f"{brace} is not a quantity" if brace else ""
+
+
 def _places(value: Fraction) -> int:
     """Decimal places that the first digit of a value has; negative for whole numbers of several digits."""
     return -math.floor(math.log10(value))

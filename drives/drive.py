@@ -6,7 +6,7 @@ import asyncio
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Protocol, TypeVar
 
-from multidrop.dialects.codec import Codec, Kind, Priority, Procedure, Request
+from multidrop.dialects.codec import Codec, Priority, Procedure
 from multidrop.dialects.errors import (
     Differs,
     DriveError,
@@ -24,7 +24,7 @@ from multidrop.dialects.program_files import Held, ProgramFiles
 from multidrop.dialects.state import DriveState
 from multidrop.dialects.values import Value
 from multidrop.drives.conversations import ASKING, Conversation, Conversations, OnOver, awaited, refuse_stranger
-from multidrop.drives.counting import Counting
+from multidrop.drives.counting import Counting, note
 from multidrop.drives.events import Changed, Outcome, Transaction
 from multidrop.drives.link import Link
 from multidrop.drives.motion_record import MotionRecord
@@ -211,14 +211,25 @@ class Drive:
     def check_line(self, text: str) -> None:
         """Raise Inexpressible for a line that cannot be sent whole, or that its language lacks."""
         if "{" in text or "}" in text:
-            from multidrop.dialects.units import quantities, strange_brace
+            from multidrop.dialects.units import unsendable
 
-            for match in quantities(text):
-                raise Inexpressible(f"{self.shown}: '{text}': {match[0]} is not converted here; nothing was sent")
-            if brace := strange_brace(text):
-                raise Inexpressible(f"{self.shown}: '{text}': {brace} is not a quantity; nothing was sent")
+            if why := unsendable(text):
+                raise Inexpressible(f"{self.shown}: '{text}': {why}; nothing was sent")
+        self.check_address(text)
         if self.state.address not in GLOBAL or self.codec.broadcasts:  # else each drive that the line is for checks it
             self.family.check_line(self.state, text)
+
+    def check_address(self, text: str) -> None:
+        """Raise Inexpressible for a line that begins with the address of a drive of this line, as on the wire."""
+        found = self.family.addressed(text, self.state.product)
+        if found is None:
+            return
+        name, line = found
+        addresses = {each.address: f"@{name} {line}" for each in self._neighbours.all_drives if each.address}
+        plain = {each.state.name: line for each in self._neighbours.all_drives if not each.address}
+        everyone = {each: f"@{each} {line}" for each in GLOBAL if addresses}
+        if (right := (everyone | plain | addresses).get(name)) is not None:
+            raise Inexpressible(f"{self.shown}: '{text}' is not a command: write {right}; nothing was sent")
 
     async def _send(self, text: str, check: Check | None) -> tuple[str, ...]:
         to_all = self.state.address in GLOBAL
@@ -338,6 +349,7 @@ class Drive:
         for drive in others:
             drive._disturbed(text)
             drive.calm = False  # what was read of it before says nothing of what is read next
+            drive.resting = (drive.resting[0], drive.commands - 1, {})
             drive.settings.clear()
             if self.state.settings_unknown:
                 drive.state.settings_may_have_changed()
@@ -388,15 +400,6 @@ class Drive:
         """Whether the scale of an axis rests on what was accepted, as far as is known."""
         return self.counting.holds(axis, self.state.recounts)
 
-    def _noted(self, request: Request) -> None:
-        """Note a request, which may be executed, that may change what an axis counts."""
-        if request.kind is Kind.PROGRAM or self.state.programming:
-            return
-        meant = [each for each in self._meant if each.counting.axes]
-        if meant and self.family.units.recounts(request):
-            for each in meant:
-                each.state.counts_may_have_changed()
-
     async def rest(self) -> tuple[int, ...] | None:
         """Read whether it rests: None while it moves; else what a reading REST later must show again, too."""
         at = self.link.now()
@@ -432,7 +435,7 @@ class Drive:
             if transaction.request.kind not in ASKING:
                 commanded, self.commands = True, self.commands + transaction.sent
             if transaction.sent:
-                self._noted(transaction.request)
+                note(self._meant, transaction.request)
 
         def over(outcome: Outcome[T]) -> None:
             self._neighbours.conversation_ended(self, address, commanded or isinstance(outcome.error, Stopped))

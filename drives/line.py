@@ -114,7 +114,11 @@ class Write(NamedTuple):
     request: Request | None
 
 
-LineEvent = Write | Finished | Unsolicited
+class EchoFound(NamedTuple):
+    """The adapter repeats what it sends: our own bytes are removed from now on."""
+
+
+LineEvent = Write | Finished | Unsolicited | EchoFound
 
 
 @dataclass(frozen=True)
@@ -137,7 +141,7 @@ class Line:
         self, codec: Codec, *, baud: int = 0, local_echo: bool = False, timeout: float = DEFAULT_TIMEOUT
     ) -> None:
         self.timeout = timeout
-        self.inbox = Inbox(codec, local_echo, self._publish)
+        self.inbox = Inbox(codec, local_echo, self._publish, lambda: self._events.append(EchoFound()))
         self.transmitted = float("-inf")
         """Time at which the last byte written has left, calculated from the baud rate, s."""
         self.baud = baud
@@ -194,11 +198,14 @@ class Line:
             self.printed_at = now
         self.inbox.receive(data, now)
 
-    def wrote(self, data: bytes, now: float, whole: bool = False) -> None:
-        """Note bytes that were written past the queue: a stop. `whole`: a part of them would do harm in a drive."""
+    def wrote(self, data: bytes, now: float, whole: bool = False, codec: Codec | None = None) -> None:
+        """Note bytes that were written past the queue: a stop. `whole`: a part of them would do harm in a drive.
+
+        `codec`: they are a request of this codec.
+        """
         self.transmitted = now + len(data) * self.byte_time
         self._partial_until = self.transmitted if whole else float("-inf")
-        self.inbox.wrote(data, now)
+        self.inbox.wrote(data, now, codec)
 
     def not_written(self, now: float) -> None:
         """Note that the transport dropped the last Write: no drive receives any of it."""
@@ -351,7 +358,7 @@ class Line:
         request = copy_with(request, tag=ticket)
         data = request.codec.encode(request)
         self.only_stop = False
-        self.wrote(data, now, whole=True)
+        self.wrote(data, now, whole=True, codec=request.codec)
         self._state = Flight(ticket, request, now, self.transmitted, now)
         self._events.append(Write(data, request))
 
@@ -376,7 +383,10 @@ class Line:
 
     def _decoded(self, flight: Flight, now: float) -> Decoded | None:
         """The reply, if it is whole, if quiet ends it, or if time is up."""
-        codec, request, buffer = flight.request.codec, flight.request, self.inbox.buffer
+        codec, request = flight.request.codec, flight.request
+        if now >= min(flight.times(self.inbox.buffer, self.timeout)):
+            self.inbox.notice_echo(b"", now, over=True)
+        buffer = self.inbox.buffer
         if not self._takes_reply(flight):
             return codec.on_timeout(request, b"") if now >= flight.times(buffer, self.timeout)[1] else None
         found = codec.decode(request, buffer) if buffer else None

@@ -110,6 +110,8 @@ class Restarts:
             return self._maybe(drive, rested, axes)
         if drive.hold and drive.state.unreferenced:  # that was said
             return
+        if not sign:  # with one, that was recorded as it came
+            drive.motions.restarted()
         signs = [sign] if sign else []
         for axis in axes:
             name = f"{axis.axis} " if axis.axis else ""
@@ -333,6 +335,8 @@ class Roster:
         for drive in self.drives.values():
             self.restarts.replied_again(drive, "sign-on" if len(self.drives) == 1 else "")
             drive.state.restarted(alone=len(self.drives) == 1)
+            if len(self.drives) == 1:
+                drive.motions.restarted()
             self.restarts.restarted(drive, certain=len(self.drives) == 1)
         which = f"one of {', '.join(self.drives)}" if len(self.drives) > 1 else next(iter(self.drives), "")
         text = f"{which or 'the drive'} was restarted (sign-on); its settings are read before the next line"

@@ -94,7 +94,7 @@ def _conditioned(known: Readout, after: Conditions, failed_at: float, late: bool
         if after.error == UNREAD:
             yield Happening(_named(after.cause or "an error is set", after.axis), True, after.error_text)
         else:
-            yield Happening(_named(f"error {after.error}: {after.error_text}", after.axis), True)
+            yield Happening(_named(f"{after.error_name}: {after.error_text}", after.axis), True)
     values = dict(before.more)
     for name, value in after.more:
         if value != values.get(name, "") and any(word in value for word in ALARMS):

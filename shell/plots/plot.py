@@ -251,7 +251,7 @@ def states_of(conditions: Conditions) -> Iterator[tuple[str, str]]:
     """The name of each lane and its state; an empty state is not known."""
     yield "program", conditions.program or "none"
     if conditions.error:
-        number = "set" if conditions.error == UNREAD else str(conditions.error)
+        number = "set" if conditions.error == UNREAD else conditions.error_name.removeprefix("error")
         yield "error", f"{number} {conditions.error_text}".strip()
     else:
         yield "error", "none"

@@ -205,7 +205,7 @@ SCALES = st.builds(
 TAKES = st.sampled_from(Takes)
 
 
-@given(SCALES, TAKES, st.integers(-(2**31), 2**31 - 1))
+@given(SCALES, TAKES, st.integers(-(2**31) + 1, 2**31 - 1))
 def test_a_shown_number_typed_back_is_the_same_number(axis, takes, number):
     number = abs(number) if takes.unsigned else number
     assert axis.native(quantity(axis.shown(number, takes), ("pallet",)), takes) == number
@@ -217,7 +217,8 @@ def test_there_and_back_is_within_half_a_step_and_a_hundredth(axis, takes, value
     try:
         number = axis.native(Quantity(value, unit), takes)
     except Diagnostic as refused:
-        assert "after rounding" in str(refused) or (takes.unsigned and value < 0)
+        text, far = str(refused), abs(axis.number(Quantity(abs(value), unit), takes)) > 2**31 - 2
+        assert "after rounding" in text or (takes.unsigned and value < 0) or (far and "for the drive" in text)
         return
     off = abs(axis.exact(number, takes) - value * unit.factor)
     assert off <= abs(axis.count) / 2

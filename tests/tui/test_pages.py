@@ -93,9 +93,10 @@ async def test_a_drive_with_an_error_is_counted_as_that() -> None:
         assert "2 error · 1 moving · 1 stopped" in app.screen.lines("heading").plain  # type: ignore[attr-defined]
 
 
-@pytest.mark.parametrize(
-    "page", ["", "plot", "drives", "controls", "program", "parameters", "why", "traffic", "macros"]
-)
+PAGES = ["", "plot", "drives", "controls", "program", "parameters", "why", "traffic", "macros"]
+
+
+@pytest.mark.parametrize("page", PAGES)
 async def test_conditions_of_the_selected_and_of_plotted_drives_are_read_every_second_on_every_page(page: str) -> None:
     async with on_screen() as (pilot, app, session):
         session.plotted = (Series("press", "b"),)

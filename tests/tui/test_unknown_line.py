@@ -127,7 +127,7 @@ async def test_a_wrong_configuration_is_edited_at_its_line_with_one_key(
             assert not urls or f"^E edits {file}:5" in told(app)
             await pilot.press(key)
             await until(pilot, lambda: isinstance(app.screen, ProgramPage))
-            assert app.screen.editor.cursor_location == (4, 0)
+            await until(pilot, lambda: app.screen.editor.cursor_location == (4, 0))
             await until(pilot, lambda: len(app.screen.findings.problems) == 2)
             await pilot.press("ctrl+f")
             assert app.screen.editor.cursor_location == (5, 0)

@@ -80,6 +80,10 @@ class Mnemonic:
     zero_on: frozenset[str] = frozenset()
     """The products that lack it and print it as 0."""
     note: str = ""
+    firmware: int = 0
+    """The first firmware of a Lexium that has it; 0: any has."""
+    large: bool = False
+    """A Lexium of NEMA size 17 lacks it."""
 
     def accepts(self, value: Number, encoder: bool = False) -> bool:
         """Whether the number is in range, whatever other variables are; with EE=1 where `encoder`."""

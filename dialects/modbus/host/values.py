@@ -35,7 +35,7 @@ from multidrop.dialects.modbus.host.operations import (
     sure,
     value,
 )
-from multidrop.dialects.modbus.manual.registers import AT, REGISTERS
+from multidrop.dialects.modbus.manual.registers import AT, IDENTITY, REGISTERS, SETUPS
 from multidrop.dialects.units import Basis, Units
 from multidrop.dialects.values import (
     Conditions,
@@ -184,7 +184,7 @@ def fold(state: ModbusState, facts: Facts) -> tuple[Conditions, ...]:
     return (points.conditions(state.product, facts, None),)
 
 
-_NO_NUMBER = mapping.IDENTITY.keys() | mapping.SETUPS
+_NO_NUMBER = IDENTITY.keys() | SETUPS
 
 
 def check(state: ModbusState, word: str) -> str:

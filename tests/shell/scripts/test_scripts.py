@@ -72,7 +72,7 @@ async def shop(tmp_path):
     ],
 )
 async def test_blocks_and_values(text, printed, shop):
-    await shop.run(text, COUNT="4")
+    await shop.run(text, **({"COUNT": "4"} if "COUNT" in text else {}))
     assert shop.printed() == printed
 
 
