@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
-from contextlib import suppress
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import partial
@@ -33,10 +32,9 @@ from multidrop.dialects.units import (
 )
 from multidrop.drives.drive import confirmed_motion
 from multidrop.drives.events import Unsolicited
-from multidrop.drives.recount import recount
-from multidrop.shell.events import OnBus, SessionEvent, SettingsRead
+from multidrop.shell.events import OnBus, SessionEvent
 from multidrop.shell.line_syntax import EVERYONE
-from multidrop.transports import TransportLost
+from multidrop.shell.scale_checks import ScaleChecks
 
 if TYPE_CHECKING:
     from multidrop.drives.bus import Bus
@@ -104,7 +102,7 @@ class Units:
         """Positions are shown in units where an axis has a scale."""
         self._axes: WeakKeyDictionary[Drive, dict[str, Axis]] = WeakKeyDictionary()
         workspace.subscribe(self._overhear, Unsolicited)
-        workspace.subscribe(self._settings_read, SettingsRead)
+        self.look = ScaleChecks(workspace).look
 
     def _overhear(self, event: SessionEvent) -> None:
         """Note the commands of others that show: an echo of another master's, or a program's print for a drive."""
@@ -122,13 +120,6 @@ class Units:
                     drive.state.reference_lost(lost)
                     why = f"'{text}' of another sender: its places are not referenced"
                     self.workspace.notify(f"{self.name(drive, '')}: {why}", bus=bus.name, warning=True)
-
-    def _settings_read(self, event: SessionEvent) -> None:
-        """Take no scale to hold that settings which were read contradict."""
-        bus = self.workspace.buses.get(event.bus) if isinstance(event, SettingsRead) else None
-        drive = bus.drives.get(event.address) if bus is not None and isinstance(event, SettingsRead) else None
-        if drive is not None and isinstance(event, SettingsRead) and drive.counting.contradicted(event.readings.values):
-            drive.state.counts_may_have_changed()
 
     # Scales
 
@@ -218,21 +209,6 @@ class Units:
             if _runs(drive):
                 axis.sure = False
         self.workspace.changed()
-
-    async def look(self, drive: Drive, text: str = "") -> None:
-        """Read again what the scales of a drive rest on if a line named one of the settings, or may have changed one.
-
-        An empty text: in any case. What cannot be read is not known, so the drive's own numbers are shown.
-        """
-        bus = self.workspace.buses.get(drive.link.name)
-        meant = bus.all_drives if bus is not None and drive.address in EVERYONE else [drive]
-        for each in meant if not drive.programming else ():
-            holds = all(map(each.scale_holds, each.counting.axes))
-            named = not text or any(re.search(rf"\b{name}\b", text, re.I) for name in each.counting.names)
-            if each.counting.axes and (named or not holds):
-                with suppress(DriveError, TransportLost):
-                    await recount(each)
-                self.workspace.changed()
 
     async def opened(self, bus: Bus) -> None:
         """Read what the scales of a bus rest on; say which of them are for no drive, or cannot be read."""
