@@ -209,8 +209,11 @@ class DriveState:
         """Record that a homing of these axes has ended, or that their position was set; none: of all axes."""
         self.unreferenced = self.unreferenced - frozenset(axes) if axes else frozenset()
 
-    def counts_may_have_changed(self) -> None:
-        """Record that its settings may give a count another length or direction than when they were last read."""
+    def counts_may_have_changed(self, restarted: bool = False) -> None:
+        """Record that its settings may give a count another length or direction than when they were last read.
+
+        `restarted`: it was switched off and on, or may have been, and is set as it was saved.
+        """
         self.recounts += 1
 
     # What is to be restored

@@ -7,15 +7,36 @@ hold, until a reading shows the settings that were accepted.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterable, Mapping
+from typing import TYPE_CHECKING, Any, Protocol
 
-from multidrop.dialects.codec import Priority, Procedure, at_priority
+from multidrop.dialects.codec import Kind, Priority, Procedure, Request, at_priority
+from multidrop.dialects.family import Family
 from multidrop.dialects.state import DriveState
 from multidrop.dialects.values import Value, number
 
 if TYPE_CHECKING:
     from multidrop.dialects.units import Settings, Units
+
+
+class Counted(Protocol):
+    """A drive, as far as its counts need it."""
+
+    @property
+    def counting(self) -> Counting: ...
+    @property
+    def state(self) -> DriveState: ...
+    @property
+    def family(self) -> Family[Any]: ...
+
+
+def note(drives: Iterable[Counted], request: Request) -> None:
+    """Note a request for these drives, which may be executed, that may change what their axes count."""
+    if request.kind is Kind.PROGRAM:
+        return
+    for each in drives:
+        if each.counting.axes and not each.state.programming and each.family.units.recounts(request):
+            each.state.counts_may_have_changed()
 
 
 class Counting:

@@ -6,7 +6,7 @@ import asyncio
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Protocol, TypeVar
 
-from multidrop.dialects.codec import Codec, Kind, Priority, Procedure, Request
+from multidrop.dialects.codec import Codec, Priority, Procedure
 from multidrop.dialects.errors import (
     Differs,
     DriveError,
@@ -24,7 +24,7 @@ from multidrop.dialects.program_files import Held, ProgramFiles
 from multidrop.dialects.state import DriveState
 from multidrop.dialects.values import Value
 from multidrop.drives.conversations import ASKING, Conversation, Conversations, OnOver, awaited, refuse_stranger
-from multidrop.drives.counting import Counting
+from multidrop.drives.counting import Counting, note
 from multidrop.drives.events import Changed, Outcome, Transaction
 from multidrop.drives.line_checks import check_name, check_quantities
 from multidrop.drives.link import Link
@@ -390,15 +390,6 @@ class Drive:
         """Whether the scale of an axis rests on what was accepted, as far as is known."""
         return self.counting.holds(axis, self.state.recounts)
 
-    def _noted(self, request: Request) -> None:
-        """Note a request, which may be executed, that may change what an axis counts."""
-        if request.kind is Kind.PROGRAM or self.state.programming:
-            return
-        meant = [each for each in self._meant if each.counting.axes]
-        if meant and self.family.units.recounts(request):
-            for each in meant:
-                each.state.counts_may_have_changed()
-
     async def rest(self) -> tuple[int, ...] | None:
         """Read whether it rests: None while it moves; else what a reading REST later must show again, too."""
         at = self.link.now()
@@ -434,7 +425,7 @@ class Drive:
             if transaction.request.kind not in ASKING:
                 commanded, self.commands = True, self.commands + transaction.sent
             if transaction.sent:
-                self._noted(transaction.request)
+                note(self._meant, transaction.request)
 
         def over(outcome: Outcome[T]) -> None:
             self._neighbours.conversation_ended(self, address, commanded or isinstance(outcome.error, Stopped))

@@ -9,12 +9,12 @@ from multidrop.drives.port_journal import GLOBAL
 
 
 def check_quantities(shown: str, text: str) -> None:
-    """Raise Inexpressible for a line with a quantity in a unit, which nothing has converted. `shown`: its drive."""
-    if "{" in text:
-        from multidrop.dialects.units import quantities
+    """Raise Inexpressible for a line with a brace that no conversion has taken away. `shown`: its drive."""
+    if "{" in text or "}" in text:
+        from multidrop.dialects.units import unsendable
 
-        for match in quantities(text):
-            raise Inexpressible(f"{shown}: '{text}': {match[0]} is not converted here; nothing was sent")
+        if why := unsendable(text):
+            raise Inexpressible(f"{shown}: '{text}': {why}; nothing was sent")
 
 
 def check_name(shown: str, text: str, found: tuple[str, str] | None, drives: Sequence[tuple[str, str]]) -> None:

@@ -143,6 +143,8 @@ class _Facts:
     read: dict[str, tuple[float, int]] = field(default_factory=dict)
     """Time of each part's last reading, and the drive's commands so far."""
     refused: set[str] = field(default_factory=set)
+    restarts: int = 0
+    """The restarts of the drive so far."""
     scaled_at: float = -inf
     """When what its scales rest on was last read."""
 
@@ -203,8 +205,9 @@ class _ConditionPoller(Poller[str]):
         drive, known = self._roster.drives.get(address), self._known.get(address)
         if drive is None or address not in self.periods:
             return  # nobody wants them any more
-        if known is None or known.drive is not drive:  # another drive is at this address
-            known = self._known[address] = _Facts(drive)
+        restarts = self._roster.restarts.count(drive)
+        if known is None or known.drive is not drive or known.restarts != restarts:  # it holds other settings
+            known = self._known[address] = _Facts(drive, restarts=restarts)
         values = drive.family.values
         ready, begun, period = False, self._link.now(), self.periods[address]
         parts = values.parts(drive.state, known.facts)

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
-from contextlib import suppress
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import partial
@@ -21,7 +20,6 @@ from multidrop.dialects import Diagnostic, DriveError, Procedure, Refused
 from multidrop.dialects.errors import Differs
 from multidrop.dialects.units import (
     PLACES,
-    QUANTITY,
     SHORT,
     Basis,
     Field,
@@ -30,21 +28,19 @@ from multidrop.dialects.units import (
     Takes,
     quantities,
     quantity,
+    strange_brace,
 )
 from multidrop.drives.drive import confirmed_motion
 from multidrop.drives.events import Unsolicited
-from multidrop.drives.recount import recount
-from multidrop.shell.events import OnBus, SessionEvent, SettingsRead
+from multidrop.shell.events import OnBus, SessionEvent
 from multidrop.shell.line_syntax import EVERYONE
-from multidrop.transports import TransportLost
+from multidrop.shell.scale_checks import ScaleChecks
 
 if TYPE_CHECKING:
     from multidrop.drives.bus import Bus
     from multidrop.drives.drive import Check, Drive
     from multidrop.shell.workspace import Workspace
 
-_BRACES = re.compile(r"\{\s*[+-]?[.,]?\d[^{}\"]*\s[^{}\"]*\}")
-"""Braces that hold a number and more: a quantity, or one that is written wrongly."""
 _BARE = re.compile(r"([+-]?(?:\d+[.,]?\d*|[.,]\d+)) ?([A-Za-z]\w*?(?:/(?:s2|s|min))?)(?![a-z0-9_/])", re.ASCII)
 _UNQUOTED = re.compile(r'"[^"]*(?:"|$)')
 
@@ -106,7 +102,7 @@ class Units:
         """Positions are shown in units where an axis has a scale."""
         self._axes: WeakKeyDictionary[Drive, dict[str, Axis]] = WeakKeyDictionary()
         workspace.subscribe(self._overhear, Unsolicited)
-        workspace.subscribe(self._settings_read, SettingsRead)
+        self.look = ScaleChecks(workspace).look
 
     def _overhear(self, event: SessionEvent) -> None:
         """Note the commands of others that show: an echo of another master's, or a program's print for a drive."""
@@ -124,13 +120,6 @@ class Units:
                     drive.state.reference_lost(lost)
                     why = f"'{text}' of another sender: its places are not referenced"
                     self.workspace.notify(f"{self.name(drive, '')}: {why}", bus=bus.name, warning=True)
-
-    def _settings_read(self, event: SessionEvent) -> None:
-        """Take no scale to hold that settings which were read contradict."""
-        bus = self.workspace.buses.get(event.bus) if isinstance(event, SettingsRead) else None
-        drive = bus.drives.get(event.address) if bus is not None and isinstance(event, SettingsRead) else None
-        if drive is not None and isinstance(event, SettingsRead) and drive.counting.contradicted(event.readings.values):
-            drive.state.counts_may_have_changed()
 
     # Scales
 
@@ -221,21 +210,6 @@ class Units:
                 axis.sure = False
         self.workspace.changed()
 
-    async def look(self, drive: Drive, text: str = "") -> None:
-        """Read again what the scales of a drive rest on if a line named one of the settings, or may have changed one.
-
-        An empty text: in any case. What cannot be read is not known, so the drive's own numbers are shown.
-        """
-        bus = self.workspace.buses.get(drive.link.name)
-        meant = bus.all_drives if bus is not None and drive.address in EVERYONE else [drive]
-        for each in meant if not drive.programming else ():
-            holds = all(map(each.scale_holds, each.counting.axes))
-            named = not text or any(re.search(rf"\b{name}\b", text, re.I) for name in each.counting.names)
-            if each.counting.axes and (named or not holds):
-                with suppress(DriveError, TransportLost):
-                    await recount(each)
-                self.workspace.changed()
-
     async def opened(self, bus: Bus) -> None:
         """Read what the scales of a bus rest on; say which of them are for no drive, or cannot be read."""
         workspace = self.workspace
@@ -283,10 +257,11 @@ class Units:
         # A quantity that is written wrongly is refused before anything is converted.
         bare = _UNQUOTED.sub(lambda match: " " * len(match[0]), text)
         found = list(quantities(text))
-        for match in _BRACES.finditer(bare):
-            if QUANTITY.fullmatch(match[0]) is None:
-                quantity(match[0][1:-1], self.own)
-                raise Diagnostic(f"not a quantity: {match[0]}", "", "valid: {NUMBER SPACE UNIT}, as in {12.5 mm}")
+        if brace := strange_brace(text):
+            if re.search(r"\d,\d", brace):
+                quantity(brace.strip("{}"), self.own)
+            valid = "valid: {NUMBER SPACE UNIT}, as in {12.5 mm}; a script fills in {NAME}"
+            raise Diagnostic(f"{brace} is not a quantity; nothing was sent", text.strip(), valid)
         for unit in _BARE.finditer(bare):
             if unit[2].partition("/")[0] in (*PLACES, *SHORT, *self.own):
                 written = f"{{{unit[1].replace(',', '.')} {unit[2]}}}"

@@ -304,7 +304,7 @@ class ScreenModel:
                 program.break_point = event.break_point
             case events.SettingsRead():
                 readout = self.bus(event.bus).readout(event.address)
-                readout.settings, readout.settings_at = event.readings, event.at
+                readout.settings, readout.settings_at = event.readings if event.known else None, event.at
 
     def quiet(self, event: events.SessionEvent) -> bool:
         """True if an event alone is not a reason to paint: bytes on the wire, or values that are those before."""

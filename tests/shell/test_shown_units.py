@@ -295,3 +295,17 @@ async def test_a_drive_that_was_switched_off_and_on_is_not_shown_in_units_before
         await asyncio.sleep(3)
         await shop.session.run("@a PR P")
         assert units.given(drive, "", 25600) is None
+
+
+async def test_after_a_silence_samples_have_units_again_once_the_settings_are_read(tmp_path: Path) -> None:
+    async with CellSession(tmp_path, PRESS) as shop:
+        drive = shop.session.drive("press", "a")
+        assert shop.session.units.given(drive, "", 51200) == (5.0, "mm")
+        async with AsyncTelemetry(shop.session, [drive], 10.0) as telemetry:
+            await asyncio.sleep(2)
+            drive.state.counts_may_have_changed()  # as after a reply that was missing, or a line that came back
+            await asyncio.sleep(0.4)
+            gap = [each.unit for each in (await telemetry.samples()).of("a")]
+            await asyncio.sleep(2)
+            later = [each.unit for each in (await telemetry.samples()).of("a")]
+    assert gap[0] == "mm" and "" in gap and later[-1] == "mm"

@@ -129,6 +129,12 @@ class MCodeState(DriveState):
         """Record the end of the move that was sent; None: a line was sent after which it is not known."""
         self.rest, self.heading = None, target
 
+    def counts_may_have_changed(self, restarted: bool = False) -> None:
+        """Record it; a drive that was restarted neither moves to a target nor steps."""
+        super().counts_may_have_changed(restarted)
+        if restarted:
+            self.rest, self.heading, self.stepping = None, None, False
+
     # Single step
 
     def steps(self) -> None:

@@ -174,10 +174,6 @@ def again(state: MCodeState, word: str, priority: Priority) -> Procedure[float]:
     return float(value(state, reply))
 
 
-def own(state: MCodeState, word: str) -> bool:
-    return lookup(word.upper(), state.product) is not None
-
-
 # A snapshot. A locked program is not asked for, as the refusal would run a resident OE subroutine (5.1.75).
 
 
@@ -279,5 +275,5 @@ VALUES = Values(
     again=again,
     controls=points.controls,
     actions=points.ACTIONS,
-    own=own,
+    own=lambda state, word: lookup(word.upper(), state.product) is not None,
 )
