@@ -23,7 +23,7 @@ from multidrop.shell.session import Session
 from multidrop.simulator.cells import read
 from multidrop.simulator.floor import Floor
 from multidrop.simulator.lexium.device import Answer
-from multidrop.simulator.lexium.ports import mcode as mcode_port
+from multidrop.simulator.lexium.ports import replies
 from multidrop.simulator.lexium.ports.modbus import ModbusPort
 from multidrop.simulator.serving.endpoints import serve_bus
 from multidrop.simulator.serving.running import RunningFloor
@@ -120,13 +120,13 @@ class Planted:
 @contextlib.contextmanager
 def other_bytes(question):
     """Have simulated drives begin the reply to the last line of a question with a blank."""
-    composed = mcode_port.compose
+    composed = replies.compose
 
     def compose(mode, text, outcome, prompt):
         found = composed(mode, text, outcome, prompt)
         return b" " + found if text.lstrip(b"!").startswith(planted_line(question).encode()) else found
 
-    with mock.patch.object(mcode_port, "compose", compose):
+    with mock.patch.object(replies, "compose", compose):
         yield
 
 
