@@ -81,6 +81,11 @@ class Mnemonic:
     """The products that lack it and print it as 0."""
     note: str = ""
 
+    @property
+    def whole(self) -> bool:
+        """Whether its numbers are whole ones."""
+        return isinstance(self.low, int) and not isinstance(self.default, (float, str))
+
     def accepts(self, value: Number, encoder: bool = False) -> bool:
         """Whether the number is in range, whatever other variables are; with EE=1 where `encoder`."""
         if self.values:
