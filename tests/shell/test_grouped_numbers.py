@@ -57,7 +57,7 @@ def test_groups_of_three_digits_are_refused_with_the_number_to_write(line: str, 
 
 POINTS = {
     "MR 51.200": "51, or 51200", "MA -51.200": "51, or 51200", "SL 20.5": "20", "P=1.000": "1, or 1000", "VM=.5": "0",
-    "MA 5,1.0": "1", "R1=2.5": "2", "ma+1.": "1", "LS=1,200.000": "200, or 200000", "H 1.5": "1",
+    "MA 5,1.0": "1", "R1=2.5": "2", "ma+1.": "1", "LS=1,200.000": "200, or 200000", "H 1.5": "2", "MA 1e3": "1000", "SL 1.5E2": "150",
 }  # fmt: skip
 WITH_POINT = (
     "F1=2.5",

@@ -253,7 +253,7 @@ def check_groups(line: str, names: Container[str] = ()) -> None:
 
 
 def _check_points(found: Sequence[Token]) -> None:
-    """Raise LineError for a point in a number of a word that takes whole numbers. In an expression it is arithmetic."""
+    """Raise LineError for a point or an exponent of a word that takes whole numbers. In an expression it is arithmetic."""
     row = lookup(found[0].text.upper()) if found and found[0].kind == "word" else None
     if row is None or not row.whole:
         return
@@ -263,10 +263,10 @@ def _check_points(found: Sequence[Token]) -> None:
     for at, token in enumerate(argument):
         first = at == 0 or argument[at - 1].kind == "comma" or (at == 1 and argument[0].text in "+-")
         last = at == len(argument) - 1 or argument[at + 1].kind == "comma"
-        if first and last and token.kind == "number" and "." in token.text:
+        if first and last and token.kind == "number" and not token.text.isdecimal():
             whole, _, fraction = token.text.partition(".")
-            group = f", or {whole}{fraction}" if len(fraction) == 3 else ""
-            why = f"{token.text} has a fraction, and {row.name} takes whole numbers; write {whole or 0}{group}"
+            group = f", or {whole}{fraction}" if len(fraction) == 3 and fraction.isdecimal() else ""
+            why = f"{token.text} is not whole, and {row.name} takes whole numbers; write {float(token.text):.0f}{group}"
             raise LineError(ErrorNumber.ILLEGAL_DATA, token.start, why)
 
 
