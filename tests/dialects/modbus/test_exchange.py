@@ -183,7 +183,7 @@ def test_a_blank_line_sends_nothing_and_a_comment_is_refused(far):
         ("PR -P,V", "MCode/TCP"),
         ("PR AB P", "MCode/TCP"),
         ("MA 5,1", "MCode/TCP"),
-        ("VM=1.5", "not a whole number"),
+        ("VM=1.5", "takes whole numbers"),
         ("VM=3000000000", "does not fit into the 32 bits of VM"),
         ("HC=70000", "does not fit into the 16 bits of HC"),
         ("MA", "needs a value"),
