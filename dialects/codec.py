@@ -97,7 +97,7 @@ class Reply:
     acknowledged: bool = False
     """The drive confirmed execution: a prompt `>`, or ACK."""
     detail: str = ""
-    """The damage, for DAMAGED."""
+    """The damage, for DAMAGED; what came in place of the reply, for TIMEOUT."""
     raw: bytes = b""
     """The bytes of the reply; set by the line."""
     took: float = 0.0

@@ -132,4 +132,7 @@ def unanswered(who: str, request: Request, reply: Reply | None = None) -> NoAnsw
             f"{who}: the reply to '{request.text}' is damaged ({reply.detail}); it may have been executed and "
             "was not sent again"
         )
-    return NoAnswer(f"{who} does not reply: it is not known whether '{request.text}' was executed; it was sent once")
+    why = f" ({reply.detail})" if reply is not None and reply.detail else ""
+    return NoAnswer(
+        f"{who} does not reply{why}: it is not known whether '{request.text}' was executed; it was sent once"
+    )

@@ -112,6 +112,8 @@ class DriveState:
     """A program was started or seen to run."""
     unreferenced: frozenset[str] = frozenset()
     """The axes whose position does not count since a restart; the empty name is an only axis."""
+    recounts: int = 0
+    """How often something may have changed the length or the direction of what its axes count."""
     restore: Owed | None = None
     """Its settings before a conversation changed them for a while; None once they are restored."""
     sync_marks: int = 0
@@ -207,10 +209,18 @@ class DriveState:
         """Take over what is known of the same drive from before a lost connection."""
         self.reference_lost(before.unreferenced)
         self.last_error, self.errors.at = before.last_error, before.errors.at
+        self.recounts = before.recounts + 1  # it was out of sight
 
     def referenced(self, *axes: str) -> None:
         """Record that a homing of these axes has ended, or that their position was set; none: of all axes."""
         self.unreferenced = self.unreferenced - frozenset(axes) if axes else frozenset()
+
+    def counts_may_have_changed(self, restarted: bool = False) -> None:
+        """Record that its settings may give a count another length or direction than when they were last read.
+
+        `restarted`: it was switched off and on, or may have been, and is set as it was saved.
+        """
+        self.recounts += 1
 
     # What is to be restored
 

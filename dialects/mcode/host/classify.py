@@ -362,5 +362,4 @@ def _item_form(item: object) -> str:
 
 
 def _is_whole_number(row: Mnemonic) -> bool:
-    number = isinstance(row.low, int) and not isinstance(row.default, (float, str))
-    return row.kind in ("variable", "flag") and number and row.name not in SEVERAL
+    return row.kind in ("variable", "flag") and row.whole and row.name not in SEVERAL

@@ -231,7 +231,7 @@ AT_HEAD = rf"(?m:^){OLDER}"
 NAME, PART, SERIAL = r'(?P<name>"?[!-~]"?)', r'(?P<part>[^">\r\n]*)', r'(?P<serial>[^">\r\n]*)'
 """Part and serial number are for a person and for comparison: odd characters in them hide no drive."""
 SETTINGS, TWICE = r"(?P<settings>(?P<em>[0-3])[0-3][01])", r"(?P=settings)"
-MDRIVE = "MDI"
+MDRIVE, MODULE = "MDI", "LMM"
 THRICE = 3
 EXPANDED_PART = re.compile(r"<?MDI[34]")
 """The part number of an MDrivePlus with expanded I/O."""
@@ -261,7 +261,7 @@ def find(state: MCodeState, place: Place) -> Procedure[bool]:
     assert matched is not None
     values = matched.groupdict()
     version = values["version"]
-    state.identified(version.split(" ")[0] if version.startswith("LM") else MDRIVE, version, values["part"])
+    state.identified(product_of(version), version, values["part"])
     take_over(state, place.address, form, values["settings"], values.get("checksum"))
     if "name" in values:
         _record(state, values["name"], values["serial"])
@@ -274,6 +274,12 @@ def find(state: MCodeState, place: Place) -> Procedure[bool]:
     if state.codec.em == 2:
         state.note(f"{who(state)}: EM=2 cannot distinguish a lost command from an executed one; EM=1 can")
     return True
+
+
+def product_of(version: str) -> str:
+    """Return the product that a version begins with; a Motion Module adds letters to it (5.1.141: LMMCM)."""
+    head = version.split(" ")[0]
+    return MODULE if head.startswith(MODULE) else head if head.startswith("LM") else MDRIVE
 
 
 def find_in_text(state: MCodeState, place: Place) -> Procedure[bool]:
