@@ -247,6 +247,17 @@ async def test_a_setting_that_was_sent_and_changed_nothing_leaves_the_units(tmp_
         assert (await output(shop, "/status a"))[-1] == "in units: 0 mm, 0 mm/s"
 
 
+async def test_the_settings_are_read_once_for_each_thing_that_may_have_changed_them(tmp_path: Path) -> None:
+    async with CellSession(tmp_path, PRESS) as shop:
+        await shop.session.run("@a EE=1")
+        before = shop.written("press").count(b"PR MS,")
+        for line in ("@a R1=5", "@a PR P", "@a MR 100"):
+            await shop.session.run(line)
+        assert shop.written("press").count(b"PR MS,") == before
+        await shop.session.run("@a RD=1")
+        assert shop.written("press").count(b"PR MS,") == before + 1
+
+
 async def test_units_come_back_with_the_setting(tmp_path: Path) -> None:
     async with CellSession(tmp_path, PRESS) as shop:
         await shop.session.run("@a EE=1")
