@@ -251,7 +251,7 @@ async def test_the_settings_are_read_once_for_each_thing_that_may_have_changed_t
     async with CellSession(tmp_path, PRESS) as shop:
         await shop.session.run("@a EE=1")
         before = shop.written("press").count(b"PR MS,")
-        for line in ("@a R1=5", "@a PR P", "@a MR 100"):
+        for line in ("@a R1=5", "@a PR P", "@a VM=9000"):
             await shop.session.run(line)
         assert shop.written("press").count(b"PR MS,") == before
         await shop.session.run("@a RD=1")
