@@ -98,6 +98,8 @@ class DriveState:
     """In program mode: the drive stores every line."""
     error: bool = False
     """The drive's error flag is set from before, or may be; the next refusal must be distinguished from it."""
+    others_heard: bool = False
+    """Bytes came without a request since the flag was seen clear: another program may have caused an error."""
     last_error: int = 0
     """The number of the last error that was read of it, which cleared it; 0: none was read."""
     errors: ErrorsRead = field(default_factory=ErrorsRead)
@@ -174,6 +176,10 @@ class DriveState:
 
     # Settings and error flag
 
+    def came_unasked(self) -> None:
+        """Record bytes that no request asked for, unless a program of the drive prints."""
+        self.others_heard = not self.running
+
     def settings_may_have_changed(self) -> None:
         """Record a restart, a lost reply to a setting, or a broadcast: the settings are unknown."""
         self.settings_unknown = True
@@ -188,7 +194,7 @@ class DriveState:
 
     def error_flag_read(self, flag: bool, code: int = 0) -> None:
         """Record the error flag. `code`: the number of the error, which the drive cleared as it was read."""
-        self.error = flag
+        self.error, self.others_heard = flag, self.others_heard and flag
         if code:
             self.last_error = code
             self.errors.add(code)

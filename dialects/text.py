@@ -68,3 +68,26 @@ def real(text: str) -> float | None:
 def counted(number: int, one: str, many: str = "") -> str:
     """Format a number of things, as `1 line` or `3 lines`. `many`: a plural that is not made by an s."""
     return f"{number} {one if number == 1 else many or f'{one}s'}"
+
+
+# Names and texts of others in command lines and tables.
+
+_FORMULA = ("=", "+", "-", "@", "\t", "\r", "\n")
+"""A spreadsheet takes a cell that begins so for a formula, and a shell a word that begins with `-` for an option."""
+NOT_FIRST = "not -, =, + or @ first"
+
+
+def acts_first(name: str) -> bool:
+    """Whether a name would act by its first character in a command line or in a table."""
+    return name[:1] in _FORMULA
+
+
+def cell(text: str) -> str:
+    """Return a text as a cell of a CSV file: with `'` before what a spreadsheet would take for a formula."""
+    acts = acts_first(text.lstrip("'")) and real(text) is None
+    return f"'{text}" if acts else text
+
+
+def of_cell(text: str) -> str:
+    """Return the text of such a cell."""
+    return text[1:] if text.startswith("'") and acts_first(text.lstrip("'")) else text

@@ -26,6 +26,7 @@ from multidrop.dialects.values import Value
 from multidrop.drives.conversations import ASKING, Conversation, Conversations, OnOver, awaited, refuse_stranger
 from multidrop.drives.counting import Counting, note
 from multidrop.drives.events import Changed, Outcome, Transaction
+from multidrop.drives.line_checks import check_name, check_quantities
 from multidrop.drives.link import Link
 from multidrop.drives.motion_record import MotionRecord
 from multidrop.drives.port_journal import GLOBAL
@@ -210,11 +211,7 @@ class Drive:
 
     def check_line(self, text: str) -> None:
         """Raise Inexpressible for a line that cannot be sent whole, or that its language lacks."""
-        if "{" in text or "}" in text:
-            from multidrop.dialects.units import unsendable
-
-            if why := unsendable(text):
-                raise Inexpressible(f"{self.shown}: '{text}': {why}; nothing was sent")
+        check_quantities(self.shown, text)
         self.check_address(text)
         if self.state.address not in GLOBAL or self.codec.broadcasts:  # else each drive that the line is for checks it
             self.family.check_line(self.state, text)
@@ -222,14 +219,7 @@ class Drive:
     def check_address(self, text: str) -> None:
         """Raise Inexpressible for a line that begins with the address of a drive of this line, as on the wire."""
         found = self.family.addressed(text, self.state.product)
-        if found is None:
-            return
-        name, line = found
-        addresses = {each.address: f"@{name} {line}" for each in self._neighbours.all_drives if each.address}
-        plain = {each.state.name: line for each in self._neighbours.all_drives if not each.address}
-        everyone = {each: f"@{each} {line}" for each in GLOBAL if addresses}
-        if (right := (everyone | plain | addresses).get(name)) is not None:
-            raise Inexpressible(f"{self.shown}: '{text}' is not a command: write {right}; nothing was sent")
+        check_name(self.shown, text, found, [(each.address, each.state.name) for each in self._neighbours.all_drives])
 
     async def _send(self, text: str, check: Check | None) -> tuple[str, ...]:
         to_all = self.state.address in GLOBAL

@@ -180,9 +180,13 @@ class Debris:
         self._sent += data.decode("latin-1")
         self._until = transmitted + LASTS
 
+    def may_come(self, now: float) -> bool:
+        """Whether bytes may still be those that a stop leaves."""
+        return now <= self._until
+
     def removed(self, lines: tuple[str, ...], known: re.Pattern[str] | None, now: float) -> tuple[str, ...]:
         """Unsolicited lines without debris. `known`: what only a stop leaves in this language."""
-        if now > self._until:
+        if not self.may_come(now):
             return lines
         expect = self._asked.expect if self._asked is not None else None
 

@@ -148,6 +148,8 @@ class Line:
         """The baud rate of the port; 0 where it is not known."""
         self.byte_time = 10.0 / baud if baud else 0.0
         """The time of a byte on the wire, s; 0: it takes none."""
+        self.unasked = 0
+        """Number of times that bytes came which no request asked for."""
         self.printed_at = float("-inf")
         """Time of the last bytes that no request asked for."""
         self._queue: list[Waiting] = []
@@ -196,6 +198,7 @@ class Line:
             self._state.received_at, self._state.due = now, None
         else:
             self.printed_at = now
+            self.unasked += 1
         self.inbox.receive(data, now)
 
     def wrote(self, data: bytes, now: float, whole: bool = False, codec: Codec | None = None) -> None:
@@ -374,6 +377,7 @@ class Line:
         ended = Transaction(flight.request, reply, flight.sent_at, now, flight.transmitted_at, flight.sent)
         self._events.append(Finished(flight.ticket, ended))
         self.inbox.consume(found.used, now)
+        self.unasked += bool(found.strays or self.inbox.buffer)
         self._nak_of = flight.request.address if reply.end is End.NAK else ""
         # A mark that ends the wait for another reply recovers too: an ACK may follow it. After a NAK others wait.
         troubled = weight.ends_wait or reply.end in (End.TIMEOUT, End.DAMAGED) or bool(self._nak_of and self._queue)

@@ -62,6 +62,8 @@ class Link:
         """Number of stops written so far, of any kind."""
         self.on_unsolicited: Callable[[Sequence[str]], None] = lambda lines: None
         """Called with unsolicited lines, debris included, before they are published."""
+        self.on_unasked: Callable[[], None] = lambda: None
+        """Called when bytes came that no request asked for."""
         self.on_echo: Callable[[], None] = lambda: self.notify(ECHO)
         """Called once it is found that the adapter repeats what it sends."""
         self.departure = Departure(keeper)
@@ -69,6 +71,7 @@ class Link:
         self._keeper = keeper
         self.debris = Debris()
         self.leftovers = Leftovers()
+        self._counted = 0
         self._came_unasked, self._unasked_said = 0, -inf
         self._orderly = False
         """The port was still open when it was shut."""
@@ -182,7 +185,9 @@ class Link:
         try:
             while self._further:
                 self._further, stops, now = False, self.stops, self.now()
-                for event in self.line.events(now):
+                news = self.line.events(now)
+                self._note_unasked(now)
+                for event in news:
                     if isinstance(event, Write):
                         if event.request is not None and event.request.priority is not Priority.POLL:
                             self._news.tell()
@@ -204,6 +209,12 @@ class Link:
             if self._timer is None:  # one that fires too early costs less than many timers
                 self._timer = self._loop.call_at(deadline, self._wake, deadline)
         self._news.tell()
+
+    def _note_unasked(self, now: float) -> None:
+        """Tell of bytes that no request asked for, before the end of a request that may be blamed for them."""
+        before, self._counted = self._counted, self.line.unasked
+        if self._counted != before and not self.debris.may_come(now):
+            self.on_unasked()
 
     @contextmanager
     def received(self) -> Iterator[bytearray]:

@@ -241,6 +241,7 @@ class Roster:
         self.on_stored_stop: Callable[[Drive], None] = lambda drive: None
         """Called with a drive that has stored a stop instead of executing it."""
         self.link.on_unsolicited = self._unsolicited
+        self.link.on_unasked = self._came_unasked
 
     @property
     def all_drives(self) -> list[Drive]:
@@ -322,6 +323,10 @@ class Roster:
         for drive in self.drives.values():
             self.conversations.link.line.inbox.codec = drive.state.codec
             break
+
+    def _came_unasked(self) -> None:
+        for drive in self.drives.values():
+            drive.state.came_unasked()
 
     def _unsolicited(self, lines: Sequence[str]) -> None:
         """Note and report a restart: the drive is set as it was saved; and a drive that stored a stop."""

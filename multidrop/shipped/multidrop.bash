@@ -464,7 +464,7 @@ _multidrop_urls() {
   printf '%s\n' sim: 'sim:#press' 'sim:#eth' 'sim:#pmx' tcp:// udp:// modbus:// rfc2217:// ssh://
   for each in /dev/serial/by-id/* /dev/ttyUSB* /dev/ttyACM*; do [ -e "$each" ] && printf '%s\n' "$each"; done
   file="${MULTIDROP_CONFIG_DIR:-${XDG_CONFIG_HOME:-$HOME/.config}/multidrop}/multidrop.toml"
-  [ -r "$file" ] && sed -n 's/^ *\[connections\.\([A-Za-z0-9_-]*\)\].*/\1/p' "$file"
+  [ -r "$file" ] && sed -n 's/^ *\[connections\.\([A-Za-z0-9_][A-Za-z0-9_-]*\)\].*/\1/p' "$file"
   true
 }
 _multidrop_url() {
@@ -480,7 +480,7 @@ _multidrop_drives() {
   local each file
   printf '%s\n' all
   file="${MULTIDROP_CONFIG_DIR:-${XDG_CONFIG_HOME:-$HOME/.config}/multidrop}/multidrop.toml"
-  [ -r "$file" ] && sed -n 's/.*[?&]drives=\([^"&]*\).*/\1/p' "$file" | tr , '\n' | sort -u
+  [ -r "$file" ] && sed -n 's/.*[?&]drives=\([^"&]*\).*/\1/p' "$file" | tr , '\n' | grep -v '^[-=+@]' | sort -u
   true
 }
 _multidrop_drive() {
@@ -494,7 +494,7 @@ _multidrop_drive() {
 _multidrop_macros() {
   local each file
   for each in macros/*.toml "${MULTIDROP_CONFIG_DIR:-${XDG_CONFIG_HOME:-$HOME/.config}/multidrop}/macros"/*.toml; do
-    [ -e "$each" ] && printf '%s\n' "${each##*/}" | sed 's/[.]toml$//'
+    [ -e "$each" ] && printf '%s\n' "${each##*/}" | sed 's/[.]toml$//; /^[-=+@]/d'
   done
   true
 }

@@ -15,7 +15,7 @@ function _multidrop_url
   test -d "$folder"; or set folder "$HOME/.config/multidrop"
 
   test -r "$folder/multidrop.toml"; or return
-  sed -n 's/^ *\[connections\.\([A-Za-z0-9_-]*\)\].*/\1/p' "$folder/multidrop.toml"
+  sed -n 's/^ *\[connections\.\([A-Za-z0-9_][A-Za-z0-9_-]*\)\].*/\1/p' "$folder/multidrop.toml"
   true
 end
 
@@ -26,7 +26,7 @@ function _multidrop_drive
   test -d "$folder"; or set folder "$HOME/.config/multidrop"
 
   test -r "$folder/multidrop.toml"; or return
-  sed -n 's/.*[?&]drives=\([^"&]*\).*/\1/p' "$folder/multidrop.toml" | tr , '\n' | sort -u
+  sed -n 's/.*[?&]drives=\([^"&]*\).*/\1/p' "$folder/multidrop.toml" | tr , '\n' | grep -v '^[-=+@]' | sort -u
   true
 end
 
@@ -35,7 +35,7 @@ function _multidrop_macro
   test -n "$folder"; or set folder "$XDG_CONFIG_HOME/multidrop"
   test -d "$folder"; or set folder "$HOME/.config/multidrop"
 
-  find macros "$folder/macros" -maxdepth 1 -name '*.toml' 2>/dev/null | sed 's!.*/!!; s/[.]toml$//'
+  find macros "$folder/macros" -maxdepth 1 -name '*.toml' 2>/dev/null | sed 's!.*/!!; s/[.]toml$//; /^[-=+@]/d'
   true
 end
 

@@ -21,7 +21,7 @@ function _multidrop_url {
   'sim:', 'sim:#press', 'sim:#eth', 'sim:#pmx', 'tcp://', 'udp://', 'modbus://', 'rfc2217://', 'ssh://'
   try { [System.IO.Ports.SerialPort]::GetPortNames() } catch { }
   Select-String -Path (Join-Path (_multidrop_folder) 'multidrop.toml') -ErrorAction SilentlyContinue `
-    -Pattern '^ *\[connections\.([A-Za-z0-9_-]+)\]' | ForEach-Object { $_.Matches[0].Groups[1].Value }
+    -Pattern '^ *\[connections\.([A-Za-z0-9_][A-Za-z0-9_-]*)\]' | ForEach-Object { $_.Matches[0].Groups[1].Value }
   ) | Where-Object { $_ -like "$WordToComplete*" }
 }
 
@@ -30,7 +30,8 @@ function _multidrop_drive {
   @(
   'all'
   Select-String -Path (Join-Path (_multidrop_folder) 'multidrop.toml') -ErrorAction SilentlyContinue `
-    -Pattern '[?&]drives=([^"&]*)' | ForEach-Object { $_.Matches[0].Groups[1].Value -split ',' }
+    -Pattern '[?&]drives=([^"&]*)' | ForEach-Object { $_.Matches[0].Groups[1].Value -split ',' } |
+    Where-Object { $_ -notmatch '^[-=+@]' }
   ) | Where-Object { $_ -like "$WordToComplete*" }
 }
 
@@ -38,7 +39,7 @@ function _multidrop_macro {
   param([string]$WordToComplete)
   @(
   Get-ChildItem -Path 'macros', (Join-Path (_multidrop_folder) 'macros') -Filter '*.toml' `
-    -ErrorAction SilentlyContinue | ForEach-Object { $_.BaseName }
+    -ErrorAction SilentlyContinue | ForEach-Object { $_.BaseName } | Where-Object { $_ -notmatch '^[-=+@]' }
   ) | Where-Object { $_ -like "$WordToComplete*" }
 }
 

@@ -66,7 +66,7 @@ class MCodeState(DriveState):
         """Record the address at which the drive replied, and the settings and error flag that it printed."""
         self.address, self.codec = address, codec
         self.name = address or self.name
-        self.error, self.running = error, running
+        self.program_read(error=error, running=running)
         self.settings_unknown, self.candidates = False, ()
 
     def settings_lost(self, candidates: Sequence[Candidate]) -> None:
@@ -115,7 +115,8 @@ class MCodeState(DriveState):
         self.running, self.stepping = True, False
 
     def program_read(self, *, error: bool, running: bool) -> None:
-        self.error, self.running = error, running
+        self.error_flag_read(error)
+        self.running = running
 
     # Motion
 
@@ -137,11 +138,9 @@ class MCodeState(DriveState):
 
     # Single step
 
-    def steps(self) -> None:
-        self.running = self.stepping = True
-
-    def may_not_step(self) -> None:
-        self.stepping = False
+    def steps(self, on: bool = True) -> None:
+        """Record that it runs its program step by step, or that it may not do that any more."""
+        self.running, self.stepping = on or self.running, on
 
     # Program mode
 

@@ -16,8 +16,9 @@ from multidrop.dialects.errors import Diagnostic, Inexpressible, NoAnswer, Refus
 from multidrop.dialects.mcode.host import units
 from multidrop.dialects.mcode.host.classify import WHOLE
 from multidrop.dialects.mcode.host.motions import cause
+from multidrop.dialects.mcode.host.settings import rows_of_list
 from multidrop.dialects.mcode.host.state import who
-from multidrop.dialects.mcode.host.values import SNAPSHOT_WORDS, rows_of_list, snapshot_of
+from multidrop.dialects.mcode.host.values import SNAPSHOT_WORDS, snapshot_of
 from multidrop.dialects.mcode.manual import parameter_plan, points
 from multidrop.dialects.mcode.manual import parameters as manual
 from multidrop.dialects.mcode.manual.mnemonic import EVERY
