@@ -71,6 +71,10 @@ class Counting:
         accepted = self._accepted.get(axis)
         return accepted is None or self._read[axis] == (recounts, accepted)
 
+    def read_since(self, recounts: int) -> bool:
+        """Whether the settings of every axis were read since the last thing that may have changed one."""
+        return all(self._read[axis][0] == recounts for axis in self._accepted)
+
     def contradicted(self, values: Mapping[str, Value]) -> bool:
         """Whether settings of a drive, by name, are other ones than were accepted for one of its axes."""
         return any(

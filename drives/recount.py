@@ -14,6 +14,6 @@ async def recount(drive: Drive, priority: Priority = Priority.OPERATOR) -> None:
     changed = await drive.run(drive.counting.reading(drive.family.units, drive.state, priority))
     drive.state.reference_lost(drive.anchored.intersection(changed))
     for axis, changes in changed.items():
-        hint = f"/units {drive.address}{f'.{axis}' if axis else ''}".rstrip()
+        hint = f"/units {drive.address or f'{drive.link.name}:'}{f'.{axis}' if axis else ''}"
         why = f"its scale rests on that, so its own numbers are shown; {hint} accepts it as it is now"
         drive.link.notify(f"{drive.shown}: {', '.join(changes)}: {why}", drive.address, warning=True)

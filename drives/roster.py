@@ -159,7 +159,7 @@ class Restarts:
         await asyncio.sleep(TOGETHER)
         unsure = []
         for drive, rested in before.items():
-            if drive.programming:
+            if drive.programming or drive.transferring:
                 continue
             try:
                 axes = await drive.motion()

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from multidrop.shell.workspace import Workspace
 
 AGAIN = 2.0
-"""Seconds between two readings of what a scale rests on that does not hold, while its drive is polled."""
+"""Seconds between two attempts to read what a scale rests on that may not hold, while its drive is polled."""
 
 
 class ScaleChecks:
@@ -40,9 +40,8 @@ class ScaleChecks:
         bus = self.workspace.buses.get(drive.link.name)
         meant = bus.all_drives if bus is not None and drive.address in EVERYONE else [drive]
         for each in meant if not drive.programming else ():
-            holds = all(map(each.scale_holds, each.counting.axes))
             named = not text or any(re.search(rf"\b{name}\b", text, re.I) for name in each.counting.names)
-            if each.counting.axes and (named or not holds):
+            if each.counting.axes and (named or not each.counting.read_since(each.state.recounts)):
                 with suppress(DriveError, TransportLost):
                     await recount(each)
                 self.workspace.changed()
@@ -60,7 +59,7 @@ class ScaleChecks:
             return
         bus = self.workspace.buses.get(event.bus)
         drive = bus.drives.get(event.event.address) if bus is not None else None
-        if drive is None or all(map(drive.scale_holds, drive.counting.axes)) or drive.programming:
+        if drive is None or drive.counting.read_since(drive.state.recounts) or drive.programming:
             return
         looked = self._looks.get(drive)
         if looked is None or (looked[1].done() and event.event.at - looked[0] >= AGAIN):

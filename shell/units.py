@@ -236,7 +236,7 @@ class Units:
         """The measure of an axis; what it rests on is read where it was not. Raises Diagnostic where there is none."""
         found, name = self.of(drive, axis), self.name(drive, axis)
         if found is None:
-            raise Diagnostic(f"{name} has no scale", "", f"/units {name} 5 mm/turn gives it one")
+            raise Diagnostic(f"{name} has no scale", "", f"/units {self.typed(drive, axis)} 5 mm/turn gives it one")
         if found.basis is None:
             await self.confirm(drive)
         if found.measure is None:
@@ -246,6 +246,11 @@ class Units:
     def name(self, drive: Drive, axis: str) -> str:
         shown = self.workspace.display_name(drive) or drive.shown
         return f"{shown}.{axis}" if axis else shown
+
+    def typed(self, drive: Drive, axis: str) -> str:
+        """The same as `/units` takes it: a drive without an address is named by its line and a colon."""
+        name = self.name(drive, axis)
+        return name if drive.label or drive.address else name.replace(drive.link.name, f"{drive.link.name}:", 1)
 
     # Quantities in lines
 
@@ -332,7 +337,7 @@ class Units:
             if not self.referenced(each, axis):
                 name, found = self.name(each, axis), self.of(each, axis)
                 unit = found.scale.unit.name if found is not None else "mm"
-                hint = f"home it, or /units here {name} 0 {unit} where it is"
+                hint = f"home it, or /units here {self.typed(each, axis)} 0 {unit} where it is"
                 raise Diagnostic(f"the position of {name} is not referenced; nothing was sent", "", hint)
 
     async def _check(
@@ -381,7 +386,7 @@ class Units:
             was = [
                 f"{key} was {before.get(key)} and is {now} now" for key, now in found.settings if before.get(key) != now
             ]
-            hint = f"/units {self.name(drive, name)} takes it as it is now"
+            hint = f"/units {self.typed(drive, name)} takes it as it is now"
             raise Differs(f"{drive.shown}: {', '.join(was)}: its scale rests on that, so '{text}' was not sent; {hint}")
         axis.sure = not _runs(drive)
 

@@ -95,13 +95,13 @@ class AsyncEvents(AsyncStream[Event]):
 
     def _compare(self, name: str, now: Conditions) -> None:
         """Publish what is new: a limit, an error, the end of a program."""
-        found: set[tuple[Kind, str]] = {
-            ("limit", LIMITS[lamp.function]) for lamp in now.lamps if lamp.on and lamp.function in LIMITS
-        }
+        limits = [LIMITS[lamp.function] for lamp in now.lamps if lamp.on and lamp.function in LIMITS]
+        found: dict[tuple[Kind, str], str] = {("limit", limit): limit for limit in limits}
         if (fault := fault_of(now)) is not None:
-            found.add(("error", fault.text))
-        for kind, text in sorted(found - self._state.get(name, frozenset())):
-            self._publish(kind, name, text)
+            found["error", str(fault.code)] = fault.text  # the same error, whatever more is known of it later
+        for (kind, which), text in sorted(found.items()):
+            if (kind, which) not in self._state.get(name, frozenset()):
+                self._publish(kind, name, text)
         if not now.program and (ended := self._running.get(name)):
             self._publish("program ended", name, f"its program has ended ({ended})")
         self._state[name], self._running[name] = frozenset(found), now.program

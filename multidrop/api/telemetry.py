@@ -37,7 +37,10 @@ class Sample(_Sample):
     """Position and velocity of one axis of one drive, in its own numbers; as a tuple it has only these."""
 
     unit: str = ""
-    """The unit of the two below; empty where the axis has no scale. With `?`: the scale is not confirmed."""
+    """The unit of the two below; empty where the axis has no scale, or none that holds.
+
+    With `?`: the scale is not confirmed.
+    """
     place: float | None = None
     """The position in that unit."""
     speed: float | None = None

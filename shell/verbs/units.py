@@ -107,7 +107,9 @@ def _described(call: Call, drive: Drive, name: str) -> str:
     if not session.units.referenced(drive, name):
         parts.append("not referenced")
     if changes := drive.counting.changes(name):
-        parts.append(f"not shown in units, as {', '.join(changes)}: /units {parts[0]} accepts that")
+        parts.append(
+            f"not shown in units, as {', '.join(changes)}: /units {session.units.typed(drive, name)} accepts that"
+        )
     elif not axis.holds:
         parts.append("not shown in units, as what it rests on may have changed and was not read since")
     elif axis.measure is not None and not axis.sure:

@@ -9,6 +9,8 @@ from typing import Any
 import pytest
 
 from multidrop.dialects.families import FAMILIES
+from multidrop.dialects.mcode.host.motions import cause
+from multidrop.dialects.mcode.manual.points import CAUSE
 from multidrop.dialects.values import UNREAD, Conditions
 from multidrop.drives.events import Conditioned, Unsolicited
 from multidrop.shell.events import OnBus
@@ -287,6 +289,27 @@ def test_faults_of_the_driver_of_a_module_are_an_error_with_its_cause():
     family = FAMILIES["tmcl"]
     state = family.new_state(family.codec, "1")
     state.motors_counted(2)
-    for flags, cause in ((0, ""), (1 << 1, "the driver is shut down: overtemperature"), (1, ""), ("absent", "")):
+    for flags, why in ((0, ""), (1 << 1, "the driver is shut down: overtemperature"), (1, ""), ("absent", "")):
         fine, found = family.values.fold(state, {"DRIVER_FLAGS 0": 0, "DRIVER_FLAGS 1": flags})
-        assert (fine.error, found.error, found.error_text) == (0, UNREAD if cause else 0, cause)
+        assert (fine.error, found.error, found.error_text) == (0, UNREAD if why else 0, why)
+
+
+async def test_a_limit_that_was_active_before_the_error_is_not_its_cause(tmp_path):
+    async with Watched(tmp_path, party("a") + LIMIT, "a") as cell:
+        await last(cell, "@a IS=2,2,0", "@a MR 51200", "@a PR ER", wait=6)
+        (found,) = await last(cell, "@a PR ER")
+        assert (found.error, found.cause, lamps(found)["2 lim+"]) == (0, "", True)
+        cell.device("line:a").errors.set(86)
+        (found,) = await last(cell)
+        assert (found.error, found.cause) == (UNREAD, "")
+
+
+def test_a_cause_stays_while_its_error_is_set_and_no_longer():
+    plus = {"IS2": (2, 1, 0)}
+    rest, met, off = {"EF": 0, "ST": 0, "IN": 0}, {"EF": 1, "ST": 0, "IN": 2}, {"EF": 1, "ST": 0, "IN": 0}
+    found = cause("LMDCM", met, {**plus, **rest})
+    assert found == "limit+ is active"
+    assert cause("LMDCM", off, {**plus, **met, CAUSE: found}) == "limit+ is active"
+    assert cause("LMDCM", {**off, "ST": 1}, {**plus, **met, CAUSE: found}) == "stalled"
+    assert cause("LMDCM", rest, {**plus, **off, CAUSE: found}) == ""
+    assert cause("LMDCM", off, {**plus, **rest, CAUSE: found}) == ""

@@ -21,7 +21,7 @@ from multidrop.simulator import cells
 from multidrop.tui.figures import NATIVE, figures_of
 from tests.shell.publishing.test_publish_feed import published
 from tests.support.cases import for_each
-from tests.support.cell_session import CellSession, bus, drive, party, pmx
+from tests.support.cell_session import ETHERNET, CellSession, bus, drive, party, pmx
 
 pytestmark = pytest.mark.virtual
 PRESS = bus("press", party("a", 'units = "5 mm/turn"'), party("b"))
@@ -247,6 +247,17 @@ async def test_a_setting_that_was_sent_and_changed_nothing_leaves_the_units(tmp_
         assert (await output(shop, "/status a"))[-1] == "in units: 0 mm, 0 mm/s"
 
 
+async def test_the_settings_are_read_once_for_each_thing_that_may_have_changed_them(tmp_path: Path) -> None:
+    async with CellSession(tmp_path, PRESS) as shop:
+        await shop.session.run("@a EE=1")
+        before = shop.written("press").count(b"PR MS,")
+        for line in ("@a R1=5", "@a PR P", "@a VM=9000"):
+            await shop.session.run(line)
+        assert shop.written("press").count(b"PR MS,") == before
+        await shop.session.run("@a RD=1")
+        assert shop.written("press").count(b"PR MS,") == before + 1
+
+
 async def test_units_come_back_with_the_setting(tmp_path: Path) -> None:
     async with CellSession(tmp_path, PRESS) as shop:
         await shop.session.run("@a EE=1")
@@ -309,3 +320,13 @@ async def test_after_a_silence_samples_have_units_again_once_the_settings_are_re
             await asyncio.sleep(2)
             later = [each.unit for each in (await telemetry.samples()).of("a")]
     assert gap[0] == "mm" and "" in gap and later[-1] == "mm"
+
+
+async def test_the_advice_for_a_drive_without_an_address_is_a_line_that_is_taken(tmp_path: Path) -> None:
+    async with CellSession(tmp_path, bus("eth", ETHERNET + '\nunits = "5 mm/turn"')) as shop:
+        drive = next(iter(shop.session.buses["eth"].drives.values()))
+        await shop.session.run("EE=1")
+        (said,) = (each for each in shop.told(Notified) if "accepts it as it is now" in each)
+        assert "/units eth: accepts it" in said and "/units eth: accepts that" in (await output(shop, "/units"))[0]
+        await shop.session.run("/units eth:")
+        assert shop.session.units.given(drive, "", 4000) == (5.0, "mm")

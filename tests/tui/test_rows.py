@@ -1,5 +1,6 @@
 """The lines of the main screen as functions of the facts."""
 
+from dataclasses import replace
 from datetime import datetime
 from typing import cast
 
@@ -8,12 +9,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 from rich.style import Style
 
-from multidrop.drives.events import Sample
+from multidrop.dialects.values import UNREAD, Conditions
+from multidrop.drives.events import Conditioned, Sample
 from multidrop.drives.stopping import Fate
 from multidrop.shell.events import OnBus, StateChanged
 from multidrop.shell.stop_report import Found, Tally
 from multidrop.tui.panels.drive import drive_rows
-from multidrop.tui.panels.drives import narrow_rows
+from multidrop.tui.panels.drives import drives_rows, narrow_rows
 from multidrop.tui.panels.table import PANELS, Panel, column_rows
 from multidrop.tui.panels.view import Glance, View, firmware_of
 from multidrop.tui.readout import Readout, State
@@ -231,3 +233,14 @@ async def test_a_position_without_reference_has_its_sign_everywhere() -> None:
         marked = [row for row in shown if "~1234" in row]
         assert len(marked) == 1 and "press:a" in marked[0] and "not referenced" in marked[0]
         assert session.sent == []
+
+
+def test_drives_in_trouble_that_have_no_row_are_counted() -> None:
+    glances = [glance(each, (0.5, 500, 0)) for each in "abcdefgh"]
+    shown = [replace(glances[0], selected=True), *glances[1:]]
+    assert "+5 ^A" in plain(narrow_rows(view(*shown), 80)[-1])
+    assert plain(drives_rows(view(*shown), 45, 4)[-1]).strip() == "7 more (1 ✗); ^A shows all drives", "a lost line"
+    for each in shown[2:7]:
+        each.readout.note(Conditioned(0.5, each.address, (Conditions(error=UNREAD, error_text="PR ER shows it"),)))
+    assert "+5 (3 ✗) ^A" in plain(narrow_rows(view(*shown), 80)[-1])
+    assert plain(drives_rows(view(*shown), 45, 4)[-1]).strip() == "7 more (4 ✗); ^A shows all drives"

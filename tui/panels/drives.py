@@ -69,8 +69,8 @@ def narrow_rows(view: View, width: int) -> list[Row]:
     for glance in shown:  # a row for each axis of the selected drive, and one for any other drive
         axes = glance.readout.axes if glance.selected else [glance.readout]
         rows += [_axis_row(glance, axis, now, width, first=axis is glance.readout) for axis in axes]
-    others = len(view.glances) - len(shown)
-    more = f"+{others} ^A   " if others else ""
+    others = [each for each in view.glances if not any(each is kept_one for kept_one in shown)]
+    more = f"+{len(others)}{_in_trouble(others)} ^A   " if others else ""
     twin = difference_words(chosen.readout)
     right: list[Span] = [(f"{more}{twin}{'   ' if twin else ''}{poll_words(chosen, now, view.polling)} ", "dim")]
     groups: list[list[Span]] = []
@@ -87,6 +87,12 @@ def kept(glances: Sequence[Glance], most: int) -> list[Glance]:
     ranked = sorted(glances, key=lambda each: (not each.selected, not _troubled(each)))
     chosen = ranked[:most]
     return [glance for glance in glances if any(glance is each for each in chosen)]
+
+
+def _in_trouble(glances: Sequence[Glance]) -> str:
+    """How many of these are in trouble, in parentheses; empty: none."""
+    count = sum(map(_troubled, glances))
+    return f" ({count} ✗)" if count else ""
 
 
 def _troubled(glance: Glance) -> bool:
@@ -149,18 +155,20 @@ def drives_rows(view: View, width: int, height: int) -> list[Row]:
     """A row for each drive of the selected bus, with its position over the last seconds; then those of other lines."""
     shown = kept(view.glances, height if len(view.glances) <= height else height - 1)
     rows = [_panel_row(glance, view.now, width) for glance in shown]
-    left = len(view.glances) - len(shown)
+    left = [each for each in view.glances if not any(each is kept_one for kept_one in shown)]
     for bus in view.session.tabs.shown:
         if bus.name == view.session.selected_bus:
             continue
-        if left or len(rows) + len(bus.drives) > height:
-            left += len(bus.drives)
+        glances = glances_of(view.session, view.model, bus)
+        if left or len(rows) + len(glances) > height:
+            left += glances
             continue
-        for each in glances_of(view.session, view.model, bus):
+        for each in glances:
             named = replace(each, address=join_target(bus.name, each.address).removesuffix(":"), label="")
             rows.append(_panel_row(named, view.now, width))
     if left and len(rows) < height:
-        rows.append(((f"   {left} more; ^A shows all drives", "dim"),))
+        trouble = _in_trouble(left)
+        rows.append(((f"   {len(left)} more{trouble}; ^A shows all drives", "error" if trouble else "dim"),))
     return rows
 
 

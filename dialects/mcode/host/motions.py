@@ -20,7 +20,7 @@ from multidrop.dialects.mcode.host import classify, exchange, operations
 from multidrop.dialects.mcode.host.before_request import before_request, value_of
 from multidrop.dialects.mcode.host.classify import INTEGER
 from multidrop.dialects.mcode.host.state import MCodeState, described, earlier_error, refuse_in_program, who
-from multidrop.dialects.mcode.manual import errors
+from multidrop.dialects.mcode.manual import errors, points
 from multidrop.dialects.mcode.manual.errors import ErrorNumber as E
 from multidrop.dialects.mcode.manual.grammar import Number, Statement, parsed
 from multidrop.dialects.mcode.manual.mnemonic import EVERY
@@ -258,15 +258,20 @@ def _new_fault(found: Mapping[str, int], before: Signs) -> tuple[Outcome, str] |
     return next(((outcome, FAULT_WORDS[bit]) for bit, outcome in FAULTS.items() if new & bit), None)
 
 
-def cause(found: Mapping[str, Value], before: Mapping[str, Value]) -> str:
+def cause(product: str, found: Mapping[str, Value], before: Mapping[str, Value]) -> str:
     """What caused the error that is set, as far as two readings of the conditions show it; empty: they do not.
 
-    Only a sign that came with the error is its cause: ST stays set from an earlier stall.
+    Only a sign that came with the error is its cause: ST stays set from an earlier stall. It stays the cause.
     """
-    if not found.get("EF"):
+    if not found.get("EF") or "EF" not in before:
         return ""
-    fault = _new_fault(_whole_numbers(found), _whole_numbers(before)) if before else None
-    return fault[1] if fault is not None else str(before.get(CAUSE, "")) if before.get("EF") else ""
+    fault = _new_fault(_whole_numbers(found), _whole_numbers(before))
+    if fault is not None:
+        return fault[1]
+    if before["EF"]:
+        return str(before.get(CAUSE, ""))
+    met = [each for each in points.met(product, {**before, **found}) if each not in points.met(product, before)]
+    return f"{met[0]} is active" if met else ""
 
 
 def _whole_numbers(facts: Mapping[str, Value]) -> dict[str, int]:

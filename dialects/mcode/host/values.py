@@ -92,7 +92,7 @@ def parts(state: MCodeState, facts: Facts) -> Sequence[Part[MCodeState]]:
 
 def _state(state: MCodeState, before: Facts) -> Procedure[Facts]:
     facts = dict((yield from _values(state, STATE)))
-    facts[points.CAUSE] = cause(facts, before)
+    facts[points.CAUSE] = cause(state.product, facts, before)
     state.program_read(error=bool(facts["EF"]), running=bool(facts["BY"]))
     position = facts["P"]
     at_rest = isinstance(position, int) and not facts["MV"] and not facts["BY"]

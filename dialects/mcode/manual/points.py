@@ -73,13 +73,9 @@ def conditions(product: str, facts: Facts, target: int | None) -> Conditions:
     if "AF" in facts and facts.get("AS"):
         words = [word for bit, word in HMT if int(number(facts["AF"])) & bit]
         more = (("hMT", ", ".join(words) or "ready"),)
-    inputs = tuple(_inputs(product, facts))
-    met = [
-        f"{lamp.function.replace('lim', 'limit')} is active" for lamp in inputs if lamp.on and lamp.function in LIMITS
-    ]
-    cause = str(facts.get(CAUSE, "")) or ", ".join(met) if facts.get("EF") else ""
+    cause = str(facts.get(CAUSE, "")) if facts.get("EF") else ""
     return Conditions(
-        lamps=(*inputs, *analog, *_outputs(facts)),
+        lamps=(*_inputs(product, facts), *analog, *_outputs(facts)),
         error=UNREAD if facts.get("EF") else 0,
         error_text="; ".join(filter(None, (cause, SET))) if facts.get("EF") else "",
         cause=cause,
@@ -95,6 +91,12 @@ def conditions(product: str, facts: Facts, target: int | None) -> Conditions:
         unit="counts" if counting(facts) else "steps",
         pace=Pace(*pace) if len(pace) == 4 else None,
     )
+
+
+def met(product: str, facts: Facts) -> tuple[str, ...]:
+    """The limits whose inputs are active, `limit+`."""
+    lamps = _inputs(product, facts)
+    return tuple(each.function.replace("lim", "limit") for each in lamps if each.on and each.function in LIMITS)
 
 
 def _whole(facts: Facts, name: str) -> int | None:

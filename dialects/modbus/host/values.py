@@ -140,7 +140,7 @@ INPUTS = 4
 def parts(state: ModbusState, facts: Facts) -> Sequence[Part[ModbusState]]:
     table = words(state.product)
     signs = [n for n in SIGNS if state.product in EVERY and state.product in table[n].products]
-    found = [Part("flags", partial(_flags, names=(*FLAGS, *signs), before=facts)), Part("points", _points)]
+    found = [Part("state", partial(_state, names=(*FLAGS, *signs), before=facts))]
     has = [n for n in SETTINGS if state.product not in EVERY or state.product in table[n].products]
     found += [Part(name, partial(_registers, names=(name,)), slow=True) for name in has]
     lists = manual.lists(state.product, state.version)
@@ -157,9 +157,9 @@ def _registers(state: ModbusState, names: Sequence[str]) -> Procedure[Facts]:
     return found
 
 
-def _flags(state: ModbusState, names: Sequence[str], before: Facts) -> Procedure[Facts]:
-    found = dict((yield from _registers(state, names)))
-    found[points.CAUSE] = cause(found, before)
+def _state(state: ModbusState, names: Sequence[str], before: Facts) -> Procedure[Facts]:
+    found = {**(yield from _registers(state, names)), **(yield from _points(state))}
+    found[points.CAUSE] = cause(state.product, found, before)
     return found
 
 

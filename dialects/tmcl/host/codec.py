@@ -324,6 +324,12 @@ class TmclState(DriveState):
     def relative_forgotten(self) -> None:
         self.relative.clear()
 
+    def counts_may_have_changed(self, restarted: bool = False) -> None:
+        """Record it; of a module that was restarted it is not known either from where MVP REL counts."""
+        super().counts_may_have_changed(restarted)
+        if restarted:
+            self.relative_forgotten()
+
     def search_mode_sent(self, motor: int) -> None:
         self.search_modes_unknown.add(motor)
 

@@ -568,6 +568,6 @@ def test_a_disabled_drive_is_read_with_its_flags() -> None:
     port = ModbusPort(drive("DE=0", personality="LMDCE"))
     state = ModbusState(Modbus(), product="LMDCE", version="LMDCE 6.002")
     reader = MODBUS.values
-    quick = next(part for part in reader.parts(state, {}) if part.name == "flags")
+    quick = next(part for part in reader.parts(state, {}) if part.name == "state")
     assert not quick.slow
     assert reader.fold(state, carried(port, quick.read(state)))[0].disabled == "DE=0"

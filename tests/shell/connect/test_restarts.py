@@ -258,3 +258,14 @@ async def test_a_drive_that_was_silent_beside_no_restart_is_not_doubted(tmp_path
         await asyncio.sleep(8)
         await cell.cycle("b")
         assert not cell.restarts() and not [each for each in cell.told() if "may have been" in each]
+
+
+async def test_from_where_a_restarted_module_counts_its_distances_is_not_known(tmp_path: Path) -> None:
+    async with Polled(tmp_path, TMCM) as cell:
+        drive = cell.session.buses[LINE].drives["1"]
+        await cell.session.run("@1 SAP 127, 0, 1")
+        await cell.session.run("@1 MVP REL, 0, 51200")
+        await asyncio.sleep(8)
+        assert drive.state.relative == {0: 1}
+        await cell.cycle("1")
+        assert cell.restarts() and drive.state.relative == {}
