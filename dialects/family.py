@@ -222,6 +222,8 @@ class Protection:
     """What may keep a drive of a product silent, or have it refuse every value; no product: not known which."""
     word: Callable[[str], str]
     """The word to which a line gives a value; empty: it gives none."""
+    besides: str = ""
+    """Another cause of silence, which is named before it."""
 
 
 @dataclass(frozen=True)

@@ -6,6 +6,8 @@ clipboard, and a C1 code is an escape sequence in one character. Direction chara
 
 from __future__ import annotations
 
+DECIMAL = r"[+-]?(?:\d{1,16}(?:\.\d{0,24})?|\.\d{1,24})"
+"""The number of a quantity, in a pattern; also with all the places of a Python number: 0.30000000000000004."""
 ACTING = (
     (0x00, 0x1F),  # C0
     (0x7F, 0x9F),  # DEL and C1

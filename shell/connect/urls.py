@@ -258,6 +258,14 @@ def _with_query(connection: Connection, query: str) -> Connection:
     return replace(connection, hints=Hints(**hints), **values)
 
 
+def with_echo(connection: Connection) -> Connection:
+    """The connection with `echo=local`, for an adapter that was found to repeat what it sends."""
+    if connection.local_echo:
+        return connection
+    sign = "&" if "?" in connection.text else "?"
+    return replace(connection, text=f"{connection.text}{sign}echo=local", local_echo=True)
+
+
 HOST = "127.0.0.1"
 
 

@@ -19,7 +19,7 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, cast
 
 from multidrop.dialects import Diagnostic
-from multidrop.dialects.families import program_language_of, program_languages
+from multidrop.dialects.families import correct_in, program_language_of, program_languages
 from multidrop.dialects.files import encoded_program_of, program_text_of, split_lines, why
 from multidrop.dialects.program_files import Conversion, Converter, Problem, errors, in_order, refuse
 from multidrop.simulator.cell.spec import DriveSpec
@@ -106,12 +106,11 @@ def ending_of(product: str) -> str:
 
 def _other_language(text: str, language: str) -> Problem | None:
     """Report that a text is a correct program of another language; None if it is not."""
+    if not (name := correct_in(text, language)):
+        return None
     known = program_languages()
-    for name, other in known.items():
-        if name != language and not errors(other.language.check(text)):
-            hint = f"name it {' or '.join(other.endings)}, or check it with --language {name}"
-            return Problem(1, 1, f"this is {other.title}, not {known[language].title}", hint)
-    return None
+    hint = f"name it {' or '.join(known[name].endings)}, or check it with --language {name}"
+    return Problem(1, 1, f"this is {known[name].title}, not {known[language].title}", hint)
 
 
 def rewrite(checked: Checked) -> None:

@@ -43,7 +43,9 @@ async def list_(call: Call) -> None:
     if file:
         new_file.check(call.output_file(file), printed=True)
     lines = await program_listing.readable(call.session, drive)
-    if file:
+    if not lines:
+        program_listing.say_none(call.session, drive)
+    if file and lines:
         return program_listing.save_new(call.session, drive, file, lines)
     for line in lines:
         call.session.output(line)

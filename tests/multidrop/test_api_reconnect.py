@@ -259,7 +259,7 @@ async def test_events_name_a_limit_an_error_the_end_of_a_program_a_loss_and_the_
         await asyncio.sleep(1)
         listening.cancel()
         assert found[1:] == [
-            ("error", "a: an error is set; read_error() reads and clears its number"),
+            ("error", "a: limit+ is active; read_error() reads and clears its number"),
             ("limit", "a: the plus limit is reached"),
             ("lost", f"line: sim:{tmp_path / 'cell.toml'}#line was lost: unplugged"),
             ("back", "line: the line is back"),

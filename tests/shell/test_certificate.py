@@ -23,7 +23,7 @@ from multidrop.shell.session import Session
 from multidrop.simulator.cells import read
 from multidrop.simulator.floor import Floor
 from multidrop.simulator.lexium.device import Answer
-from multidrop.simulator.lexium.ports import mcode as mcode_port
+from multidrop.simulator.lexium.ports import replies
 from multidrop.simulator.lexium.ports.modbus import ModbusPort
 from multidrop.simulator.serving.endpoints import serve_bus
 from multidrop.simulator.serving.running import RunningFloor
@@ -46,7 +46,7 @@ def rows(family, *traits):
 
 
 PLANTS = [
-    *(("lexium", each) for each in rows("mcode", "lexium", "serial", "alone")),
+    *(("lexium", each) for each in rows("mcode", "lexium", "serial", "alone", "hmt")),
     *(("ethernet", each) for each in rows("mcode", "ethernet") if each.asks),
     *(("mdrive", each) for each in rows("mcode", "mdrive", "base") if each.asks),
     *(("pmx", each) for each in rows("pmx")),
@@ -120,13 +120,13 @@ class Planted:
 @contextlib.contextmanager
 def other_bytes(question):
     """Have simulated drives begin the reply to the last line of a question with a blank."""
-    composed = mcode_port.compose
+    composed = replies.compose
 
     def compose(mode, text, outcome, prompt):
         found = composed(mode, text, outcome, prompt)
         return b" " + found if text.lstrip(b"!").startswith(planted_line(question).encode()) else found
 
-    with mock.patch.object(mcode_port, "compose", compose):
+    with mock.patch.object(replies, "compose", compose):
         yield
 
 
@@ -144,6 +144,13 @@ async def test_a_planted_deviation_is_found_by_its_question(tmp_path, family, qu
         with contextlib.nullcontext() if planted.begun else other_bytes(question):
             assert await compare(cell.session, drive, file, load(file))
         assert cell.printed()[-1].startswith(f"{question.name}: here ")
+
+
+def test_every_trait_that_a_question_needs_is_one_of_the_planted_drives_or_of_a_party_line():
+    asked_of = {question for _, question in PLANTS} | {*rows("modbus", "closed"), *rows("mcode", "lexium", "party")}
+    for family, record in FAMILIES.items():
+        table = record.certifying.table if record.certifying is not None else ()
+        assert [each.name for each in table if each not in asked_of] == [], family
 
 
 MODBUS = '[[bus]]\nname = "w"\nserve = ["modbus://127.0.0.1:0"]\n[[bus.drive]]\npersonality = "LMDCE"\n'
@@ -212,7 +219,7 @@ async def test_beside_a_stored_program_nothing_is_asked_that_may_raise_an_error(
 async def test_while_a_program_runs_only_what_changes_nothing_is_asked(cell):
     await cell.session.run("EX Ga")
     report = await asked(cell)
-    assert len(report.answers) == 3 and set(report.unasked.values()) == {"its program ran"}
+    assert len(report.answers) == 5 and set(report.unasked.values()) == {"its program ran"}
 
 
 @pytest.mark.virtual

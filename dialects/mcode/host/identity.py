@@ -239,6 +239,7 @@ ENCODER_PART = "-E"
 """Part of the part number of an MDrivePlus with an encoder (such as -EQ)."""
 TEXT = b'PR "~'
 """The first characters of a print: a drive refuses them after half a line, and executes nothing by themselves."""
+END_OF_TEXT = b'"'
 SETTLE = 0.03
 """Quiet time after the first line feeds, s: half a line in a drive's buffer is refused meanwhile."""
 NAMED = (2, 3)
@@ -294,9 +295,10 @@ def find_in_text(state: MCodeState, place: Place) -> Procedure[bool]:
     return False
 
 
-def end_text() -> Procedure[None]:
-    """Complete the text in a drive that is not in party mode."""
-    yield Request(NOBODY, 'end of the text "', Kind.QUIET, MCode(), settle=SETTLE, timeout=BRIEF, body=b'"\r')
+def end_text() -> Procedure[Reply]:
+    """Complete the text in a drive that is not in party mode; such a drive prints it, or repeats its end (EM=0)."""
+    body = END_OF_TEXT + b"\r"
+    return (yield Request(NOBODY, 'end of the text "', Kind.QUIET, MCode(), settle=SETTLE, timeout=BRIEF, body=body))
 
 
 def _whispers(place: Place) -> Procedure[bool]:

@@ -186,4 +186,6 @@ def _word(text: str) -> str:
     return row.name if row is not None and row.kind in ("variable", "flag") else ""
 
 
-CYBER_SECURITY = Protection(_text, _word)
+ANOTHER = "another program or a PLC may hold the only connection that the drive serves: close it there; or "
+"""Another cause of a silent drive: the network opens a connection that the drive does not serve."""
+CYBER_SECURITY = Protection(_text, _word, ANOTHER)

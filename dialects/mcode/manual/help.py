@@ -66,6 +66,11 @@ def describe(word: str, product: str = "") -> list[str]:
     if row is None:
         near = _near(word.strip(), product)
         raise Diagnostic(f"no mnemonic {word.strip()!r}", "", f"perhaps {', '.join(near)}" if near else "")
+    return page(row, facts(row, product))
+
+
+def facts(row: Mnemonic, product: str = "") -> dict[str, str]:
+    """Return what the tables say of a word, by the label of its line in the help; empty where they say nothing."""
     older = row.reserved_on <= MDRIVE_PLUS
     default = "" if row.default is None else str(row.default)
     if row.default is not None and row.default_encoder is not None:
@@ -77,22 +82,27 @@ def describe(word: str, product: str = "") -> list[str]:
     if product in EVERY and product not in row.products:
         here = f"not in an {product}: error 37" if product in row.reserved_on else f"a free name in an {product}"
         here = f"not in an {product}: it prints 0; error 37 for any value" if product in row.zero_on else here
-    more = () if older else [(each["label"], each["text"]) for each in details().get(row.name, ())]
-    facts = (
-        ("syntax", row.syntax),
-        ("range", _range(row)),
-        ("default", default),
-        ("access", ACCESS[row.access] if row.kind in ("variable", "flag", "keyword") else ""),
-        ("use", use if row.kind not in ("math", "reserved") else ""),
-        ("products", _products(row.name)),
-        ("firmware", f"{row.firmware} or newer" if row.firmware else ""),
-        ("size", "not on NEMA 17" if row.large else ""),
-        ("here", here),
-        ("note", row.note),
-        *more,
-        ("manual", (f"MCode reference of 2012, page {row.section}" if older else f"MCode reference {row.section}")),
-    )
-    lines = [f"  {label:<10} {fact}" for label, fact in facts if fact]
+    return {
+        "syntax": row.syntax,
+        "range": range_of(row),
+        "default": default,
+        "access": ACCESS[row.access] if row.kind in ("variable", "flag", "keyword") else "",
+        "use": use if row.kind not in ("math", "reserved") else "",
+        "products": _products(row.name),
+        "firmware": f"{row.firmware} or newer" if row.firmware else "",
+        "size": "not on NEMA 17" if row.large else "",
+        "here": here,
+        "note": row.note,
+        "manual": f"MCode reference of 2012, page {row.section}" if older else f"MCode reference {row.section}",
+    }
+
+
+def page(row: Mnemonic, said: Mapping[str, str]) -> list[str]:
+    """Lay out the help on a word, with a line for each fact, and for each detail before the last fact."""
+    older = row.reserved_on <= MDRIVE_PLUS
+    *facts, manual = said.items()
+    more = [] if older else [(each["label"], each["text"]) for each in details().get(row.name, ())]
+    lines = [f"  {label:<10} {fact}" for label, fact in (*facts, *more, manual) if fact]
     return [f"{row.name}: {row.title} ({row.kind})", f"  {row.meaning}", *lines]
 
 
@@ -179,7 +189,8 @@ def _near(word: str, product: str) -> list[str]:
     return list(dict.fromkeys(titled + alike))[:6]
 
 
-def _range(row: Mnemonic) -> str:
+def range_of(row: Mnemonic) -> str:
+    """Return the numbers that a word takes or shows, with their unit; empty where they are unstated."""
     if row.values:
         return f"{', '.join(map(str, row.values))} {row.unit}".strip()
     plain = _span(row, encoder=False)

@@ -85,6 +85,11 @@ class Mnemonic:
     large: bool = False
     """A Lexium of NEMA size 17 lacks it."""
 
+    @property
+    def whole(self) -> bool:
+        """Whether its numbers are whole ones."""
+        return isinstance(self.low, int) and not isinstance(self.default, (float, str))
+
     def accepts(self, value: Number, encoder: bool = False) -> bool:
         """Whether the number is in range, whatever other variables are; with EE=1 where `encoder`."""
         if self.values:

@@ -91,6 +91,7 @@ class Model(NamedTuple):
     `prompts_at_start`: a prompt follows the sign-on. `captures_relative`: TR sets PC too, TP does not.
     `flags_by_nak`: with a checksum the drive carries a line out and replies NAK while an error is set.
     `wakes_by_line`: in party mode the first line is carried out, too; its LF is the one that party mode waits for.
+    `echoes_before_value`: a LF right behind the CR of a line is given back before what the line prints, not after it.
     """
 
     version: str
@@ -122,6 +123,7 @@ class Model(NamedTuple):
     captures_relative: bool = False
     flags_by_nak: bool = False
     wakes_by_line: bool = False
+    echoes_before_value: bool = False
 
 
 def _lexium(name: str, *, ethernet: bool = False) -> Model:
@@ -160,6 +162,7 @@ MDRIVE = Model(
     captures_relative=True,
     flags_by_nak=True,
     wakes_by_line=True,
+    echoes_before_value=True,
 )
 
 MODELS: Mapping[str, Model] = {
