@@ -208,8 +208,13 @@ def _epilog(operation: Operation) -> str:
 
     from multidrop.shell.operations.table import COMMANDS
 
-    examples = operation.examples or [each.examples[-1] for each in COMMANDS.parts(operation.command).values()]
+    own = COMMANDS.parts(operation.command)
+    examples = operation.examples or [each.examples[-1] for each in own.values()]
     lines = ["examples:", *(f"  multidrop {each}" for each in examples)]
-    if operation.urls or "URL" in str([*operation.arguments.items()]):
+    if own and operation.run:  # argparse does not list them
+        lines = ["also:", *(f"  {each.command:<15} {each.meaning}" for each in own.values()), "", *lines]
+    if operation.own_urls:
+        lines += ["", *textwrap.wrap(operation.own_urls, WIDTH, break_on_hyphens=False, break_long_words=False)]
+    elif operation.urls or "URL" in str([*operation.arguments.items()]):
         lines += ["", *textwrap.wrap(urls(), WIDTH, break_on_hyphens=False, break_long_words=False)]
     return "\n".join(lines)

@@ -32,18 +32,32 @@ PATH = re.compile(r"(FILE|SCRIPT|CELL|PATH)\b")
 BRACKETED = re.compile(r"\[(?:[^\[\]]|\[[^\[\]]*\])*\]\S*|\((?:[^()]|\([^()]*\))*\)\S*|\S+")
 """One part of a usage line: an option with its value, a group, or a word."""
 USAGE_WIDTH = 77
-VALUES = {"URL": "url", "URL2": "url", "PORT-OR-URL": "url", "ADDR": "drive", "NAME": "macro", "NAME|off": "macro"}
+VALUES = {
+    "BROKER-URL": "broker",
+    "URL": "url",
+    "URL2": "url",
+    "PORT-OR-URL": "url",
+    "ADDR": "drive",
+    "NAME": "macro",
+    "NAME|off": "macro",
+}
 """What is listed for a metavar; NAME in the commands on macros only."""
 
 # Connections, ports and simulated buses; drives of saved connections; macros: listed without a start of Python.
+BEGINNINGS = " ".join(
+    ["sim:", *(f"'sim:#{bus}'" for bus in ("press", "eth", "pmx"))]
+    + [form.prefix for scheme, form in URL_FORMS.items() if scheme not in ("sim", "serial")]
+)
+"""The beginnings of URLs: of a serial port the path is enough."""
 CONFIG = '"${MULTIDROP_CONFIG_DIR:-${XDG_CONFIG_HOME:-$HOME/.config}/multidrop}'
 LISTS = {
     "url": rf"""
-  printf '%s\n' sim: 'sim:#press' 'sim:#eth' 'sim:#pmx' tcp:// udp:// modbus:// rfc2217:// ssh://
+  printf '%s\n' {BEGINNINGS}
   for each in /dev/serial/by-id/* /dev/ttyUSB* /dev/ttyACM*; do [ -e "$each" ] && printf '%s\n' "$each"; done
   file={CONFIG}/multidrop.toml"
   [ -r "$file" ] && sed -n 's/^ *\[connections\.\([A-Za-z0-9_][A-Za-z0-9_-]*\)\].*/\1/p' "$file"
 """,
+    "broker": "\n  printf '%s\\n' mqtt:// mqtts://\n",
     "drive": rf"""
   printf '%s\n' all
   file={CONFIG}/multidrop.toml"
@@ -62,12 +76,13 @@ FISH_CONFIG = """
 """
 FISH_LISTS = {
     "url": rf"""
-  printf '%s\n' sim: 'sim:#press' 'sim:#eth' 'sim:#pmx' tcp:// udp:// modbus:// rfc2217:// ssh://
+  printf '%s\n' {BEGINNINGS}
   find /dev/serial/by-id -type l 2>/dev/null
   find /dev -maxdepth 1 '(' -name 'ttyUSB*' -o -name 'ttyACM*' ')' 2>/dev/null{FISH_CONFIG}
   test -r "$folder/multidrop.toml"; or return
   sed -n 's/^ *\[connections\.\([A-Za-z0-9_][A-Za-z0-9_-]*\)\].*/\1/p' "$folder/multidrop.toml"
 """,
+    "broker": "\n  printf '%s\\n' mqtt:// mqtts://\n",
     "drive": rf"""
   printf '%s\n' all{FISH_CONFIG}
   test -r "$folder/multidrop.toml"; or return
@@ -78,12 +93,13 @@ FISH_LISTS = {
 """,
 }
 POWERSHELL_LISTS = {
-    "url": r"""
-  'sim:', 'sim:#press', 'sim:#eth', 'sim:#pmx', 'tcp://', 'udp://', 'modbus://', 'rfc2217://', 'ssh://'
-  try { [System.IO.Ports.SerialPort]::GetPortNames() } catch { }
+    "url": rf"""
+  {", ".join(f"'{each}'" for each in BEGINNINGS.replace("'", "").split())}
+  try {{ [System.IO.Ports.SerialPort]::GetPortNames() }} catch {{ }}
   Select-String -Path (Join-Path (_multidrop_folder) 'multidrop.toml') -ErrorAction SilentlyContinue `
-    -Pattern '^ *\[connections\.([A-Za-z0-9_][A-Za-z0-9_-]*)\]' | ForEach-Object { $_.Matches[0].Groups[1].Value }
+    -Pattern '^ *\[connections\.([A-Za-z0-9_][A-Za-z0-9_-]*)\]' | ForEach-Object {{ $_.Matches[0].Groups[1].Value }}
 """,
+    "broker": "\n  'mqtt://', 'mqtts://'\n",
     "drive": r"""
   'all'
   Select-String -Path (Join-Path (_multidrop_folder) 'multidrop.toml') -ErrorAction SilentlyContinue `
@@ -95,6 +111,17 @@ POWERSHELL_LISTS = {
     -ErrorAction SilentlyContinue | ForEach-Object { $_.BaseName } | Where-Object { $_ -notmatch '^[-=+@]' }
 """,
 }
+PARTS = {"snapshot": ("apply",)}
+"""The parts of commands that run by themselves, too: they are offered beside the URLs, with cell files."""
+for _command, _names in PARTS.items():
+    _words = " ".join(_names)
+    _cells = """  for each in *.toml; do [ -e "$each" ] && printf '%s\\n' "$each"; done"""
+    LISTS[_command] = f"\n  printf '%s\\n' {_words}\n{_cells}{LISTS['url']}"
+    _cells = "  find . -maxdepth 1 -name '*.toml' 2>/dev/null | sed 's!^[.]/!!'"
+    FISH_LISTS[_command] = f"\n  printf '%s\\n' {_words}\n{_cells}{FISH_LISTS['url']}"
+    _cells = "  Get-ChildItem -Path '*.toml' -ErrorAction SilentlyContinue | ForEach-Object { $_.Name }"
+    _words = ", ".join(f"'{name}'" for name in _names)
+    POWERSHELL_LISTS[_command] = f"\n  {_words}\n{_cells}{POWERSHELL_LISTS['url']}"
 # bash divides words at colons: they are joined for the parser, and the candidates lose what the line already has.
 BASH_WORDS = """
 _multidrop() {
@@ -117,7 +144,11 @@ complete -o bashdefault -F _multidrop multidrop
 
 def listed(kind: str) -> str:
     """The function of bash that prints the values that begin with what is typed."""
-    own = """  [[ "$1" == sim:* ]] && compgen -P sim: -f -X '!*.toml' -- "${1#sim:}"\n""" if kind == "url" else ""
+    own = (
+        """  [[ "$1" == sim:* ]] && compgen -P sim: -f -X '!*.toml' -- "${1#sim:}"\n"""
+        if kind in ("url", *PARTS)
+        else ""
+    )
     return f"""
 _multidrop_{kind}s() {{
   local each file{LISTS[kind]}  true
@@ -217,8 +248,10 @@ def completion(shell: str) -> str:
     """The completion for one shell."""
     parser = build()
     parser.add_all()
+    take_parts(parser)
     for action, command in actions(parser):
         kind = VALUES.get(action.metavar) if isinstance(action.metavar, str) else None
+        kind = command.split()[1] if kind == "url" and command.split()[1] in PARTS else kind
         if kind and (kind != "macro" or " macro " in command):
             name = f"_multidrop_{kind}"
             action.complete = {**dict.fromkeys(FILES, name), "fish": f"({name})"}  # type: ignore[attr-defined]
@@ -231,6 +264,22 @@ def completion(shell: str) -> str:
     return (
         "\n".join(line.rstrip() for line in text.strip().splitlines()) + "\n" + (BASH_WORDS if shell == "bash" else "")
     )
+
+
+def take_parts(parser: argparse.ArgumentParser) -> None:
+    """Give the commands in `PARTS` the options of their parts."""
+    commands = next(each for each in parser._actions if isinstance(each, argparse._SubParsersAction)).choices
+    for command, names in PARTS.items():
+        own = {option for each in commands[command]._actions for option in each.option_strings}
+        for name in names:
+            part = build([command, name])
+            asked = next(each for each in part._actions if isinstance(each, argparse._SubParsersAction))
+            group = asked.choices[command]
+            group.add_arguments([name])
+            inner = next(each for each in group._actions if isinstance(each, argparse._SubParsersAction)).choices[name]
+            inner.add_arguments(())
+            more = [each for each in inner._actions if each.option_strings and not own & {*each.option_strings}]
+            commands[command]._actions.extend(more)
 
 
 def actions(parser: argparse.ArgumentParser) -> Iterator[tuple[argparse.Action, str]]:

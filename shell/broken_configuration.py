@@ -49,7 +49,9 @@ def salvage(text: str, where: str, read: Callable[[dict[str, Any], str], T]) -> 
             name = problem.message.removeprefix("no key ")
             found = [path for path in _paths(document) if re.match(rf"{re.escape('.'.join(path))}(?![\w-])", name)]
             path = max(found, key=len, default=())
-            problems.append(placed(problem.message, text, where, problem.hint))
+            at = line_of(text, path)  # a name in quotation marks is not what its message begins with
+            placed_at = f"{where}:{at}" if at and path else placed(problem.message, text, where).where
+            problems.append(Diagnostic(problem.message, placed_at, problem.hint))
             lost.append((path, problems[-1]))
             _leave_out(document, path[:2] if path[2:] == ("url",) else path)
 

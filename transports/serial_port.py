@@ -13,7 +13,6 @@ import re
 import shlex
 import sys
 from collections.abc import Callable
-from pathlib import Path
 from typing import TypeVar
 
 import serial
@@ -23,6 +22,8 @@ from multidrop.transports.serial_ports import com_name, holder, present
 
 if sys.platform != "win32":
     import fcntl
+    import grp
+    import pwd
     import termios
 
     from multidrop.transports import output_queue
@@ -82,7 +83,7 @@ def _why(port: str, error: OSError) -> str:
     if number in (errno.EBUSY, errno.EAGAIN, errno.EWOULDBLOCK):
         return f"{port} is in use by {holder(port) or 'another program'}; close it there"
     if number in (errno.EACCES, errno.EPERM):
-        return f"no permission to open {port}; `sudo usermod -aG {shlex.quote(_group(port))} $USER`, then log in again"
+        return f"no permission to open {port}; {_permission(port)}"
     if number in (errno.ENOENT, errno.ENODEV, errno.ENXIO, errno.ENOTDIR):
         return _nothing(port)
     if number in (errno.EISDIR, errno.ENOTTY) or "configure" in str(error):
@@ -111,13 +112,53 @@ def _nothing(port: str) -> str:
     return f"no port {port}; plug it in, or see `multidrop ports`"
 
 
-def _group(port: str) -> str:
-    """The group that may use a port; most distributions call it `dialout`."""
+USUAL = "dialout"
+"""The group of serial ports in most distributions."""
+
+
+def _permission(port: str) -> str:
+    """The remedy for a port that this account may not open: it depends on the owner, the group and the mode."""
+    usual = f"`sudo usermod -aG {USUAL} $USER`, then log in again"
+    if sys.platform == "win32":
+        return usual
+    try:
+        found = os.stat(port)
+    except OSError:
+        return usual
+    mode, name = found.st_mode & 0o777, _group_name(found.st_gid)
+    rule = f"a udev rule with GROUP={USUAL!r}, MODE='0660' lets that group use it"
+    shown, group = f"its mode is {mode:04o}", shlex.quote(name)
+    if found.st_uid == os.geteuid():
+        if mode & 0o600 == 0o600:
+            return f"you own it, and {shown}: {ELSEWHERE}"
+        return f"you own it, and {shown}: `chmod u+rw {shlex.quote(port)}`"
+    if mode & 0o060 != 0o060 or found.st_gid == 0:
+        who = f"group {name}, {shown}" if mode & 0o060 != 0o060 else f"it is of the group {name} only"
+        return f"{who}, so no other group helps: {rule}"
+    if found.st_gid in (os.getegid(), *os.getgroups()):
+        return f"you are in its group {name}, which may use it: {ELSEWHERE}"
+    if _is_member(found.st_gid):
+        return f"you are in its group {name}, but this login began before that: log out and in again"
+    return f"`sudo usermod -aG {group} $USER`, then log in again"
+
+
+ELSEWHERE = "something else refuses it (a container, SELinux, or another program that has it for itself)"
+
+
+def _group_name(number: int) -> str:
     if sys.platform != "win32":
-        with contextlib.suppress(OSError, KeyError):
-            owner = Path(port).group()
-            return owner if owner != "root" else "dialout"
-    return "dialout"
+        with contextlib.suppress(KeyError):
+            return grp.getgrgid(number).gr_name
+    return str(number)
+
+
+def _is_member(number: int) -> bool:
+    """Whether the list of groups has this account, even if this login does not."""
+    if sys.platform != "win32":
+        with contextlib.suppress(KeyError):
+            account = pwd.getpwuid(os.geteuid())
+            return account.pw_name in grp.getgrgid(number).gr_mem or account.pw_gid == number
+    return False
 
 
 class SerialControl(PortControl):

@@ -28,7 +28,8 @@ from textual.screen import Screen
 
 from multidrop.dialects import Diagnostic
 from multidrop.drives.events import Unsolicited
-from multidrop.shell.configuration import DEFAULT_LOOK, Look
+from multidrop.shell.broken_configuration import placed
+from multidrop.shell.configuration import DEFAULT_LOOK, Look, Settings, parse
 from multidrop.shell.events import Failed, OnBus, Printed, SessionEvent, StateChanged
 from multidrop.shell.session import Session
 from multidrop.tui.actions import Actions, Parts
@@ -153,6 +154,7 @@ class MultidropApp(Dressed):
             self.selection.select,
             self.show_line,
             self.last_records,
+            troubles_of_text,
             self,
             self.main,
             self.assist,
@@ -450,3 +452,15 @@ def bindings() -> list[BindingType]:
     """The keys of all screens that can be set, those of the app first; no page has one of its own."""
     screens: list[type[Framed]] = [Framed, MainScreen, Page]
     return [*MultidropApp.BINDINGS, *(each for screen in screens for each in screen.BINDINGS)]
+
+
+def look_troubles(found: Settings, text: str, where: str) -> list[Diagnostic]:
+    """What is wrong in a configuration that only the screen knows, keys and themes, and files that it names."""
+    look = found.look
+    troubles = [*keymap(bindings(), look.keys).troubles, *wrong_theme(look.theme), *found.mqtt.unreadable()]
+    return [placed(trouble, text, where) for trouble in troubles]
+
+
+def troubles_of_text(text: str, where: str) -> list[Diagnostic]:
+    """The same of the text of a configuration file that is being edited."""
+    return look_troubles(parse(text, where, lenient=True), text, where)

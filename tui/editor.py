@@ -46,7 +46,7 @@ class MacroGrammar:
             macro = parse_macro(text, self._file)
             tuple(macro.parameters)
         except Diagnostic as problem:
-            return [_problem(problem)]
+            return [problem_of(problem)]
         return ()
 
     def entries(self, text: str) -> Sequence[Entry]:
@@ -61,10 +61,10 @@ class ConfigurationGrammar(MacroGrammar):
 
     def check(self, text: str, product: str) -> Sequence[Problem]:
         """Every problem of a text, in order."""
-        return [_problem(each) for each in configuration.parse(text, self._file, lenient=True).problems]
+        return [problem_of(each) for each in configuration.parse(text, self._file, lenient=True).problems]
 
 
-def _problem(found: Diagnostic) -> Problem:
+def problem_of(found: Diagnostic) -> Problem:
     """An error as an editor marks it, at the place that it names."""
     place = _LINE.search(found.where)
     line, column = (int(place[1]), int(place[2] or 1)) if place else (1, 1)

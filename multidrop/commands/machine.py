@@ -97,16 +97,10 @@ def check(chosen: argparse.Namespace) -> int:
     """Report what is wrong; exit code 0 if nothing is."""
     found = configuration.load(lenient=True)
     text = _text(configuration.config_file())
-    from multidrop.shell.broken_configuration import placed
-    from multidrop.tui.app import bindings
-    from multidrop.tui.keymap import keymap
-    from multidrop.tui.widgets.theme import wrong_theme
+    from multidrop.tui.app import look_troubles
 
-    # The screen knows keys and themes.
-    look = found.look
-    troubles = [*keymap(bindings(), look.keys).troubles, *wrong_theme(look.theme), *found.mqtt.unreadable()]
-    placed_troubles = [placed(trouble, text, str(configuration.config_file())) for trouble in troubles]
-    write(sys.stderr, *map(str, (*found.problems, *placed_troubles)))
+    troubles = look_troubles(found, text, str(configuration.config_file()))
+    write(sys.stderr, *map(str, (*found.problems, *troubles)))
     if not (troubles or found.problems):
         state = "is right" if text else "does not exist: all settings are the defaults"
         write(sys.stdout, f"{configuration.config_file()} {state}")

@@ -49,7 +49,7 @@ _shtab_multidrop_poll_option_strings=(-h --help --every --drive --rows --json --
 _shtab_multidrop_publish_option_strings=(-h --help --to --home-assistant --rate --no-reconnect --no-config)
 _shtab_multidrop_plant_option_strings=(-h --help --json --no-config)
 _shtab_multidrop_share_option_strings=(-h --help --rfc2217 --json --no-config)
-_shtab_multidrop_snapshot_option_strings=(-h --help -o --output --no-config)
+_shtab_multidrop_snapshot_option_strings=(-h --help -o --output --no-config --drive --from --with --other-product --dry-run --yes)
 _shtab_multidrop_twin_fit_option_strings=(-h --help --cell --json --no-config)
 _shtab_multidrop_twin_option_strings=(-h --help)
 _shtab_multidrop_certify_option_strings=(-h --help --drive -o --output --compare --yes --no-config)
@@ -136,11 +136,12 @@ _shtab_multidrop_plot___to_COMPGEN=_shtab_compgen_files
 _shtab_multidrop_poll_pos_0_COMPGEN=_multidrop_url
 _shtab_multidrop_poll___drive_COMPGEN=_multidrop_drive
 _shtab_multidrop_publish_pos_0_COMPGEN=_multidrop_url
-_shtab_multidrop_plant_pos_0_COMPGEN=_multidrop_url
+_shtab_multidrop_plant_pos_0_COMPGEN=_multidrop_broker
 _shtab_multidrop_share_pos_0_COMPGEN=_multidrop_url
-_shtab_multidrop_snapshot_pos_0_COMPGEN=_multidrop_url
+_shtab_multidrop_snapshot_pos_0_COMPGEN=_multidrop_snapshot
 _shtab_multidrop_snapshot__o_COMPGEN=_shtab_compgen_files
 _shtab_multidrop_snapshot___output_COMPGEN=_shtab_compgen_files
+_shtab_multidrop_snapshot___drive_COMPGEN=_multidrop_drive
 _shtab_multidrop_twin_fit___cell_COMPGEN=_shtab_compgen_files
 _shtab_multidrop_certify_pos_0_COMPGEN=_multidrop_url
 _shtab_multidrop_certify___drive_COMPGEN=_multidrop_drive
@@ -354,6 +355,9 @@ _shtab_multidrop_snapshot_pos_0_nargs=+
 _shtab_multidrop_snapshot__h_nargs=0
 _shtab_multidrop_snapshot___help_nargs=0
 _shtab_multidrop_snapshot___no_config_nargs=0
+_shtab_multidrop_snapshot___other_product_nargs=0
+_shtab_multidrop_snapshot___dry_run_nargs=0
+_shtab_multidrop_snapshot___yes_nargs=0
 _shtab_multidrop_twin_fit__h_nargs=0
 _shtab_multidrop_twin_fit___help_nargs=0
 _shtab_multidrop_twin_fit___json_nargs=0
@@ -461,7 +465,7 @@ _shtab_multidrop___no_config_nargs=0
 
 _multidrop_urls() {
   local each file
-  printf '%s\n' sim: 'sim:#press' 'sim:#eth' 'sim:#pmx' tcp:// udp:// modbus:// rfc2217:// ssh://
+  printf '%s\n' sim: 'sim:#press' 'sim:#eth' 'sim:#pmx' tcp:// udp:// modbus:// rfc2217:// ssh:// usb: usbip://
   for each in /dev/serial/by-id/* /dev/ttyUSB* /dev/ttyACM*; do [ -e "$each" ] && printf '%s\n' "$each"; done
   file="${MULTIDROP_CONFIG_DIR:-${XDG_CONFIG_HOME:-$HOME/.config}/multidrop}/multidrop.toml"
   [ -r "$file" ] && sed -n 's/^ *\[connections\.\([A-Za-z0-9_][A-Za-z0-9_-]*\)\].*/\1/p' "$file"
@@ -473,6 +477,19 @@ _multidrop_url() {
     [[ "$each" == "$1"* ]] && printf '%s\n' "$each"
   done < <(_multidrop_urls)
   [[ "$1" == sim:* ]] && compgen -P sim: -f -X '!*.toml' -- "${1#sim:}"
+  true
+}
+
+_multidrop_brokers() {
+  local each file
+  printf '%s\n' mqtt:// mqtts://
+  true
+}
+_multidrop_broker() {
+  local each
+  while IFS= read -r each; do
+    [[ "$each" == "$1"* ]] && printf '%s\n' "$each"
+  done < <(_multidrop_brokers)
   true
 }
 
@@ -503,6 +520,25 @@ _multidrop_macro() {
   while IFS= read -r each; do
     [[ "$each" == "$1"* ]] && printf '%s\n' "$each"
   done < <(_multidrop_macros)
+  true
+}
+
+_multidrop_snapshots() {
+  local each file
+  printf '%s\n' apply
+  for each in *.toml; do [ -e "$each" ] && printf '%s\n' "$each"; done
+  printf '%s\n' sim: 'sim:#press' 'sim:#eth' 'sim:#pmx' tcp:// udp:// modbus:// rfc2217:// ssh:// usb: usbip://
+  for each in /dev/serial/by-id/* /dev/ttyUSB* /dev/ttyACM*; do [ -e "$each" ] && printf '%s\n' "$each"; done
+  file="${MULTIDROP_CONFIG_DIR:-${XDG_CONFIG_HOME:-$HOME/.config}/multidrop}/multidrop.toml"
+  [ -r "$file" ] && sed -n 's/^ *\[connections\.\([A-Za-z0-9_][A-Za-z0-9_-]*\)\].*/\1/p' "$file"
+  true
+}
+_multidrop_snapshot() {
+  local each
+  while IFS= read -r each; do
+    [[ "$each" == "$1"* ]] && printf '%s\n' "$each"
+  done < <(_multidrop_snapshots)
+  [[ "$1" == sim:* ]] && compgen -P sim: -f -X '!*.toml' -- "${1#sim:}"
   true
 }
 

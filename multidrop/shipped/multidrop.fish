@@ -7,7 +7,7 @@
 # Custom Preamble
 
 function _multidrop_url
-  printf '%s\n' sim: 'sim:#press' 'sim:#eth' 'sim:#pmx' tcp:// udp:// modbus:// rfc2217:// ssh://
+  printf '%s\n' sim: 'sim:#press' 'sim:#eth' 'sim:#pmx' tcp:// udp:// modbus:// rfc2217:// ssh:// usb: usbip://
   find /dev/serial/by-id -type l 2>/dev/null
   find /dev -maxdepth 1 '(' -name 'ttyUSB*' -o -name 'ttyACM*' ')' 2>/dev/null
   set -l folder $MULTIDROP_CONFIG_DIR
@@ -16,6 +16,11 @@ function _multidrop_url
 
   test -r "$folder/multidrop.toml"; or return
   sed -n 's/^ *\[connections\.\([A-Za-z0-9_][A-Za-z0-9_-]*\)\].*/\1/p' "$folder/multidrop.toml"
+  true
+end
+
+function _multidrop_broker
+  printf '%s\n' mqtt:// mqtts://
   true
 end
 
@@ -36,6 +41,21 @@ function _multidrop_macro
   test -d "$folder"; or set folder "$HOME/.config/multidrop"
 
   find macros "$folder/macros" -maxdepth 1 -name '*.toml' 2>/dev/null | sed 's!.*/!!; s/[.]toml$//; /^[-=+@]/d'
+  true
+end
+
+function _multidrop_snapshot
+  printf '%s\n' apply
+  find . -maxdepth 1 -name '*.toml' 2>/dev/null | sed 's!^[.]/!!'
+  printf '%s\n' sim: 'sim:#press' 'sim:#eth' 'sim:#pmx' tcp:// udp:// modbus:// rfc2217:// ssh:// usb: usbip://
+  find /dev/serial/by-id -type l 2>/dev/null
+  find /dev -maxdepth 1 '(' -name 'ttyUSB*' -o -name 'ttyACM*' ')' 2>/dev/null
+  set -l folder $MULTIDROP_CONFIG_DIR
+  test -n "$folder"; or set folder "$XDG_CONFIG_HOME/multidrop"
+  test -d "$folder"; or set folder "$HOME/.config/multidrop"
+
+  test -r "$folder/multidrop.toml"; or return
+  sed -n 's/^ *\[connections\.\([A-Za-z0-9_][A-Za-z0-9_-]*\)\].*/\1/p' "$folder/multidrop.toml"
   true
 end
 
@@ -87,7 +107,7 @@ function _shtab_multidrop_using
 end
 
 set -g _shtab_multidrop_commands demo tui shell send run sim program 'program check' 'program test' 'program sweep' 'program convert' 'program list' 'program diff' 'program upload' 'program download' params 'params backup' 'params diff' 'params restore' macro 'macro list' 'macro show' 'macro play' 'macro edit' 'macro describe' 'macro rename' 'macro copy' 'macro delete' 'macro key' 'macro import' 'macro export' plot poll publish plant share snapshot twin 'twin fit' certify ports relay scan rescue log 'log show' 'log follow' 'log grep' 'log at' 'log bisect' 'log judge' 'log replay' config 'config path' 'config show' 'config check' help lsp report completion
-set -g _shtab_multidrop_opts_with_value --against --allow --baud --break --cell --cluster --compare --csv --dialect --drive --every --expect --jobs --join --junit --language --on --other --output --page --parquet --personality --random --rate --resume --rfc2217 --role --rows --run --save --search --seed --serve --set --speed --svg --tcp --times --to --until --vary --watch --with -o
+set -g _shtab_multidrop_opts_with_value --against --allow --baud --break --cell --cluster --compare --csv --dialect --drive --every --expect --from --jobs --join --junit --language --on --other --output --page --parquet --personality --random --rate --resume --rfc2217 --role --rows --run --save --search --seed --serve --set --speed --svg --tcp --times --to --until --vary --watch --with -o
 
 complete -c multidrop -e
 complete -c multidrop -f
@@ -345,7 +365,7 @@ complete -c multidrop -n '_shtab_multidrop_using; and test $_shtab_multidrop_npo
 complete -c multidrop -n '_shtab_multidrop_using plant' -s h -l help -d 'show this help message and exit'
 complete -c multidrop -n '_shtab_multidrop_using plant' -l json -d 'print one JSON object a line'
 complete -c multidrop -n '_shtab_multidrop_using plant' -l no-config -d 'read no configuration file'
-complete -c multidrop -n '_shtab_multidrop_using plant; and test $_shtab_multidrop_npos -eq 0' -ka "(_multidrop_url)" -d 'mqtt://[USER@]BROKER[:PORT]/PREFIX: a broker, and the topic above all publishers; mqtts:// is encrypted'
+complete -c multidrop -n '_shtab_multidrop_using plant; and test $_shtab_multidrop_npos -eq 0' -ka "(_multidrop_broker)" -d 'mqtt://[USER@]BROKER[:PORT]/PREFIX: a broker, and the topic above all publishers; mqtts:// is encrypted'
 complete -c multidrop -n '_shtab_multidrop_using; and test $_shtab_multidrop_npos -eq 0' -a share -d 'Lend a port to several clients over the network (RFC 2217), of which one writes; a stop passes from any.'
 complete -c multidrop -n '_shtab_multidrop_using share' -s h -l help -d 'show this help message and exit'
 complete -c multidrop -n '_shtab_multidrop_using share' -l rfc2217 -x -d 'serve it here (host: 127.0.0.1 unless given; port 0: a free one)'
@@ -356,7 +376,13 @@ complete -c multidrop -n '_shtab_multidrop_using; and test $_shtab_multidrop_npo
 complete -c multidrop -n '_shtab_multidrop_using snapshot' -s h -l help -d 'show this help message and exit'
 complete -c multidrop -n '_shtab_multidrop_using snapshot' -s o -l output -xka "(__fish_complete_path (commandline -ct))" -d 'the new file; -: standard output'
 complete -c multidrop -n '_shtab_multidrop_using snapshot' -l no-config -d 'read no configuration file'
-complete -c multidrop -n '_shtab_multidrop_using snapshot; and test $_shtab_multidrop_npos -ge 0' -ka "(_multidrop_url)" -d 'what to open'
+complete -c multidrop -n '_shtab_multidrop_using snapshot' -l drive -xka "(_multidrop_drive)" -d 'the replacement (default: the only drive); all or several: each from its own name; may be repeated'
+complete -c multidrop -n '_shtab_multidrop_using snapshot' -l from -x -d 'the drive in the file (default: of the same name)'
+complete -c multidrop -n '_shtab_multidrop_using snapshot' -l with -x -d 'write these settings too, which can move the motor or lock the drive'
+complete -c multidrop -n '_shtab_multidrop_using snapshot' -l other-product -d 'the replacement may be another product'
+complete -c multidrop -n '_shtab_multidrop_using snapshot' -l dry-run -d 'show what would be done, and do nothing'
+complete -c multidrop -n '_shtab_multidrop_using snapshot' -l yes -d 'answer every question with yes beforehand'
+complete -c multidrop -n '_shtab_multidrop_using snapshot; and test $_shtab_multidrop_npos -ge 0' -ka "(_multidrop_snapshot)" -d 'what to open'
 complete -c multidrop -n '_shtab_multidrop_using; and test $_shtab_multidrop_npos -eq 0' -a twin -d 'Fit the drives of a cell to a session log.'
 complete -c multidrop -n '_shtab_multidrop_using twin' -s h -l help -d 'show this help message and exit'
 complete -c multidrop -n '_shtab_multidrop_using twin; and test $_shtab_multidrop_npos -eq 0' -a fit -d 'Find load, friction, inertia and current margin of drives in a session log; put them into a cell.'

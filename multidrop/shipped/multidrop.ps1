@@ -18,10 +18,17 @@ function _multidrop_folder {
 function _multidrop_url {
   param([string]$WordToComplete)
   @(
-  'sim:', 'sim:#press', 'sim:#eth', 'sim:#pmx', 'tcp://', 'udp://', 'modbus://', 'rfc2217://', 'ssh://'
+  'sim:', 'sim:#press', 'sim:#eth', 'sim:#pmx', 'tcp://', 'udp://', 'modbus://', 'rfc2217://', 'ssh://', 'usb:', 'usbip://'
   try { [System.IO.Ports.SerialPort]::GetPortNames() } catch { }
   Select-String -Path (Join-Path (_multidrop_folder) 'multidrop.toml') -ErrorAction SilentlyContinue `
     -Pattern '^ *\[connections\.([A-Za-z0-9_][A-Za-z0-9_-]*)\]' | ForEach-Object { $_.Matches[0].Groups[1].Value }
+  ) | Where-Object { $_ -like "$WordToComplete*" }
+}
+
+function _multidrop_broker {
+  param([string]$WordToComplete)
+  @(
+  'mqtt://', 'mqtts://'
   ) | Where-Object { $_ -like "$WordToComplete*" }
 }
 
@@ -40,6 +47,18 @@ function _multidrop_macro {
   @(
   Get-ChildItem -Path 'macros', (Join-Path (_multidrop_folder) 'macros') -Filter '*.toml' `
     -ErrorAction SilentlyContinue | ForEach-Object { $_.BaseName } | Where-Object { $_ -notmatch '^[-=+@]' }
+  ) | Where-Object { $_ -like "$WordToComplete*" }
+}
+
+function _multidrop_snapshot {
+  param([string]$WordToComplete)
+  @(
+  'apply'
+  Get-ChildItem -Path '*.toml' -ErrorAction SilentlyContinue | ForEach-Object { $_.Name }
+  'sim:', 'sim:#press', 'sim:#eth', 'sim:#pmx', 'tcp://', 'udp://', 'modbus://', 'rfc2217://', 'ssh://', 'usb:', 'usbip://'
+  try { [System.IO.Ports.SerialPort]::GetPortNames() } catch { }
+  Select-String -Path (Join-Path (_multidrop_folder) 'multidrop.toml') -ErrorAction SilentlyContinue `
+    -Pattern '^ *\[connections\.([A-Za-z0-9_][A-Za-z0-9_-]*)\]' | ForEach-Object { $_.Matches[0].Groups[1].Value }
   ) | Where-Object { $_ -like "$WordToComplete*" }
 }
 
@@ -113,7 +132,7 @@ $_shtab_multidrop_option_strings = @{
     '_shtab_multidrop_share' = @('-h', '--help', '--rfc2217', '--json', '--no-config')
     '_shtab_multidrop_shell' = @('-h', '--help', '--raw', '--twin', '--no-reconnect', '--yes', '--beyond', '--no-config')
     '_shtab_multidrop_sim' = @('-h', '--help', '--allow', '--json', '--speed', '--no-config')
-    '_shtab_multidrop_snapshot' = @('-h', '--help', '-o', '--output', '--no-config')
+    '_shtab_multidrop_snapshot' = @('-h', '--help', '-o', '--output', '--no-config', '--drive', '--from', '--with', '--other-product', '--dry-run', '--yes')
     '_shtab_multidrop_tui' = @('-h', '--help', '--raw', '--twin', '--no-reconnect', '--share', '--join', '--no-config')
     '_shtab_multidrop_twin' = @('-h', '--help')
     '_shtab_multidrop_twin_fit' = @('-h', '--help', '--cell', '--json', '--no-config')
@@ -159,7 +178,7 @@ $_shtab_multidrop_compgens = @{
     '_shtab_multidrop_params_restore___drive' = '_multidrop_drive'
     '_shtab_multidrop_params_restore_pos_0' = '_multidrop_url'
     '_shtab_multidrop_params_restore_pos_1' = '_shtab_powershell_compgen_files'
-    '_shtab_multidrop_plant_pos_0' = '_multidrop_url'
+    '_shtab_multidrop_plant_pos_0' = '_multidrop_broker'
     '_shtab_multidrop_plot___drive' = '_multidrop_drive'
     '_shtab_multidrop_plot___to' = '_shtab_powershell_compgen_files'
     '_shtab_multidrop_plot_pos_0' = '_multidrop_url'
@@ -201,9 +220,10 @@ $_shtab_multidrop_compgens = @{
     '_shtab_multidrop_shell_pos_0' = '_multidrop_url'
     '_shtab_multidrop_sim___allow' = '_shtab_powershell_compgen_files'
     '_shtab_multidrop_sim_pos_0' = '_shtab_powershell_compgen_files'
+    '_shtab_multidrop_snapshot___drive' = '_multidrop_drive'
     '_shtab_multidrop_snapshot___output' = '_shtab_powershell_compgen_files'
     '_shtab_multidrop_snapshot__o' = '_shtab_powershell_compgen_files'
-    '_shtab_multidrop_snapshot_pos_0' = '_multidrop_url'
+    '_shtab_multidrop_snapshot_pos_0' = '_multidrop_snapshot'
     '_shtab_multidrop_tui_pos_0' = '_multidrop_url'
     '_shtab_multidrop_twin_fit___cell' = '_shtab_powershell_compgen_files'
 }
@@ -481,8 +501,11 @@ $_shtab_multidrop_nargs = @{
     '_shtab_multidrop_sim___json' = '0'
     '_shtab_multidrop_sim___no_config' = '0'
     '_shtab_multidrop_sim__h' = '0'
+    '_shtab_multidrop_snapshot___dry_run' = '0'
     '_shtab_multidrop_snapshot___help' = '0'
     '_shtab_multidrop_snapshot___no_config' = '0'
+    '_shtab_multidrop_snapshot___other_product' = '0'
+    '_shtab_multidrop_snapshot___yes' = '0'
     '_shtab_multidrop_snapshot__h' = '0'
     '_shtab_multidrop_snapshot_pos_0' = '+'
     '_shtab_multidrop_tui___help' = '0'
@@ -933,9 +956,15 @@ $_shtab_multidrop_help = @{
     '_shtab_multidrop_sim__h' = 'show this help message and exit'
     '_shtab_multidrop_sim_pos_0' = 'a cell file (TOML)'
     '_shtab_multidrop_snapshot' = 'Read every drive into a new cell file, which the simulator opens as the same machine.'
+    '_shtab_multidrop_snapshot___drive' = 'the replacement (default: the only drive); all or several: each from its own name; may be repeated'
+    '_shtab_multidrop_snapshot___dry_run' = 'show what would be done, and do nothing'
+    '_shtab_multidrop_snapshot___from' = 'the drive in the file (default: of the same name)'
     '_shtab_multidrop_snapshot___help' = 'show this help message and exit'
     '_shtab_multidrop_snapshot___no_config' = 'read no configuration file'
+    '_shtab_multidrop_snapshot___other_product' = 'the replacement may be another product'
     '_shtab_multidrop_snapshot___output' = 'the new file; -: standard output'
+    '_shtab_multidrop_snapshot___with' = 'write these settings too, which can move the motor or lock the drive'
+    '_shtab_multidrop_snapshot___yes' = 'answer every question with yes beforehand'
     '_shtab_multidrop_snapshot__h' = 'show this help message and exit'
     '_shtab_multidrop_snapshot__o' = 'the new file; -: standard output'
     '_shtab_multidrop_snapshot_pos_0' = 'what to open'

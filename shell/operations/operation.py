@@ -65,6 +65,8 @@ class Operation(NamedTuple):
     arguments: Arguments = NOTHING
     urls: bool = False
     """The help on a group explains URLs, as that on a command with a URL does."""
+    own_urls: str = ""
+    """The explanation of its own URLs, where it takes other ones."""
 
     @property
     def name(self) -> str:

@@ -33,21 +33,38 @@ VERB_GROUPS = {
 """The verbs in the order and the groups of `/help`."""
 COMMAND_ORDER = """demo tui shell send run sim program params macro plot poll publish plant share snapshot twin certify
     ports relay scan rescue log config help lsp report completion"""
-SCRIPT_WORDS = {
-    "/set": "/set NAME EXPR",
-    "/if": "/if EXPR",
-    "/else": "/else",
-    "/end": "/end",
-    "/repeat": "/repeat N",
-    "/while": "/while EXPR",
-    "/until": "/until EXPR",
-    "/expect": '/expect "TEXT" [SECONDS]',
-    "/assert": "/assert [@ADDR] EXPR OP EXPR [+- N]",
-    "/verify": "/verify [@ADDR] EXPR OP EXPR [+- N]",
-    "/print": "/print TEXT",
-    "/call": "/call FILE|MACRO [NAME=VALUE ...]",
+SCRIPT_VERBS: Mapping[str, tuple[str, str]] = {
+    "/set": ("/set NAME EXPR", "gives a name a value, which is worked out once: a number, a text, a drive's word"),
+    "/if": ("/if EXPR", "executes the lines up to /else or /end if the expression holds"),
+    "/else": ("/else", "begins the lines that are executed if the expression of /if does not hold"),
+    "/end": ("/end", "ends a block of /if, /repeat, /while or /until"),
+    "/repeat": ("/repeat N", "executes the lines up to /end N times"),
+    "/while": (
+        "/while EXPR",
+        "executes the lines up to /end while the expression holds; it is asked before each round",
+    ),
+    "/until": (
+        "/until EXPR",
+        "executes the lines up to /end until the expression holds; it is asked before each round",
+    ),
+    "/expect": (
+        '/expect "TEXT" [SECONDS]',
+        "looks for a text in what the last command printed, and in what comes until then (1 s); fails without it",
+    ),
+    "/assert": (
+        "/assert [@ADDR] EXPR OP EXPR [+- N]",
+        "compares two values now, and ends the script where that does not hold; OP is ==, !=, <, <=, > or >=",
+    ),
+    "/verify": (
+        "/verify [@ADDR] EXPR OP EXPR [+- N]",
+        "compares as /assert does, but goes on where that does not hold; the end of the script is then exit code 1",
+    ),
+    "/print": ("/print TEXT", "prints a text to standard output; {NAME} is replaced by its value"),
+    "/call": ("/call FILE|MACRO [NAME=VALUE ...]", "executes another script, or plays a macro, with these values"),
 }
-"""The verbs that only scripts have, with their usage."""
+"""The verbs that only scripts have, each with its usage and its meaning."""
+SCRIPT_WORDS: Mapping[str, str] = {name: usage for name, (usage, _) in SCRIPT_VERBS.items()}
+"""Their usage."""
 _FILES = ("buses", "programs", "drives", "macros", "session")
 _HEAD = re.compile(r"""^\["?([^".\]]+)"?\]\n(?:usage = ["'](/\w+))?""", re.M)
 _ENTRY = re.compile(
@@ -149,7 +166,7 @@ def find(name: str) -> Operation:
 
     if name in SCRIPT_WORDS:
         raise Diagnostic(f"{name} is a verb of scripts", hint="multidrop run SCRIPT, or run - for standard input")
-    near = difflib.get_close_matches(name, VERBS, 2) or ["/help"]
+    near = difflib.get_close_matches(name, [*VERBS, *SCRIPT_WORDS], 2) or ["/help"]
     raise Diagnostic(f"no verb {name}", hint=f"try {' or '.join(near)}")
 
 

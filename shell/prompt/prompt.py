@@ -312,7 +312,7 @@ class Prompt:
         if self._question.takes(buffer.text):
             buffer.reset()  # an answer is not a line: the history does not keep it
             return True
-        if not buffer.text.strip() and self._pager.more():
+        if self._pager.takes(buffer.text):
             buffer.reset()
             return True
         self._pager.rest.clear()

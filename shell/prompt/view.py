@@ -253,10 +253,15 @@ class PlainOutput(DummyOutput):
             self._echoed = now
 
 
-class Pager:
-    """Long help, a screenful at a time: Enter on an empty line shows the next one. It takes no key and waits for none.
+_KEYS = re.compile(r"\S|([qjkbfdugn])\1*", re.IGNORECASE)
+"""What people type to a pager: one character, or one of its keys several times."""
+_NEXT, _LEAVE = frozenset("fjd"), frozenset("qQ")
 
-    `rest`: the lines that are not shown yet.
+
+class Pager:
+    """Long help, a screenful at a time: Enter on an empty line shows the next one, `q` leaves it.
+
+    It waits for no key: a command that is typed is a command, and leaves it too. `rest`: the lines not shown yet.
     """
 
     def __init__(self, session: Session, app: Application[Any]) -> None:
@@ -266,6 +271,20 @@ class Pager:
     def show(self, lines: Sequence[str]) -> None:
         self.rest = list(lines)
         self.more()
+
+    def takes(self, text: str) -> bool:
+        """Take a line that is for a pager, while there is more to show: it must not reach a drive."""
+        typed = text.strip()
+        if not self.rest or (typed and _KEYS.fullmatch(typed) is None):
+            return False
+        if not typed or set(typed) <= _NEXT:
+            return self.more()
+        left = set(typed) <= _LEAVE
+        if left:
+            self.rest.clear()
+        keys = "the help is closed" if left else "Enter shows more help, q closes it"
+        self._session.notify(f"'{typed}' was not sent: {keys}")
+        return True
 
     def more(self) -> bool:
         """Show the next lines; False where there are none. In raw mode, where Enter sends a byte, show all of them."""
@@ -280,7 +299,7 @@ class Pager:
             self._session.output(line, columns=True)
         del self.rest[:shown]
         if self.rest:
-            self._session.notify(f"Enter shows the next of {counted(len(self.rest), 'more line')}")
+            self._session.notify(f"Enter shows the next of {counted(len(self.rest), 'more line')}, q closes the help")
         return shown > 0
 
 

@@ -15,12 +15,14 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import os
+import stat
 import sys
+import time
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, fields
 from pathlib import Path
 from typing import Any, TypeVar
-from urllib.parse import quote
+from urllib.parse import quote, unquote
 
 from multidrop.dialects import DriveState, Owed
 from multidrop.dialects.state import Remembered
@@ -41,6 +43,9 @@ LINE = 128
 MOST = 64
 """The largest number of drives recorded for a port; the oldest are dropped."""
 LONGEST_NAME = 100
+PSEUDO_TERMINALS = "/dev/pts/"
+KEPT_FOR = 60 * 86400.0
+"""The time for which the files of an adapter that is not there are kept, s."""
 LOST = "if this session is interrupted, the next one cannot repair this port"
 Row = TypeVar("Row", Owed, Remembered)
 
@@ -161,10 +166,12 @@ class PortState(Keeper):
         self._mark(b"")
 
     def close(self) -> None:
-        """Release the port; an unfinished line stays on record."""
+        """Release the port; an unfinished line stays on record. Delete the records of ports that are gone."""
         if self._line >= 0:
             os.close(self._line)
             self._line = -1
+            with contextlib.suppress(OSError):
+                _prune(self._store.folder, time.time())
 
     def _mark(self, line: bytes) -> None:
         if self._line < 0:
@@ -237,6 +244,36 @@ class PortState(Keeper):
         else:
             (self._store.folder / name).unlink(missing_ok=True)
         sync_folder(self._store.folder)
+
+
+def _prune(folder: Path, now: float) -> None:
+    """Delete the files of serial ports that do not exist any more, unless a drive is owed something. Raises OSError.
+
+    A pseudo-terminal is gone for good; an adapter may be plugged in again, so its files stay for some weeks.
+    """
+    for line in folder.glob("*.line"):
+        port = unquote(line.name.removesuffix(".line"))
+        if not port.startswith("/dev/") or os.path.exists(port) or line.with_suffix(".json").exists():
+            continue
+        found = line.lstat()
+        gone = port.startswith(PSEUDO_TERMINALS) or now - found.st_mtime > KEPT_FOR
+        if gone and stat.S_ISREG(found.st_mode):
+            _delete(line)
+
+
+def _delete(line: Path) -> None:
+    """Delete the record of a port, and the memory of its drives, unless a session uses it or was interrupted."""
+    if sys.platform != "win32":
+        held = open_private(line, os.O_RDWR)
+        try:
+            fcntl.flock(held, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            if not os.read(held, LINE).strip(b"\0"):
+                line.unlink()
+                line.with_suffix(".drives").unlink(missing_ok=True)
+        except BlockingIOError:
+            return
+        finally:
+            os.close(held)
 
 
 def memory_of(folder: Path, port: str) -> tuple[PortMemory, float]:

@@ -19,7 +19,7 @@ from multidrop.shell.motions import OUTCOME
 from multidrop.shell.new_file import STANDARD_OUTPUT
 from multidrop.shell.operations.conditions import ON_SCREEN
 from multidrop.shell.operations.operation import Operation
-from multidrop.shell.operations.table import VERB_GROUPS, VERBS
+from multidrop.shell.operations.table import SCRIPT_VERBS, VERB_GROUPS, VERBS
 from multidrop.shell.operations.usage import split
 from multidrop.shell.quitting import GOES_ON
 from multidrop.shell.roles import EVERYTHING, TIMES, Filter, Transcripts
@@ -274,6 +274,10 @@ def overview() -> list[str]:
                 lines.append(each.usage)
             mark = "[screen] " * (each.fits in ON_SCREEN)
             lines.append(f"{each.usage if len(each.usage) <= WIDTH else '':<{WIDTH}}  {mark}{each.lines[0]}")
+    lines += ["", "In scripts only:"]
+    for usage, meaning in SCRIPT_VERBS.values():
+        lines += [usage] if len(usage) > WIDTH else []
+        lines.append(f"{usage if len(usage) <= WIDTH else '':<{WIDTH}}  {meaning}")
     return [*lines, "", "[screen]: only on the screen, which multidrop tui shows"]
 
 
@@ -291,12 +295,21 @@ def described(name: str, language: Language | None = None, product: str = "") ->
             return each.describe(name, product)
     if f"/{name}" in VERBS:
         return described(f"/{name}")
+    word = name.lower() if name.startswith("/") else f"/{name.lower()}"
+    if word in SCRIPT_VERBS:
+        usage, meaning = SCRIPT_VERBS[word]
+        return [
+            usage,
+            f"{meaning[0].upper()}{meaning[1:]}.",
+            "In scripts only: multidrop run SCRIPT, or /play of a macro.",
+        ]
     if language and (others := [key for key, family in FAMILIES.items() if family.language.knows(name)]):
         raise Diagnostic(
             f"this drive has no command {name}", "/help", f"multidrop help {name} --dialect {others[0]} explains it"
         )
     own = language or FAMILIES[DEFAULT].language
-    near = difflib.get_close_matches(name.upper(), [*own.names(), *(key.upper() for key in VERBS)], 3)
-    shown = [each.lower() if name.startswith("/") else each for each in near]
-    hint = f"similar: {', '.join(shown)}" if shown else "/help lists the verbs"
+    known = {key.removeprefix("/").upper(): key for key in (*SCRIPT_VERBS, *VERBS)}
+    known |= {} if name.startswith("/") else {each.upper(): each for each in own.names()}
+    near = difflib.get_close_matches(name.removeprefix("/").upper(), known, 3)
+    hint = f"similar: {', '.join(known[each] for each in near)}" if near else "/help lists the verbs"
     raise Diagnostic(f"no verb or command {name}", "/help", hint)

@@ -3,8 +3,10 @@
 import importlib.util
 import os
 import re
+import shlex
 import subprocess
 import sys
+from itertools import takewhile
 
 import pytest
 
@@ -71,6 +73,13 @@ CASES = {
     "multidrop params backup gantry --drive a": ["all", "a"],
     "multidrop params backup gantry --drive ": ["all", "a", "b"],
     "multidrop macro play ": ["shuttle"],
+    "multidrop send us": ["usb:", "usbip://"],
+    "multidrop snapshot app": ["apply"],
+    "multidrop snapshot apply ce": ["cell.toml"],
+    "multidrop snapshot apply cell.toml gan": ["gantry"],
+    "multidrop snapshot apply cell.toml gantry --dri": ["--drive"],
+    "multidrop snapshot apply cell.toml gantry --drive b": ["b"],
+    "multidrop plant mq": ["mqtt://", "mqtts://"],
 }
 
 
@@ -119,3 +128,34 @@ def test_powershell_has_every_command_and_what_is_listed():
 def test_the_command_prints_the_file_of_a_shell(home):
     done = completed(home, sys.executable, "-m", "multidrop", "completion", "zsh")
     assert " ".join(done) == " ".join((SHIPPED / "_multidrop").read_text().split())
+
+
+EXAMPLES = [(name, each) for name, operation in COMMANDS.items() for each in operation.examples]
+
+
+@pytest.mark.parametrize(("name", "example"), EXAMPLES)
+def test_no_shell_reads_an_example_in_another_way(name, example):
+    bare = re.sub(r"\"[^\"]*\"|'[^']*'", "", example)
+    assert set(re.sub(r"(?<=[ ])(~(?=/)|[<>|](?= ))", "", bare)) & set("?*[]#~^{}<>|;&$!()\\") == set(), name
+
+
+@pytest.mark.process
+@pytest.mark.needs("zsh")
+def test_zsh_passes_the_words_of_every_example_as_they_are(tmp_path):
+    """Where no file matches, zsh refuses a word with a question mark; with extendedglob also one with #, ^ or ~."""
+    words = [re.findall(r"""(?:"[^"]*"|'[^']*'|\S)+""", example) for _, example in EXAMPLES]
+    lines = [" ".join(takewhile(lambda word: word not in "<>|", each)) for each in words]
+    script = "setopt extendedglob\n" + "".join(f"print -rl -- {each}; print -- --end--\n" for each in lines)
+    done = subprocess.run(
+        ["zsh", "-f", "-i", "-c", script], cwd=tmp_path, capture_output=True, text=True, timeout=PATIENCE
+    )
+    assert done.stderr == "" and done.returncode == 0
+    words = [part.split("\n") for part in done.stdout.strip("\n").split("\n--end--")[:-1]]
+    assert [[each for each in part if each] for part in words] == [shlex.split(each) for each in lines]
+
+
+def test_help_names_the_parts_and_the_urls_of_a_command(multidrop):
+    text = multidrop("snapshot", "--help").stdout
+    assert "also:\n  snapshot apply  put the state" in text
+    text = " ".join(multidrop("plant", "--help").stdout.split())
+    assert "A BROKER-URL is mqtt://BROKER/PREFIX" in text and "serial:PORT" not in text and "sim:" not in text

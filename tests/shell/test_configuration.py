@@ -211,3 +211,10 @@ def test_a_folder_that_cannot_be_written_is_named(file):
     file.mkdir()
     with pytest.raises(Diagnostic, match="multidrop.toml"):
         configuration.save("clamp", "sim:")
+
+
+def test_a_name_in_quotation_marks_has_its_line_too(folder):
+    (folder / "multidrop.toml").write_text('[log]\nfiles = 3\n[connections."a b"]\nurl = "sim:"\n')
+    with pytest.raises(Diagnostic) as caught:
+        configuration.load()
+    assert caught.value.where.endswith("multidrop.toml:3") and "connections.a b: not a name" in str(caught.value)

@@ -6,11 +6,13 @@ import asyncio
 import errno
 import os
 import re
+import stat
 import subprocess
 import sys
 import threading
 from collections.abc import Iterator
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 import serial
@@ -145,6 +147,43 @@ async def test_a_port_that_goes_while_it_is_opened_is_unreachable_and_closed(
 def test_a_missing_permission_names_the_group() -> None:
     error = serial.SerialException(errno.EACCES, "could not open port")
     assert "usermod -aG dialout" in str(open_error("/dev/ttyNOWHERE", error))
+
+
+@pytest.mark.fork
+@pytest.mark.parametrize(
+    ("mode", "owner", "group", "groups", "members", "remedy"),
+    [
+        (0o660, 0, 20, (), (), "`sudo usermod -aG dialout $USER`, then log in again"),
+        (0o660, 0, 77, (), (), "`sudo usermod -aG plugdev $USER`, then log in again"),
+        (0o660, 0, 20, (), ("fitter",), "you are in its group dialout, but this login began before that"),
+        (0o660, 0, 20, (20,), (), "you are in its group dialout, which may use it: something else refuses it"),
+        (0o600, 0, 20, (20,), (), "group dialout, its mode is 0600, so no other group helps: a udev rule"),
+        (0o640, 0, 20, (), (), "group dialout, its mode is 0640, so no other group helps: a udev rule"),
+        (0o660, 0, 0, (), (), "it is of the group root only, so no other group helps: a udev rule"),
+        (0o060, 500, 20, (20,), (), "you own it, and its mode is 0060: `chmod u+rw /dev/ttyS9`"),
+        (0o600, 500, 20, (), (), "you own it, and its mode is 0600: something else refuses it"),
+    ],
+)
+def test_the_remedy_for_a_missing_permission_follows_from_owner_group_and_mode(
+    monkeypatch: pytest.MonkeyPatch,
+    mode: int,
+    owner: int,
+    group: int,
+    groups: tuple[int, ...],
+    members: tuple[str, ...],
+    remedy: str,
+) -> None:
+    names = {0: "root", 20: "dialout", 77: "plugdev"}
+    found = os.stat_result((stat.S_IFCHR | mode, 0, 0, 1, owner, group, 0, 0, 0, 0))
+    account = SimpleNamespace(pw_name="fitter", pw_gid=500)
+    monkeypatch.setattr(os, "stat", lambda path, **_: found)
+    monkeypatch.setattr(os, "geteuid", lambda: 500)
+    monkeypatch.setattr(os, "getegid", lambda: 500)
+    monkeypatch.setattr(os, "getgroups", lambda: [500, *groups])
+    monkeypatch.setattr("grp.getgrgid", lambda number: SimpleNamespace(gr_name=names[number], gr_mem=[*members]))
+    monkeypatch.setattr("pwd.getpwuid", lambda number: account)
+    told = str(open_error("/dev/ttyS9", serial.SerialException(errno.EACCES, "could not open port")))
+    assert told.startswith("no permission to open /dev/ttyS9; ") and remedy in told and "\n" not in told
 
 
 @pytest.mark.fork

@@ -347,3 +347,31 @@ async def test_a_program_is_mended_downloaded_traced_and_stopped(folder: Path) -
         await until(pilot, lambda: "▶" not in page.editor.render_line(3).text)
         assert app.screen is page and page.editor.text == LONG
         assert next(iter((folder / "data" / "backups").iterdir())).suffix == ".mxt"
+
+
+WRONG = """own_units = 3
+foo = 1
+[connections."a b"]
+url = "sim:"
+[connections.-x]
+url = "sim:"
+[screen]
+theme = "no-such"
+[keys]
+nothing = "^D"
+[log]
+files = -1
+"""
+
+
+async def test_the_configuration_page_shows_all_errors_with_their_lines(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("MULTIDROP_CONFIG_DIR", str(folder))
+    (folder / "multidrop.toml").write_text(WRONG)
+    async with page(folder, file=str(folder / "multidrop.toml"), size=(100, 40)) as pilot:
+        await until(pilot, lambda: "files" in shown(pilot).lines("below").plain)
+        told = shown(pilot).lines("below").plain.splitlines()
+        places = [line.split()[1] for line in told if line.strip().startswith("✗")]
+        assert places == ["1:1", "2:1", "3:1", "5:1", "8:1", "10:1", "12:1"], told
+        assert not any("more; ^L" in line for line in told)

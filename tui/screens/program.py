@@ -18,11 +18,11 @@ from textual.app import ComposeResult
 from textual.containers import Horizontal, Vertical
 
 from multidrop.dialects import Diagnostic
-from multidrop.dialects.program_files import Entry, Problem
+from multidrop.dialects.program_files import Entry, Problem, in_order
 from multidrop.shell.programs.checking import ending_of
 from multidrop.shell.programs.edited_file import real_text
 from multidrop.shell.programs.program_text import ProgramGrammar
-from multidrop.tui.editor import Editor, Grammar, grammar_of
+from multidrop.tui.editor import ConfigurationGrammar, Editor, Grammar, grammar_of, problem_of
 from multidrop.tui.panels.program import SIGNS, index_of, spot_of, state_words
 from multidrop.tui.panels.table import column_rows, panel, side_width
 from multidrop.tui.panels.view import View
@@ -32,6 +32,7 @@ from multidrop.tui.screens.page import Host, Page, start
 from multidrop.tui.screens.program_file import FileOnScreen, Seen
 from multidrop.tui.screens.program_rows import (
     LOOK_FIRST,
+    MOST_PROBLEMS,
     UPLOAD,
     Finder,
     Findings,
@@ -134,7 +135,8 @@ class ProgramPage(Page):
         lines, unit = self._compared
         if (self.program.lines is not lines or unit_of(self.host.session) != unit) and self._edited_at is None:
             self._edited_at = 0.0
-        rows = problem_rows(self.findings.problems, self.editor.cursor_location[0] + 1, width)
+        most = self.size.height // 2 if isinstance(self.grammar, ConfigurationGrammar) else MOST_PROBLEMS
+        rows = problem_rows(self.findings.problems, self.editor.cursor_location[0] + 1, width, max(most, MOST_PROBLEMS))
         rows = [rule(self.findings.words[0].strip(), width), *rows] if rows else []
         rows.append(rule("transcript", width, self.state_words()))
         news = self.host.last_records(max(NEWS[0], self.size.height // NEWS[1]))
@@ -206,6 +208,9 @@ class ProgramPage(Page):
         unit, shown = unit_of(self.host.session), text.text
         self._compared = lines, unit
         found = await asyncio.to_thread(examined, grammar, shown, unit, lines)
+        if isinstance(grammar, ConfigurationGrammar):
+            more = map(problem_of, self.host.look_troubles(real_text(shown), text.name))
+            found = replace(found, problems=tuple(in_order([*found.problems, *more])))
         self.take_text()
         if self.text is text and text.text == shown:
             self.findings, self._checked = found, shown

@@ -84,21 +84,19 @@ def heading_row(
     return spread(left, [(where, "dim")], width)
 
 
-def problem_rows(problems: Sequence[Problem], at: int, width: int) -> list[Row]:
-    """The problems from the line of the cursor on (from 1), then from the top; errors before warnings."""
+def problem_rows(problems: Sequence[Problem], at: int, width: int, most: int = MOST_PROBLEMS) -> list[Row]:
+    """The problems from the line of the cursor on (from 1), then from the top; errors before warnings; `most` rows."""
     ahead = sorted(problems, key=lambda each: (each.warning, each.line < at))
     rows: list[Row] = []
-    for each in ahead[:MOST_PROBLEMS]:
+    for each in ahead[:most]:
         hint = f"; {each.hint}" if each.hint else ""
         sign, role = ("!", "strong") if each.warning else ("✗", "error")
         place = f"{each.line}:{each.column}"
         rows.append(
             ((f" {sign} ", role), (f"{place:<7} ", "dim"), (fit(visible(each.what + hint), width - 12), "text"))
         )
-    if len(problems) > MOST_PROBLEMS:
-        rows[-1] = (
-            (fit(f"   … and {len(problems) - MOST_PROBLEMS + 1} more; ^L goes from one to the next", width), "dim"),
-        )
+    if len(problems) > most:
+        rows[-1] = ((fit(f"   … and {len(problems) - most + 1} more; ^L goes from one to the next", width), "dim"),)
     return rows
 
 

@@ -9,7 +9,7 @@ from prompt_toolkit.output import ColorDepth
 
 from multidrop.dialects import Diagnostic, Stopped
 from multidrop.macros import Macro, Step
-from multidrop.shell.events import Progressed
+from multidrop.shell.events import Failed, Progressed
 from multidrop.shell.macro_arguments import value_fields
 from multidrop.shell.prompt.terminal_input import PAUSE, at_terminal
 from multidrop.shell.prompt.view import PlainOutput
@@ -171,6 +171,37 @@ async def test_long_help_is_shown_a_screenful_at_a_time_and_any_line_ends_it(typ
     typist.send("\r/sleep 0\r")
     await until(lambda: "/sleep 0" in typist.entered)
     assert len(typist.output) == shown
+
+
+@pytest.mark.parametrize(
+    ("typed", "closes"),
+    [("q", True), ("Q", True), ("qq", True), (" q ", True), ("k", False), ("E", False), ("?", False)],
+)
+async def test_what_is_typed_to_the_pager_is_never_sent(typist, typed, closes):
+    typist.send("/help\r")
+    await until(lambda: any("q closes the help" in each for each in typist.notices))
+    shown, entered = len(typist.output), list(typist.entered)
+    typist.send(f"{typed}\r")
+    await until(lambda: any("was not sent" in each for each in typist.notices))
+    typist.send("\r")
+    await until(lambda: closes or len(typist.output) > shown)
+    typist.send("/sleep 0\r")
+    await until(lambda: "/sleep 0" in typist.entered)
+    assert [each for each in typist.entered if each not in ("/sleep 0", *entered)] == []
+    assert (len(typist.output) == shown) == closes
+
+
+async def test_keys_that_go_on_show_more_and_a_command_is_a_command(typist):
+    typist.send("/help\r")
+    await until(lambda: any("q closes the help" in each for each in typist.notices))
+    shown = len(typist.output)
+    typist.send("f\r")
+    await until(lambda: len(typist.output) > shown)
+    failed = []
+    typist.session.subscribe(failed.append, Failed)
+    typist.send("/sleep 0\rE\r")  # the first one closes the help: E is a command, and no drive is open
+    await until(lambda: failed)
+    assert not any("was not sent: " in each for each in typist.notices)
 
 
 async def test_in_raw_mode_help_is_shown_whole_as_enter_sends_a_byte(typist):

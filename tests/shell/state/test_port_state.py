@@ -364,3 +364,44 @@ def test_a_safe_name_stands_for_one_text_and_is_no_path(text):
     assert unquote(name, errors="surrogatepass") == text
     assert not set(name) & set('<>:"/\\|?* ') and name.isascii() and not name.endswith(".")
     assert not atomic.reserved(name) and not atomic.reserved(f"{name}.json")
+
+
+GONE, ADAPTER = "/dev/pts/4294967", "/dev/serial/by-id/usb-GONE-if00"
+
+
+def files_of(tmp_path, name):
+    return {path.suffix for path in (tmp_path / "ports").iterdir() if unquote(path.stem) == name}
+
+
+@pytest.mark.fork
+def test_the_files_of_ports_that_are_gone_are_deleted_once_nothing_depends_on_them(tmp_path):
+    long_ago = 61 * 86400
+    drives = {"": Remembered("", "", "LMDCM", "LMDCM 6.002", "x", "1", False, 0, 1)}
+    for name in (GONE, ADAPTER, "10.0.0.5:503", "/dev/null"):
+        state = PortState(tmp_path, name)
+        state.remember(drives)
+        state.close()
+    assert files_of(tmp_path, GONE) == set()  # its own end has found it gone
+    assert files_of(tmp_path, ADAPTER) == files_of(tmp_path, "/dev/null") == {".line", ".drives"}
+    for path in (tmp_path / "ports").iterdir():
+        os.utime(path, (path.stat().st_atime - long_ago, path.stat().st_mtime - long_ago))
+    PortState(tmp_path, "/dev/zero").close()
+    assert files_of(tmp_path, ADAPTER) == set()
+    for kept in ("10.0.0.5:503", "/dev/null", "/dev/zero"):
+        assert ".line" in files_of(tmp_path, kept)
+
+
+@pytest.mark.fork
+def test_what_a_session_uses_or_has_left_of_a_port_that_is_gone_stays(tmp_path):
+    cut, held, owed = (f"{GONE}{number}" for number in range(3))
+    state = PortState(tmp_path, cut)
+    state.begun("MR 5")
+    state.close()
+    using = PortState(tmp_path, held)
+    owing = PortState(tmp_path, owed)
+    asyncio.run(owing.owes(known(restore=OWED)))
+    owing.close()
+    assert files_of(tmp_path, cut) == files_of(tmp_path, held) == {".line"}
+    assert files_of(tmp_path, owed) == {".line", ".json"}
+    assert PortState(tmp_path, cut).cut == "MR 5"
+    using.close()
