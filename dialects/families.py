@@ -41,6 +41,7 @@ TABLE: Mapping[str, Row] = {
             "multidrop.dialects.mcode.manual.editing",
             ("mcode", "mxt"),
             {"lexium": "multidrop.dialects.mcode.manual.conversion"},
+            "multidrop.dialects.mcode.manual.supported:unsupported",
         ),
     ),
     "modbus": Row("multidrop.dialects.modbus.family:MODBUS", scheme="modbus"),

@@ -73,6 +73,8 @@ class Effect:
     """Axes whose motion it stops on purpose."""
     unknown: frozenset[str] = frozenset()
     """Axes whose positions or targets have another meaning after it, so that a target is not known any more."""
+    clears: bool = False
+    """It clears a sign of a failure, so that the motions before it are judged first."""
 
 
 NOTHING = Effect()
@@ -84,6 +86,7 @@ def joined(effects: Sequence[Effect]) -> Effect:
         tuple(move for each in effects for move in each.begins),
         frozenset(axis for each in effects for axis in each.ends),
         frozenset(axis for each in effects for axis in each.unknown),
+        any(each.clears for each in effects),
     )
 
 
@@ -100,7 +103,7 @@ class Evidence:
     stopped: bool = False
     """This session has stopped it since, so that an error of a line cut off by the stop says nothing of the motion."""
     program: bool = False
-    """A program may have moved the axis since: one was started, or seen to run."""
+    """A program may have moved the axis since: one was started, or seen to run, right before it, too."""
 
 
 @dataclass(frozen=True)
@@ -168,6 +171,8 @@ class Motions(Generic[S]):
     """
     place: Callable[[Signs, str], int | None] = lambda signs, axis: None
     """The position of an axis at rest in `signs`; None: it moves, or its position was not read."""
+    runs: Callable[[Signs], bool] = lambda signs: False
+    """Whether `signs` show a program that runs, or that the drive may start itself: it may move any axis."""
     judge: Callable[[S, str, Evidence], Procedure[Ending | None]] = _reached
     """Judge the motion of an axis that two readings show at rest; None: it is not over yet (it settles).
 

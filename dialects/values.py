@@ -191,7 +191,7 @@ def differing(
 
 
 UNREAD = -1
-"""An error is set, and to read its number would clear it."""
+"""An error is set, and it has no number, or to read the number would clear it."""
 Facts = Mapping[str, Value]
 """What parts have read, by name."""
 
@@ -228,6 +228,8 @@ class Conditions:
     error_text: str = ""
     clears: str = ""
     """The line that clears the error, where the axis takes no move before it; empty: it takes moves."""
+    cause: str = ""
+    """What caused an error without a number, in few words, as far as readings that change nothing show it."""
     program: str = ""
     """The label of the program that runs, or `running`; empty: none runs."""
     runs: bool | None = None

@@ -33,6 +33,8 @@ class Course:
     stopped: bool = False
     """Its own sequence has stopped it."""
     stopped_by_other: bool = False
+    restarted: bool = False
+    """The drive was restarted since, which ends every motion."""
     replaced: Move | None = None
     """The motion of another sequence that has replaced it."""
     ending: Ending | None = None
@@ -44,6 +46,11 @@ class Course:
 
     def evidence(self, errors: tuple[int, ...]) -> Evidence:
         return Evidence(self.move, self.before, errors, self.stopped or self.stopped_by_other, self.program)
+
+    @property
+    def cut_off(self) -> Ending | None:
+        """How it ended where a restart ended it; nothing that is read of the drive then says anything of it."""
+        return restart(self.move.axis) if self.restarted else None
 
     def judged(self, found: Ending) -> Ending:
         """Decide whether what the drive shows is a failure of this motion, and keep it."""
@@ -64,6 +71,11 @@ class Course:
         return replace(found, reason=found.reason or NOT_OURS, failed=True) if short else found
 
 
+def restart(axis: str) -> Ending:
+    """The end of a motion by a restart of its drive."""
+    return Ending(Outcome.POWER, axis, reason="it was restarted", failed=True)
+
+
 Courses = dict[str, list[Course]]
 """The courses of a drive by axis, the newest last."""
 
@@ -73,6 +85,8 @@ class MotionRecord:
 
     def __init__(self) -> None:
         self._courses: Courses = {}
+        self.restarts = 0
+        """The number of restarts that were seen."""
 
     def begin(self, courses: Iterable[Course]) -> None:
         """Record motions whose line is on its way. A motion of the same sequence on the same axis is replaced well."""
@@ -110,6 +124,12 @@ class MotionRecord:
             if course.open:
                 course.stopped = course.stopped or by is None or course.by is by
                 course.stopped_by_other = course.stopped_by_other or not (by is None or course.by is by)
+
+    def restarted(self) -> None:
+        """Record a sign of a restart."""
+        self.restarts += 1
+        for course in self._all():
+            course.restarted = course.restarted or course.open
 
     def close(self, by: Sequence) -> None:
         """Take the motions of a sequence that ends early for stopped by it: they are judged no more."""

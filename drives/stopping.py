@@ -17,7 +17,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from functools import partial
 
-from multidrop.dialects import DriveState, StopPiece
+from multidrop.dialects import DriveState, Started, StopPiece
 from multidrop.drives.drive import Drive
 from multidrop.drives.events import Traffic, isolated
 from multidrop.drives.halts import Fate as Fate
@@ -70,15 +70,21 @@ class Stopping:
         else:
             self._ahead.press()
 
-    def halt(self, only: Iterable[Drive] | None = None, follows: bool = True) -> Halt:
+    def halt(
+        self,
+        only: Iterable[Drive] | None = None,
+        follows: bool = True,
+        *,
+        started: Mapping[Drive, Started] | None = None,
+    ) -> Halt:
         """Write a stop of all drives or some, and nothing else: no watcher hears of it before `halted`.
 
-        `only` as a mapping: what was started in each of them; only that is stopped, where the line allows it.
+        `started`: what was started in each of `only`; only that is stopped, where the line allows it.
         `follows`: it may be the one that follows a call of `ahead`. Failures go to `Halt.trouble`.
         """
         drives = tuple(self._roster.all_drives if only is None else only)
         halt = Halt(self._link, self._link.stamp(), self._link.stops, only is None, drives)
-        halt.started = only if isinstance(only, Mapping) else {}
+        halt.started = started or {}
         if halt.whole:
             self.last = halt
             self._missed = self._missed and not follows

@@ -279,7 +279,8 @@ class Automations:
         bus = self._open_bus(link)
         if bus is None:
             return Halt(link, self._workspace.now(), 0, False, tuple(only), started=started, trouble=["closed"])
-        return bus.halt(None if any(drive.address in GLOBAL for drive in only) else started)
+        whole = any(drive.address in GLOBAL for drive in only)
+        return bus.halt() if whole else bus.halt(started, started=started)
 
     def _open_bus(self, link: Link) -> Bus | None:
         """The bus of a link; None once it is closed."""

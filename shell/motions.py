@@ -18,7 +18,7 @@ from multidrop.dialects.errors import MotionFailed
 from multidrop.dialects.motions import NO_MOTIONS, NO_SIGNS, Ending, Evidence, Motions, Outcome, Signs, joined
 from multidrop.dialects.state import DriveState
 from multidrop.drives.drive import NOT_SENT, Check, Drive, still
-from multidrop.drives.motion_record import Course, Courses
+from multidrop.drives.motion_record import Course, Courses, restart
 from multidrop.drives.port_journal import GLOBAL
 from multidrop.shell.automation import is_automation, sequence
 from multidrop.shell.workspace import Workspace
@@ -98,7 +98,7 @@ class _Line:
         check = self._check
         if self.effect.begins or not self.effect.ends:
             for each in self.reached:
-                if each.state.error and self._suspect(each):
+                if self._may_have_failed(each):
                     await each.run(self._judged_before(each))
         if self.effect.begins and self._to_all:
             await self._prepare_each()
@@ -126,6 +126,11 @@ class _Line:
     def _suspect(self, drive: Drive) -> list[Course]:
         """The motions of this sequence of which an error may be: not those that it has stopped itself."""
         return [each for each in drive.motions.open_of(self.by) if not each.stopped]
+
+    def _may_have_failed(self, drive: Drive) -> bool:
+        """Whether something is known already that shows, or may show, that a motion of this sequence has failed."""
+        shown = bool(drive.state.error) or self.effect.clears
+        return any(each.restarted or shown for each in self._suspect(drive))
 
     def _took_effect(self) -> None:
         for each in self.reached:
@@ -155,7 +160,7 @@ class _Line:
             raise NoAnswer(f"{drive.shown} does not reply: {unsent}") from None
         except Stopped:
             raise Stopped(f"{drive.shown}: stopped; {unsent}") from None
-        if state.error and self._suspect(drive):
+        if self._may_have_failed(drive):
             yield from self._judged_before(drive)
         return (yield from motions.old(state, signs, True))
 
@@ -166,7 +171,7 @@ class _Line:
             place = None if move.relative is None else motions.place(signs, move.axis)
             if place is not None and move.relative is not None:
                 move = replace(move, target=place + move.relative)
-            courses.append(Course(move, self.by, signs, state.errors.count))
+            courses.append(Course(move, self.by, signs, state.errors.count, motions.runs(signs)))
         drive.motions.begin(courses)
         if courses:
             state.errors.motion(True)
@@ -199,7 +204,8 @@ class _Line:
 
 def _sign_of(drive: Drive, course: Course) -> Procedure[Ending | None]:
     """Judge a motion that may be under way still: by a sign of failure only, not by where it is."""
-    found = yield from _motions(drive).judge(drive.state, course.move.axis, _evidence(drive, course))
+    if (found := course.cut_off) is None:
+        found = yield from _motions(drive).judge(drive.state, course.move.axis, _evidence(drive, course))
     if found is None or found.outcome in (Outcome.REACHED, Outcome.STOPPED):
         return None
     return _judged(drive, course, found)
@@ -228,6 +234,7 @@ class Watch:
         self._by, self._accepts = sequence(workspace), ended
         self._signs: dict[Drive, Signs] = {}
         self._errors: dict[Drive, int] = {}
+        self._restarts = {each: each.motions.restarts for each in drives}
         self._silent: set[Drive] = set()
         self.endings: dict[Drive, list[Ending]] = {}
         """How the motions of each drive ended that was judged."""
@@ -260,8 +267,10 @@ class Watch:
         endings = []
         for course in self.own(drive):
             motions, axis = _motions(drive), course.move.axis
+            found = course.cut_off
             try:
-                found = await drive.run(motions.judge(drive.state, axis, _evidence(drive, course)))
+                if found is None:
+                    found = await drive.run(motions.judge(drive.state, axis, _evidence(drive, course)))
             except (Refused, NoAnswer) as error:
                 found = Ending(Outcome.UNKNOWN, axis, reason=f"its end could not be read ({error})")
             if found is None:
@@ -269,12 +278,14 @@ class Watch:
             endings.append(_judged(drive, course, found))
         return endings
 
-    async def _judge_other(self, drive: Drive) -> list[Ending]:
+    async def _judge_other(self, drive: Drive) -> list[Ending] | None:
         if drive in self.endings or drive.programming:
             return []
         if self._accepts and (mine := drive.motions.of(self._by)):
             return [each.ending for each in mine if each.ending is not None]
         motions, state = _motions(drive), drive.state
+        if drive.motions.restarts != self._restarts[drive]:
+            return [restart("")]
         signs = self._signs.get(drive, NO_SIGNS)
         evidence = Evidence(None, signs, state.errors.since(self._errors.get(drive, state.errors.count)))
         endings: list[Ending] = []
@@ -282,9 +293,10 @@ class Watch:
             return endings
         for axis in drive.family.units.axes(state):
             found = await drive.run(motions.judge(state, axis, evidence))
-            if found is not None:
-                bad = found.outcome not in (Outcome.REACHED, Outcome.STOPPED, Outcome.REPLACED, Outcome.UNKNOWN)
-                endings.append(replace(found, failed=bad))
+            if found is None:
+                return None
+            bad = found.outcome not in (Outcome.REACHED, Outcome.STOPPED, Outcome.REPLACED, Outcome.UNKNOWN)
+            endings.append(replace(found, failed=bad))
         return endings
 
     @property

@@ -9,8 +9,9 @@ import asyncio
 import contextlib
 import operator
 import re
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Awaitable, Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from multidrop.dialects import Diagnostic, DriveError, Motion, NoAnswer
@@ -30,6 +31,8 @@ LIMIT = 60.0
 """The default time limit, s."""
 APART = REST
 """The time between the two readings of a drive at rest, and between those of a value, s."""
+LISTENING = 0.5
+"""The time between two looks for a failed motion while a text is awaited, s."""
 SHOWN = 3
 """The number of lines that a wait for a text shows when it runs out."""
 SIGNS: Mapping[str, Callable[[float, float], bool]] = {
@@ -205,11 +208,26 @@ async def _value(workspace: Workspace, drive: Drive, line: str, check: Check | N
 async def wait_text(workspace: Workspace, text: str, limit: float) -> None:
     """Wait until a drive prints a text; what came since the line before counts.
 
-    Raises Timeout after `limit` seconds.
+    It ends early with MotionFailed once a motion of this automation has failed. Raises Timeout after `limit` seconds.
     """
-    if not await workspace.lately.finds(text, limit):
+    if not await listened(workspace, partial(workspace.lately.finds, text), limit):
         seen = ", ".join(f'"{line}"' for line in workspace.lately.last(SHOWN)) or "nothing"
         raise Timeout(f'/wait "{text}": not printed within {limit:g} s; seen {seen}')
+
+
+async def listened(workspace: Workspace, finds: Callable[[float], Awaitable[bool]], limit: float) -> bool:
+    """Whether a text comes within `limit` seconds. `finds` waits for it for a time, s.
+
+    Meanwhile the motions of this automation are judged, seldom: what a drive prints by itself can meet a question on
+    the line. A drive that cannot be asked says nothing of them. Raises MotionFailed.
+    """
+    deadline = workspace.now() + limit
+    while not await finds(max(0.0, min(LISTENING, deadline - workspace.now()))):
+        if workspace.now() >= deadline:
+            return False
+        with contextlib.suppress(NoAnswer):
+            await check_own(workspace)
+    return True
 
 
 FRESH = 1.0
@@ -371,4 +389,5 @@ def _described(drive: Drive, begun: float, now: float) -> str:
         return "runs a program, which may move it" if running is not None and running.runs else ""
     named = drive.product and not drive.state.stranger
     known = named or drive.seen is not None or drive.commands
-    return f"is not known: {last_seen(drive, now)}" if known else ""
+    read = drive.seen is not None or drive.started_at > float("-inf")
+    return (f"is not known: {last_seen(drive, now)}" if read else last_seen(drive, now)) if known else ""

@@ -62,11 +62,16 @@ def list_(chosen: argparse.Namespace) -> int:
         if chosen.json:
             held = await program_listing.read(session, drive, "list")
             held.check_listed(name)
+            if not held.lines:
+                program_listing.say_none(session, drive)
             for at, text in held.lines:
                 session.output(json.dumps({"drive": address_of(session, drive), "at": at, "text": text}))
             return
         own = f"{name}: " if is_several(chosen.drive) else ""
-        for line in await program_listing.readable(session, drive):
+        lines = await program_listing.readable(session, drive)
+        if not lines:
+            program_listing.say_none(session, drive)
+        for line in lines:
             session.output(f"{own}{line}")
 
     return _with_drive(chosen, show, unsolicited=not chosen.json)

@@ -14,7 +14,8 @@ from __future__ import annotations
 import importlib
 import os
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, cast
 
 from multidrop.dialects import Diagnostic
@@ -58,10 +59,18 @@ class Checked:
         return sum(old != new for old, new in lines) if self.right else 0
 
 
-def examine(file: str, personality: str, language: str = "") -> Checked:
-    """Check one file for a product; its name gives the language. Raises Diagnostic if it cannot be read."""
+def examine(
+    file: str, personality: str, language: str = "", reported: Mapping[str, tuple[str, str]] = MappingProxyType({})
+) -> Checked:
+    """Check one file for a product; its name gives the language. Raises Diagnostic if it cannot be read.
+
+    `reported`: for the product of one unit, the version and the part number that it prints.
+    """
     text, encoding = encoded_program_of(file)
-    return examine_text(text, file, personality, language, encoding)
+    checked = examine_text(text, file, personality, language, encoding)
+    files = program_languages()[language or program_language_of(file)]
+    more = files.unsupported(text, personality, *reported.get(personality, ("", "")))
+    return replace(checked, problems=in_order([*checked.problems, *more]))
 
 
 def examine_text(text: str, file: str, personality: str, language: str = "", encoding: str = "utf-8") -> Checked:

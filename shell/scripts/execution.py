@@ -10,6 +10,7 @@ import contextlib
 from collections import deque
 from collections.abc import Awaitable, Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import TypeVar
 
 from multidrop.dialects import Diagnostic, DriveError, Stopped
@@ -371,7 +372,7 @@ class Execution:
 
     async def _expect(self, text: str, frame: Frame) -> None:
         wanted, seconds = words.expectation(text)
-        if not await self._heard.finds(wanted, seconds):
+        if not await waits.listened(self.session, partial(self._heard.finds, wanted), seconds):
             seen = ", ".join(map(quoted, self._heard.last(SHOWN))) or "nothing"
             raise CheckFailed(f'{text}: wanted "{wanted}" within {seconds:g} s, seen {seen}')
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 import os
 import re
 import sys
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from functools import partial
 from typing import NamedTuple, TypeVar
 
@@ -27,6 +27,8 @@ from multidrop.shell.scripts.model import CallFile, CallMacro, If, MacroScript, 
 from multidrop.shell.session import BARE_WORDS, bare
 
 LOOPS = ("/repeat", "/while", "/until")
+EXPRESSIONS = ("/if", *LOOPS, "/set", "/assert", "/verify")
+"""The verbs with an expression, in which a name has no braces."""
 UNKNOWN = "0"
 """Stands for a value that is only known when the line is executed."""
 
@@ -105,9 +107,21 @@ class WrongScript(Diagnostic):
 def read_script(file: str, values: Mapping[str, str], macros: MacroStore | None = None) -> Script:
     """Read and check a script file (`-`: standard input), and every file that it calls.
 
-    Raises WrongScript with every error, each with `file:line`; Diagnostic for a file that cannot be read.
+    Raises WrongScript with every error, each with `file:line`; Diagnostic for a file that cannot be read, and for a
+    value that no line uses.
     """
-    return _Reader(values, macros).read(file, values, ())
+    reader = _Reader(values, macros)
+    script = reader.read(file, values, ())
+    _all_used(file, values, reader.used)
+    return script
+
+
+def _all_used(file: str, given: Collection[str], used: Collection[str]) -> None:
+    """Raise Diagnostic for values that no line uses: one with a wrong name would be left out without a word."""
+    if left := [name for name in given if name not in used]:
+        several = "s" if len(left) > 1 else ""
+        taken = ", ".join(sorted(used)) or "no value"
+        raise Diagnostic(f"no line takes the value{several} {', '.join(left)}", file, f"its lines take {taken}")
 
 
 def read_macro(macro: Macro, given: Mapping[str, str], macros: MacroStore | None = None) -> MacroScript:
@@ -143,6 +157,8 @@ class _Reader:
     def __init__(self, values: Mapping[str, str], macros: MacroStore | None) -> None:
         self.values = values
         self.macros = macros
+        self.used: set[str] = set()
+        """The names that lines of the files use."""
         self._calls = 0
 
     def read(self, file: str, values: Names, chain: Chain) -> Script:
@@ -151,8 +167,10 @@ class _Reader:
             return Script(file, (), self.values)
         checker = _Checker(self, source(file), values, (*chain, Link(_identity(file), file)))
         body = checker.script()
+        self.used |= checker.used
         if checker.problems:
             raise WrongScript(checker.problems)
+        _all_used(file, values.keys() - self.values.keys(), checker.used)
         return Script(file, body, self.values)
 
     def macro_script(self, macro: Macro, values: Names, chain: Chain) -> MacroScript:
@@ -196,6 +214,7 @@ class _Checker:
         self._lines: Iterator[ScriptLine] = iter(lines)
         self._chain = chain
         self._depth = 0
+        self.used = {name for line in lines for name in _used(line, values)}
         self._takes_any = any(line.word == "/raw" or re.search(r"\bPG\b", line.text, re.I) for line in lines)
         """Program mode or raw mode may take a word as it is."""
         changing = {name for line in lines if line.word == "/set" for name in line.text.split()[1:2]}
@@ -349,6 +368,12 @@ class _Checker:
 
     def _wrong(self, line: ScriptLine, message: str) -> None:
         self.problems.append(Diagnostic(message, line.where))
+
+
+def _used(line: ScriptLine, given: Collection[str]) -> set[str]:
+    """The names that a line uses: with braces, and those of `given` in an expression."""
+    bare = {*words.NAME.findall(words.rest_of(line.text))} if line.word in EXPRESSIONS else set()
+    return value_names(line.text) | (bare & {*given})
 
 
 def _stood_in(values: Names) -> dict[str, str]:

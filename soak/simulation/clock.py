@@ -29,6 +29,8 @@ LATE = 10.0
 WORLD = ("soak.", "multidrop.simulator.")
 """The modules whose timers are not the loop's work: they stand for drives, the kernel, threads and the person."""
 
+STOPS = "soak.simulation.pacer"
+
 
 class Deadlock(AssertionError):
     """Nothing is ready and no timer is set: something waits for ever."""
@@ -82,13 +84,20 @@ class SimulatedLoop(asyncio.BaseEventLoop):
 
     def starve(self, seconds: float) -> None:
         """Let the loop do nothing for so long, while drives, the kernel, threads and the person go on."""
+        self._pass(seconds, _of_the_world)
+
+    def hold(self, seconds: float) -> None:
+        """Let the work under way take so long. The thread that writes stops goes on; all others are late."""
+        self._pass(seconds, _writes_stops)
+
+    def _pass(self, seconds: float, goes_on: Callable[[asyncio.TimerHandle], bool]) -> None:
         until = self.now + seconds
-        self._starved = True
+        before, self._starved = self._starved, True
         timers: list[asyncio.TimerHandle] = self._scheduled  # type: ignore[attr-defined]
         later: list[asyncio.TimerHandle] = []
         while timers and timers[0]._when <= until:  # type: ignore[attr-defined]
             timer = heapq.heappop(timers)
-            if not _of_the_world(timer):
+            if not goes_on(timer):
                 later.append(timer)
                 continue
             timer._scheduled = False  # type: ignore[attr-defined]
@@ -99,8 +108,8 @@ class SimulatedLoop(asyncio.BaseEventLoop):
                 timer._run()
         for timer in later:
             heapq.heappush(timers, timer)
-        self._starved = False
-        self.now = until
+        self._starved = before
+        self.now = max(self.now, until)
 
     def close(self) -> None:
         """Close the loop."""
@@ -260,6 +269,15 @@ class SimulatedLoop(asyncio.BaseEventLoop):
 
 def _of_the_world(timer: asyncio.TimerHandle) -> bool:
     """Whether a timer goes on while the loop is starved."""
+    return _module(timer).startswith(WORLD)
+
+
+def _writes_stops(timer: asyncio.TimerHandle) -> bool:
+    """Whether a timer is of the thread that writes the pieces of stops."""
+    return _module(timer) == STOPS
+
+
+def _module(timer: asyncio.TimerHandle) -> str:
     called = timer._callback  # type: ignore[attr-defined]
     owner = type(called.__self__) if hasattr(called, "__self__") else called
-    return getattr(owner, "__module__", "").startswith(WORLD)
+    return str(getattr(owner, "__module__", ""))

@@ -159,7 +159,8 @@ def under_way(world: World, line: str, stop: Stop) -> bool:
         if at < stop.at - STILL:
             break
         if name == line and (left := _written(world, line, index)):
-            return _is_stop(stop, line, left)
+            # Its forms were made when it came: what was half sent then may have left since.
+            return any(_is_stop(each, line, left) for each in (stop, *earlier))
     return bool(earlier)  # nothing of it has left yet
 
 

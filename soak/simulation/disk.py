@@ -143,7 +143,7 @@ class Disk:
 
     def _operate(self, what: str, path: str, work: Callable[[], Any], part: Callable[[], object] | None = None) -> Any:
         if self.climate["slow disk"] and self.climate.happens("slow disk", self.rng):
-            self.loop.now += self.rng.random() ** 4 * SLOW
+            self.loop.hold(self.rng.random() ** 4 * SLOW)
 
         def noted() -> Any:
             result = work()

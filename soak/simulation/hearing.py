@@ -113,7 +113,8 @@ def _reaches(bus: Bus) -> dict[str, Callable[[bytes], bool]]:
 def _parts(bus: Bus) -> tuple[bytes, ...]:
     """The bytes that a stop of a line is made of."""
     forms = stop_forms(bus.roster)
-    found = (forms.immediate, forms.unterminated, forms.invalidate, *(each.data for each in forms.repeats))
+    cut, _ = forms.written(cut=True)
+    found = (forms.immediate, forms.unterminated, forms.invalidate, cut, *(each.data for each in forms.repeats))
     return tuple(filter(None, (*found, *_unsure(bus))))
 
 

@@ -76,7 +76,8 @@ def _every_drive(world: World) -> Iterator[str | Granted]:
         if not stop.who and any(stop.at <= at <= until for at in ends):
             continue
         for line, drives in stop.reaches.items():
-            again = any(name == line and stop.at <= at <= until for at, name, _ in history.opened)
+            till = max(until, _back(world, line, stop))
+            again = any(name == line and stop.at <= at <= till for at, name, _ in history.opened)
             if again or _lost(world, line, stop):
                 continue
             left = stop_bytes(world, line, stop, until)
@@ -116,6 +117,12 @@ def _lost(world: World, line: str, stop: Stop) -> bool:
     """Whether a session says after a stop that a line was lost."""
     said = re.compile(rf"{line[:2]}: .* was lost|{line[:2]}: .*; trying again")
     return any(at >= stop.at and said.match(text) for at, text in world.history.notices)
+
+
+def _back(world: World, line: str, stop: Stop) -> float:
+    """When a line that was lost before a stop is said to be back after it; 0 where it was not lost."""
+    said = f"{line[:2]} is back after"
+    return next((at for at, text in world.history.notices if at >= stop.at and text.startswith(said)), 0.0)
 
 
 def _true(world: World) -> Iterator[str]:

@@ -14,6 +14,7 @@ FIXED = {
     797: "the error of a refused Modbus write, whose flag was read too late, which the next line was blamed for",
     15: "a terminal that hung up after the end of the story (of the simulation itself)",
     116: "the error of a Modbus write that was refused after its time-out, which the next line was blamed for",
+    8002542: "a program that was lost as its drive had booted, within a download (of the simulation itself)",
     3025: "a script's line that a macro recorded, and played (of the simulation itself)",
     4478: "a line that waited for the end of a download, taken for one of program mode (of the simulation itself)",
     10177: "a value of a drive that was without power, set while the question ran (of the simulation itself)",
@@ -132,6 +133,10 @@ FIXED = {
     7008855: "a kill that met a stop as the simulation looked at a queue (of the simulation itself)",
     8000469: "a value of another controller, whose own came as the mark of a third one was awaited in vain",
     8000715: "a stop of the computer that lends the port, soon after one of its client (of the simulation itself)",
+    300197: "the stop of an early end that was owed after a loss, which failed for a controller and a module",
+    300003: "a stop of a half-sent line, which another key met on its way (of the simulation itself)",
+    300935: "a slow disk that kept the thread from writing the rest of a stop (of the simulation itself)",
+    300170: "a stop on a line that was lost again as it came back (of the simulation itself)",
     8002337: "a stop of which a loop that was held up sent the other controllers nothing for four seconds",
 }
 DERIVED = 12

@@ -267,7 +267,10 @@ async def test_a_script_runs_and_its_failure_names_the_line(url: str, tmp_path: 
         with pytest.raises(Diagnostic, match="steps"):
             await session.run(str(tmp_path / "turn.txt"))
         with pytest.raises(DriveError, match="wanted == 1"):  # a value may have any name
-            await session.run(str(tmp_path / "turn.txt"), file=1, steps=1, goal=1)
+            (tmp_path / "file.txt").write_text((tmp_path / "turn.txt").read_text().replace("goal", "file"))
+            await session.run(str(tmp_path / "file.txt"), file=1, steps=1)
+        with pytest.raises(Diagnostic, match="no line takes the value step;"):
+            await session.run(str(tmp_path / "turn.txt"), step=1, steps=1, goal=1)
 
 
 MACRO = """name = "go"

@@ -23,14 +23,14 @@ def certify(multidrop, tmp_path):
 def test_a_report_is_written_whole_and_compared(certify, tmp_path):
     done = certify("sim:cell.toml", "-o", "r.toml")
     assert (done.returncode, done.stdout) == (0, "")
-    assert done.stderr == "00: 14 questions answered, 0 not asked in r.toml\n"
+    assert done.stderr == "00: 15 questions answered, 0 not asked in r.toml\n"
     same = certify("--compare", "r.toml", "sim:cell.toml")
     assert (same.returncode, same.stdout) == (0, "")
     text = (tmp_path / "r.toml").read_text()
     (tmp_path / "r.toml").write_text(text.replace('["?SAP"]', '["0"]'))
     other = certify("--compare", "r.toml", "sim:cell.toml")
     assert (other.returncode, other.stdout) == (1, "polarity-word: here ?SAP; in r.toml 0\n")
-    assert "13 of 14 answers of r.toml are the same" in other.stderr
+    assert "14 of 15 answers of r.toml are the same" in other.stderr
     assert certify("sim:cell.toml", "-o", "-").stdout == text
 
 

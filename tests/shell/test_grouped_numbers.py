@@ -6,7 +6,7 @@ import asyncio
 
 import pytest
 
-from multidrop.dialects import Diagnostic, Inexpressible
+from multidrop.dialects import Diagnostic, DriveError, Inexpressible
 from multidrop.dialects.mcode.manual import program_checker, program_file
 from multidrop.dialects.mcode.manual.grammar import LineError, check_groups
 from multidrop.dialects.modbus.host.codec import Modbus, ModbusState
@@ -53,6 +53,46 @@ def why(line: str) -> str:
 @for_each(("line", "number"), GROUPED.items())
 def test_groups_of_three_digits_are_refused_with_the_number_to_write(line: str, number: str) -> None:
     assert why(line).endswith(f"; write {number}"), line
+
+
+POINTS = {
+    "MR 51.200": "51, or 51200", "MA -51.200": "51, or 51200", "SL 20.5": "20", "P=1.000": "1, or 1000", "VM=.5": "0",
+    "MA 5,1.0": "1", "R1=2.5": "2", "ma+1.": "1", "LS=1,200.000": "200, or 200000", "H 1.5": "2", "MA 1e3": "1000", "SL 1.5E2": "150",
+}  # fmt: skip
+WITH_POINT = (
+    "F1=2.5",
+    "R1=F1*2.5",
+    "R1=7*1.5",
+    "SA=1.8",
+    "CR=0.5",
+    "PR 8.5",
+    "BR A1,P>1.5",
+    "MR 5 '51.2",
+    "Q1=2.5",
+    "MA F1",
+)
+
+
+@for_each(("line", "number"), POINTS.items())
+def test_a_fraction_is_refused_where_a_word_takes_whole_numbers(line: str, number: str) -> None:
+    assert why(line).endswith(f" takes whole numbers; write {number}"), line
+
+
+@for_each("line", WITH_POINT)
+def test_a_point_in_arithmetic_and_in_words_that_take_it_is_none(line: str) -> None:
+    assert why(line) == "", line
+
+
+async def test_a_fraction_moves_no_drive_of_any_family(tmp_path) -> None:
+    cell = bus("press", party("a")) + bus("stages", pmx("00")) + bus("line", MODULE)
+    lines = ("@press:a MR 51.200", "@press:* MR 51.200", "@stages:00 X51.200", "@line:1 MVP ABS, 0, 51.200")
+    async with CellSession(tmp_path, cell) as shop:
+        for line in lines:
+            with pytest.raises((Diagnostic, DriveError)):
+                await shop.session.run(line)
+            assert not shop.moving(), line
+        written = shop.written("press") + shop.written("line")
+        assert b"51" not in written
 
 
 @for_each("line", FIELDS)
@@ -116,7 +156,7 @@ async def test_a_line_for_the_program_is_refused_too(tmp_path) -> None:
 async def test_a_line_that_no_drive_gets_is_found_before_the_script_moves_anything(tmp_path, wrong: str) -> None:
     (tmp_path / "s.txt").write_text(f"@a MR 51200\n/if 1 == 1\n  {wrong}\n/end\n", encoding="utf-8")
     async with CellSession(tmp_path, bus("press", party("a")), bus("stages", pmx("00")), bus("lab", MODULE)) as shop:
-        script = read_script(str(tmp_path / "s.txt"), {"FAR": "200,000"})
+        script = read_script(str(tmp_path / "s.txt"), {"FAR": "200,000"} if "{" in wrong else {})
         with pytest.raises(Diagnostic, match=r"s.txt:3: .*nothing was sent"):
             await run_script(shop.session, script)
         macro = Macro("go", (Step(0.0, "@a MR 51200"), Step(0.0, wrong)))

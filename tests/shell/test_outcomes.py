@@ -83,6 +83,33 @@ async def test_a_limit_fails_every_wait_early(tmp_path: Path, wait: str) -> None
         assert await value(session, "R1") == 0 and session.now() - begun < 10
 
 
+@pytest.mark.parametrize("wait", ['/wait "DONE" 60', '/expect "DONE" 60'])
+async def test_a_wait_for_a_text_ends_with_the_failed_motion(tmp_path: Path, wait: str) -> None:
+    async with at_limit(tmp_path) as session:
+        begun = session.now()
+        with pytest.raises(MotionFailed, match="plus limit reached"):
+            await ran(session, tmp_path, "MA 90000", wait, "R1=777")
+        assert await value(session, "R1") == 0 and session.now() - begun < 10
+
+
+PRINTS = "program_text = '''\nPG 100\nLB Ga\nMA 20000\nH\nH 2000\nPR \"DONE\"\nE\nPG\n'''"
+
+
+@pytest.mark.parametrize("wait", ['/wait "DONE" 60', '/expect "DONE" 60'])
+async def test_a_wait_for_a_text_takes_one_that_comes_after_the_motion(tmp_path: Path, wait: str) -> None:
+    async with on(tmp_path, PRINTS, VM=20000) as session:
+        await ran(session, tmp_path, "EX Ga", wait, "R1=777")
+        assert await value(session, "R1") == 777
+
+
+async def test_a_wait_for_a_text_lasts_as_long_as_it_says(tmp_path: Path) -> None:
+    async with on(tmp_path, VM=20000) as session:
+        begun = session.now()
+        with pytest.raises(DriveError, match="not printed within 7.3 s"):
+            await sent(session, "MA 20000", '/wait "DONE" 7.3')
+        assert session.now() - begun == pytest.approx(7.3, abs=0.3)
+
+
 async def test_a_limit_ends_a_move_without_a_target_as_a_failure(tmp_path: Path) -> None:
     async with at_limit(tmp_path) as session:
         assert (await failed(session, "SL 50000", "/wait stopped")).outcome == "limit"

@@ -211,6 +211,30 @@ async def test_a_loss_during_a_start_raises_the_alarm(tmp_path):
         assert [text for text in shop.warned() if "E-stop" in text]
 
 
+RETURNS = {
+    "a controller": (bus("line", pmx("00"), pmx("01")), ["@line:00 JX+"], b"ABORT"),
+    "a module": (bus("line", drive("TMCM-3110", "1"), drive("TMCM-3110", "2")), ["@line:1 ROR 0, 500"], b"\x01\x03"),
+    "a drive of a party line": (press(name="line"), ["@line:a SL 50000"], b"\x1b"),
+}
+
+
+@pytest.mark.parametrize(("cell", "lines", "stop"), RETURNS.values(), ids=RETURNS)
+async def test_the_stop_that_a_loss_kept_from_a_drive_is_sent_once_the_line_is_back(cell, lines, stop, tmp_path):
+    async with CellSession(tmp_path, cell, reconnect=True) as shop:
+        with pytest.raises((TransportLost, DriveError)):
+            async with shop.session.automations.run():
+                for line in lines:
+                    await shop.session.run(line)
+                await asyncio.sleep(0.5)
+                shop.world("/sim unplug line")
+                await shop.session.run(lines[0].partition(" ")[0] + " " + "STATUS")
+        shop.events.clear()
+        shop.world("/sim plug line")
+        await asyncio.sleep(30)
+        assert shop.written("line").find(stop) in range(20) and not shop.moving()
+        assert not [text for text in shop.warned() if "failed" in text]
+
+
 SHUTTLE = ["PRG {0}", "WHILE 1=1", "{1}1000", "WAIT{1}", "{1}0", "WAIT{1}", "ENDWHILE", "END"]
 
 

@@ -91,7 +91,7 @@ class FakeBus:
     def at(self, address):
         return self.drives[address]
 
-    def halt(self, only=None, follows=True):
+    def halt(self, only=None, follows=True, started=None):
         """Noted as the real one does it."""
         self.stops += 1
         drives = tuple(self.all_drives if only is None else only)

@@ -10,7 +10,7 @@ import math
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
-from multidrop.dialects.values import Conditions, Lamp, Pace
+from multidrop.dialects.values import UNREAD, Conditions, Lamp, Pace
 from multidrop.tui.panels.view import NOT_REFERENCED, Glance, View, firmware_of, name_of
 from multidrop.tui.readout import READ, SWITCHES, Readout
 from multidrop.tui.text import age, at_words, fit
@@ -80,7 +80,8 @@ def trouble_of(axis: Readout) -> str:
     if axis.trouble or conditions is None or not conditions.error:
         return axis.trouble
     limits = [lamp.function for lamp in conditions.lamps if lamp.on and lamp.function in LIMITS]
-    return limits[0] if limits else conditions.error_name
+    unnumbered = conditions.cause if conditions.error == UNREAD else ""
+    return limits[0] if limits else unnumbered or conditions.error_name
 
 
 def program_words(readout: Readout, now: float) -> str:

@@ -42,8 +42,11 @@ def facts_of(view: View, bus: Bus, glance: Glance) -> Iterator[tuple[str, str]]:
         found = session.units.of(drive, axis.axis) if session.scaled else None
         scale = found.scale if found is not None else None
         unit = unit_of(axis, glance.unit)
+        fails = "does not hold now" if found is not None and not found.holds else ""
         text = (
-            (axis.figures.unit or unit) if scale is None else ", ".join(filter(None, (str(scale), scale.shown_travel)))
+            (axis.figures.unit or unit)
+            if scale is None
+            else ", ".join(filter(None, (str(scale), scale.shown_travel, fails)))
         )
         yield f"units {axis.axis}".rstrip(), text
     program, family = readout.program, drive.family

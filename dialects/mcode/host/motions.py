@@ -24,14 +24,16 @@ from multidrop.dialects.mcode.manual import errors
 from multidrop.dialects.mcode.manual.errors import ErrorNumber as E
 from multidrop.dialects.mcode.manual.grammar import Number, Statement, parsed
 from multidrop.dialects.mcode.manual.mnemonic import EVERY
+from multidrop.dialects.mcode.manual.points import CAUSE
 from multidrop.dialects.mcode.manual.table import lookup
 from multidrop.dialects.motions import NOTHING, Effect, Ending, Evidence, Motions, Move, MoveKind, Outcome, Signs
 from multidrop.dialects.state import DriveState
+from multidrop.dialects.values import Value
 
 S = TypeVar("S", bound=DriveState)
 AXIS = ""
 ONLY = frozenset({AXIS})
-SIGNS = ("EF", "MV", "BY", "ST", "P", "AF")
+SIGNS = ("EF", "MV", "BY", "ST", "P", "AF", "TE")
 """What is read before a motion."""
 END = ("EF", "BY", "MP", "ST", "EE", "P", "DB", "AF", "AS")
 """What is read at its end."""
@@ -41,6 +43,10 @@ FREE = ("TE", "JE", "FL")
 """What lets a drive move without a line of ours: armed trips, jog inputs, a clock that it follows."""
 TORQUE = 3
 """The value of AS without targets."""
+CLOSED_LOOP = (1, 2)
+"""The values of AS with which the rotor is held near the steps, and steps that it lacks are made up."""
+BOUNDS = 2
+"""How far the rotor may be from the steps in these modes, full steps; the widest setting of CB is 1.7 (5.1.18)."""
 TURNS_ROUND = (1, 4)
 """The values of LM with which a limit turns a homing round."""
 FAULTS: Mapping[int, Outcome] = {
@@ -69,8 +75,17 @@ OUTCOMES: Mapping[int, Outcome] = {
     E.NO_MOTOR_VOLTAGE: Outcome.POWER,
 }
 STALLED = "stalled"
+RUNS = ("BY", "TE")
+"""Not 0: a program runs, or a trip may start one; a trip disarms itself (5.1.125)."""
 MOVES = {"MA", "MR"}
 HOMINGS = {"HM", "HI", "HF"}
+PROGRAMS = {"EX", "CL", "BR"}
+WITHOUT_TARGET = {"AS": (TORQUE,), "JE": (1,), "FL": (1,), "SC": (1,)}
+"""Words that with one of these values start, or let inputs start, motion without a target."""
+CLEARED = {"ER", "ST"}
+"""Words whose value is a sign of a failure, which a line clears that sets it."""
+REFERS = {"RS", "IP", "FD"}
+"""Words after which a target is not known any more: they go on with another one, or set what positions count."""
 
 
 # What a line does
@@ -89,11 +104,15 @@ def effect(state: DriveState, text: str) -> Effect:
         return Effect(ends=ONLY) if value == 0 else Effect(begins=(Move(MoveKind.VELOCITY, AXIS),))
     if word in HOMINGS and statement.arguments:
         return Effect(begins=(Move(MoveKind.HOMING, AXIS),))
-    if word == "EX":
+    if word in PROGRAMS:
         return Effect(begins=(Move(MoveKind.PROGRAM, AXIS),))
+    if word in WITHOUT_TARGET and value in WITHOUT_TARGET[word]:
+        return Effect(begins=(Move(MoveKind.VELOCITY, AXIS),))
     if word in ("PS", "E"):
         return Effect(ends=ONLY)
-    if word == "RS" or classify.written_word(text) in classify.SCALE | {"JE", "FL"}:
+    if word == "CF" or classify.written_word(text) in CLEARED:
+        return Effect(clears=True)
+    if word in REFERS or classify.written_word(text) in classify.SCALE | {"JE", "FL", "TE"}:
         return Effect(unknown=ONLY)
     return NOTHING
 
@@ -150,7 +169,13 @@ def motions(access: Access[S]) -> Motions[S]:
         return found
 
     return Motions(
-        effect=effect_of, signs=signs, old=old, place=_place, judge=judge, fails=errors.BY_ITSELF.__contains__
+        effect=effect_of,
+        signs=signs,
+        old=old,
+        place=_place,
+        runs=_runs,
+        judge=judge,
+        fails=errors.BY_ITSELF.__contains__,
     )
 
 
@@ -158,12 +183,17 @@ def _place(found: Signs, axis: str) -> int | None:
     return None if found.get("MV") or found.get("BY") else found.get("P")
 
 
+def _runs(found: Signs) -> bool:
+    return any(found.get(each) for each in RUNS)
+
+
 def _judge(access: Access[S], state: S, evidence: Evidence) -> Procedure[Ending | None]:
     found = yield from access.values(state, END)
     before, move, position = evidence.before, evidence.move, found.get("P")
     ending = Ending(Outcome.REACHED, AXIS, position)
     if move is None:
-        return _seen(found, before, ending)
+        seen = _seen(found, before, ending)
+        return None if seen is ending and (yield from _makes_up(access, state, found)) else seen
     homing, program = move.kind is MoveKind.HOMING, move.kind is MoveKind.PROGRAM
     codes = [code for code in evidence.errors if code in errors.BY_ITSELF]
     if found.get("EF") and not before.get("EF"):
@@ -185,6 +215,8 @@ def _judge(access: Access[S], state: S, evidence: Evidence) -> Procedure[Ending 
         return _failed(ending, codes[-1], state)
     if (fault := _new_fault(found, before)) is not None:
         return replace(ending, outcome=fault[0], reason=fault[1])
+    if (yield from _makes_up(access, state, found)):
+        return None
     target = move.target
     if target is None or position is None or found.get("AS") == TORQUE or evidence.program or found.get("BY"):
         return ending
@@ -194,6 +226,14 @@ def _judge(access: Access[S], state: S, evidence: Evidence) -> Procedure[Ending 
         return None  # position maintenance may still correct it
     free = yield from access.values(state, FREE)
     return ending if any(free.values()) else replace(ending, outcome=Outcome.STOPPED)
+
+
+def _makes_up(access: Access[S], state: S, found: Mapping[str, int]) -> Procedure[bool]:
+    """Whether the rotor is not where the steps are yet: with hMT P counts steps, and makes up what is missing."""
+    if found.get("AS") not in CLOSED_LOOP:
+        return False
+    lag = yield from access.values(state, ("LL", "MS"))
+    return abs(lag.get("LL", 0)) > BOUNDS * lag.get("MS", 1)
 
 
 def _seen(found: Mapping[str, int], before: Signs, ending: Ending) -> Ending:
@@ -216,6 +256,21 @@ def _new_fault(found: Mapping[str, int], before: Signs) -> tuple[Outcome, str] |
         return Outcome.STALL, STALLED
     new = found.get("AF", 0) & ~before.get("AF", -1)
     return next(((outcome, FAULT_WORDS[bit]) for bit, outcome in FAULTS.items() if new & bit), None)
+
+
+def cause(found: Mapping[str, Value], before: Mapping[str, Value]) -> str:
+    """What caused the error that is set, as far as two readings of the conditions show it; empty: they do not.
+
+    Only a sign that came with the error is its cause: ST stays set from an earlier stall.
+    """
+    if not found.get("EF"):
+        return ""
+    fault = _new_fault(_whole_numbers(found), _whole_numbers(before)) if before else None
+    return fault[1] if fault is not None else str(before.get(CAUSE, "")) if before.get("EF") else ""
+
+
+def _whole_numbers(facts: Mapping[str, Value]) -> dict[str, int]:
+    return {name: value for name, value in facts.items() if isinstance(value, int)}
 
 
 def _tolerance(found: Mapping[str, int]) -> int:

@@ -205,6 +205,7 @@ def _traits(state: MCodeState) -> set[str]:
         "ethernet" if ETHERNET.match(state.product) else "serial",
     }
     found |= {"base"} if state.product == "MDI" else set()
+    found |= {"hmt"} if (row := lookup("AF", state.product)) is not None and state.product in row.products else set()
     return found | {"party" if state.codec.party else "alone"}
 
 

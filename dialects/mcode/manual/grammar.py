@@ -14,7 +14,7 @@ The grammar gives words no meaning, except that it asks for the known words wher
 from __future__ import annotations
 
 import re
-from collections.abc import Container
+from collections.abc import Container, Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
 from math import inf
@@ -228,6 +228,7 @@ def check_groups(line: str, names: Container[str] = ()) -> None:
 
     Three digits after a number and a comma or a space are such a group where the word has no further field, or a field
     that takes only 0 or 1. `PR` has as many fields as a line holds. A mark of a remark may divide groups: `MA 200'000`.
+    So may a point: it is refused in a number alone where a word takes whole numbers. A drive reads `MA 200.000` as 200.
     """
     found = divided(tokens(line), names)
     word = found[0].text.upper() if found and found[0].kind == "word" else ""
@@ -248,6 +249,25 @@ def check_groups(line: str, names: Container[str] = ()) -> None:
             field += 1
         elif not token.text.isspace():  # a space that is not ASCII is no token of the language
             number = None
+    _check_points(found)
+
+
+def _check_points(found: Sequence[Token]) -> None:
+    """Raise LineError for a point or an exponent of a word that takes whole numbers. In an expression it is arithmetic."""
+    row = lookup(found[0].text.upper()) if found and found[0].kind == "word" else None
+    if row is None or not row.whole:
+        return
+    argument = [token for token in found[1:] if token.kind != "remark" and not token.text.isspace()]
+    if argument and argument[0].text == "=":
+        del argument[0]
+    for at, token in enumerate(argument):
+        first = at == 0 or argument[at - 1].kind == "comma" or (at == 1 and argument[0].text in "+-")
+        last = at == len(argument) - 1 or argument[at + 1].kind == "comma"
+        if first and last and token.kind == "number" and not token.text.isdecimal():
+            whole, _, fraction = token.text.partition(".")
+            group = f", or {whole}{fraction}" if len(fraction) == 3 and fraction.isdecimal() else ""
+            why = f"{token.text} is not whole, and {row.name} takes whole numbers; write {float(token.text):.0f}{group}"
+            raise LineError(ErrorNumber.ILLEGAL_DATA, token.start, why)
 
 
 def _fields(word: str, at: int) -> set[str]:

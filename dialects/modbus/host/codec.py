@@ -93,6 +93,10 @@ class Modbus(Codec):
         at, foreign = _whole(buffer)
         return ((_foreign(buffer),), len(buffer)) if foreign else ((), at)
 
+    def printed(self, line: str) -> bool:
+        """Never: a Modbus server only replies."""
+        return False
+
     def stop(self, addresses: Sequence[str], sure: bool = True, half_sent: bool = False) -> bytes:
         """Return the end of the program, then SL 0: the axis decelerates at D, the hardest stop over Modbus."""
         return b"".join(piece.data for piece in self.stop_again(addresses))
@@ -104,6 +108,11 @@ class Modbus(Codec):
             StopPiece(pdu_codec().message(END_NUMBER, pdu_codec().read_specific("E"), self.unit)),
             StopPiece(pdu_codec().message(SLEW_NUMBER, slew, self.unit)),
         )
+
+    def repeated(self, sent: bytes, rest: bytes, over: bool) -> bool:
+        """Tell an adapter's repetition from the reply to a write of one register, which has the same bytes."""
+        found = framing.first(sent, 0)
+        return found is not None and found.pdu[0] not in WRITES
 
     def hears_stop(self, data: bytes, address: str, sure: bool = True) -> bool:
         return True

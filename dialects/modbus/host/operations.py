@@ -166,10 +166,10 @@ def carried_out(state: ModbusState, text: str, pdu: bytes) -> Procedure[bytes]:
         if code in BY_ITSELF and not starts_motion(text):  # the reply confirms the write
             state.note(f"{who(state)}: '{text}' was executed, and meanwhile: {described(code, state)}, now cleared")
             return answer
-        if code in BY_ITSELF:
-            either = f"it refused '{text}', or that came by itself and it was executed"
-            raise Refused(f"{who(state)}: {described(code, state)}; {either}", code)
-        raise Refused(f"{who(state)} refused '{text}': {described(code, state)}", code)
+        raise NoAnswer(
+            f"{who(state)} accepted '{text}' and then showed {described(code, state)}, now cleared: it is not known "
+            "whether it was executed, or the error is another program's; it was sent once"
+        )
     return answer
 
 

@@ -28,7 +28,9 @@ HOMING = re.compile(r"(HL|H|L|ZH|Z)([XY])[+-]", re.ASCII)
 STOP = re.compile(r"(?:STOP|ABORT)([XY]?)", re.ASCII)
 STARTS = re.compile(r"SR[01]=[13]|GS\d+", re.ASCII)
 REFERS = re.compile(r"(?:P|E|SL|SLR|POL)([XY])=.*", re.ASCII)
-JOYSTICK = re.compile(r"JO(=.*)?", re.ASCII)
+CLEARS = re.compile(r"CLR[XY]", re.ASCII)
+JOYSTICK = re.compile(r"JO|JF|JO=.*", re.ASCII)
+JOYSTICK_OFF = ("JF", "JO=0")
 OVERSHOOTS = "H"
 """The homing that slows down behind the place that it has found; the others end on 0 (7.10)."""
 DISTANCES = 1
@@ -39,8 +41,8 @@ LOOP_BUSY = frozenset(table.LOOP) - table.LOOP_ERRORS - {0, LOOP_OFF}
 """The values of SLS with which the axis is not at rest, though it may make no pulses in this moment."""
 SWITCHES = {1 << 4: "plus", 1 << 5: "minus"}
 LATCHED = {table.LIMIT_PLUS: "plus", table.LIMIT_MINUS: "minus"}
-FAILED_PROGRAM = 4
-"""The value of SASTAT of a program that an error has ended."""
+RUNNING, FAILED_PROGRAM = 1, 4
+"""The values of SASTAT of a program that runs, and of one that an error has ended."""
 
 
 # What a line does
@@ -62,7 +64,7 @@ def _effect(line: str) -> Effect:
     if (found := FLYING.fullmatch(line)) is not None:
         return Effect(begins=(Move(MoveKind.POSITION, found[1].lower(), target=int(found[2])),))
     if (found := JOG.fullmatch(line)) is not None:
-        return Effect(begins=tuple(Move(MoveKind.VELOCITY, axis) for axis in _axes(found[1])))
+        return Effect(begins=_without_target(_axes(found[1])))
     if (found := HOMING.fullmatch(line)) is not None:
         target = None if found[1] == OVERSHOOTS else 0
         return Effect(begins=(Move(MoveKind.HOMING, found[2].lower(), target),))
@@ -72,7 +74,15 @@ def _effect(line: str) -> Effect:
         return Effect(begins=tuple(Move(MoveKind.PROGRAM, axis) for axis in sorted(BOTH)))
     if (found := REFERS.fullmatch(line)) is not None:
         return Effect(unknown=_axes(found[1]))
-    return Effect(unknown=BOTH) if JOYSTICK.fullmatch(line) else NOTHING
+    if CLEARS.fullmatch(line):
+        return Effect(clears=True)
+    if JOYSTICK.fullmatch(line):
+        return Effect(unknown=BOTH) if line in JOYSTICK_OFF else Effect(begins=_without_target(BOTH))
+    return NOTHING
+
+
+def _without_target(axes: frozenset[str]) -> tuple[Move, ...]:
+    return tuple(Move(MoveKind.VELOCITY, axis) for axis in sorted(axes))
 
 
 def _axes(named: str) -> frozenset[str]:
@@ -111,6 +121,11 @@ def place(found: Signs, axis: str) -> int | None:
     if found["MM"] != DISTANCES:
         return 0
     return None if found[f"MST{axis.upper()}"] & table.MOVING else found[f"P{axis.upper()}"]
+
+
+def runs(found: Signs) -> bool:
+    """Whether a program runs."""
+    return any(found[f"SASTAT{program}"] == RUNNING for program in PROGRAMS)
 
 
 # At its end
@@ -174,4 +189,4 @@ def _loop_failed(ending: Ending, loop: int, name: str) -> Ending:
     return replace(ending, outcome=outcome, reason=f"StepNLoop {words}; CLR{name} clears the error")
 
 
-MOTIONS = Motions(effect=effect, signs=signs, old=old, place=place, judge=judge)
+MOTIONS = Motions(effect=effect, signs=signs, old=old, place=place, runs=runs, judge=judge)

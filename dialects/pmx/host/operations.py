@@ -53,14 +53,17 @@ def number(
     return int(reply.text)
 
 
-def refusal(state: PmxState, request: Request, reply: Reply) -> Refused:
+def refusal(state: PmxState, request: Request, reply: Reply) -> Refused | NoAnswer:
     """Describe a refusal: the reply where it says more than the command, its meaning, the remedy."""
     received, text = reply.text, request.text
     head = f"{who(state)} refused '{text}'"
     if (found := table.meaning(received)) is not None:
         return Refused(f"{head}: {received}: {found[0]} ({_valid(text, received) or found[1]})")
     if received != f"?{text}" and not text.startswith(received[1:]):
-        return Refused(f"{head}: it received {received[1:]!r}, or does not accept it so (was the line disturbed?)")
+        return NoAnswer(
+            f"{who(state)}: {received!r} came for '{text}': the line was disturbed, or another program uses it; it is "
+            f"not known whether '{text}' was executed; it was sent once"
+        )
     advice = _advice(text)
     row = table.lookup(text)
     moves = row is not None and text == text.upper() and {"place", "sign", "both"} & set(row.shapes)
@@ -248,7 +251,9 @@ def identify(hints: Hints) -> Procedure[list[PmxState]]:
 def find(state: PmxState) -> Procedure[PmxState | None]:
     """Identify one controller; None where it is silent."""
     text = ""
-    for _ in range(TRIES):
+    for tried in range(TRIES):
+        if tried and not text.startswith("?"):  # a gateway's greeting came in its place: the controller's reply is late
+            yield from _mark(state, state.codec.request(state.address, "ID"), False)
         text = yield from _ask(state, "ID")
         if not text or PRODUCT.search(text):
             break

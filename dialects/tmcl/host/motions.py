@@ -17,12 +17,16 @@ from multidrop.dialects.codec import Procedure
 from multidrop.dialects.errors import Refused
 from multidrop.dialects.motions import NOTHING, Effect, Ending, Evidence, Motions, Move, MoveKind, Outcome, Signs
 from multidrop.dialects.tmcl.host.codec import MOST_MOTORS, TmclState
-from multidrop.dialects.tmcl.host.operations import motors, read
+from multidrop.dialects.tmcl.host.operations import busy, motors, read
 from multidrop.dialects.tmcl.manual import commands
 from multidrop.dialects.tmcl.manual.commands import Axis, Call, Command, Search
 
-ABSOLUTE, RELATIVE = 0, 1
-"""The types of MVP; the third one, COORD, needs coordinates."""
+ABSOLUTE, RELATIVE, TOGETHER = 0, 1, 2
+"""The types of MVP; the third one, COORD, moves motors to coordinates that are stored in the module."""
+SEVERAL = 0xC0
+"""The motor of MVP COORD: one, or with a bit of SEVERAL the sum of bits."""
+PROGRAM = "program"
+"""Whether its program runs, among the signs."""
 STARTS = (129, 130)
 """The commands that run or step the module's program."""
 DRIVER_FAULTS: Mapping[int, str] = {
@@ -57,6 +61,10 @@ def effect(state: TmclState, text: str) -> Effect:
             return _begins(Move(MoveKind.POSITION, axis, target=call.value))
         case Command.MVP, kind if kind == RELATIVE:
             return _begins(Move(MoveKind.POSITION, axis, relative=call.value))
+        case Command.MVP, kind if kind == TOGETHER:
+            named = [n for n in range(MOST_MOTORS) if call.motor >> n & 1] if call.motor & SEVERAL else [call.motor]
+            # Where it ends is read from parameter 0, as after MVP REL.
+            return Effect(tuple(Move(MoveKind.POSITION, _axis(state, each), relative=0) for each in named))
         case Command.SAP, Axis.TARGET_POSITION:
             return _begins(Move(MoveKind.POSITION, axis, target=call.value))
         case Command.SAP, Axis.TARGET_VELOCITY:
@@ -87,8 +95,8 @@ def _axis(state: TmclState, motor: int) -> str:
 
 
 def signs(state: TmclState) -> Procedure[Signs]:
-    """Read the flags of each motor's driver; 0 for a module without them."""
-    found = {}
+    """Read the flags of each motor's driver, 0 for a module without them, and whether its program runs."""
+    found = {PROGRAM: int((yield from busy(state)))}
     for motor in range((yield from motors(state))):
         found[f"208_{motor}"] = yield from _flags(state, motor)
     return found
@@ -166,4 +174,9 @@ def _value(state: TmclState, parameter: Axis, motor: int) -> Procedure[int]:
     return (yield from read(state, Call(Command.GAP, parameter, motor)))
 
 
-MOTIONS = Motions(effect=effect, signs=signs, judge=judge)
+def runs(found: Signs) -> bool:
+    """Whether its program runs."""
+    return bool(found.get(PROGRAM))
+
+
+MOTIONS = Motions(effect=effect, signs=signs, runs=runs, judge=judge)

@@ -267,7 +267,7 @@ class MCodePort:
     def _on_end_of(self, line: Line, byte: int, now: float) -> None:
         """Take CR or LF within a line."""
         if line.mode.party or byte == CR:
-            self._line = None
+            self._line, line.entered = None, byte == CR
             if line.mine and len(self._waiting) < MOST_WAITING:
                 self._waiting.append(line)
             elif line.mine:

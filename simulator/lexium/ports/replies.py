@@ -37,11 +37,12 @@ class Mode(NamedTuple):
 class Line:
     """A line that is being received: its settings, its addressee, and its text.
 
-    `mine`: it is for this drive. `replies`: this drive replies to it.
+    `mine`: it is for this drive. `replies`: this drive replies to it. `entered`: a carriage return ends it.
     """
 
     def __init__(self, mode: Mode, name: bytes = b"", mine: bool = True, replies: bool = True) -> None:
         self.mode, self.name, self.mine, self.replies = mode, name, mine, replies
+        self.entered = False
         self.text = bytearray()
 
 
@@ -138,6 +139,8 @@ class Replier:
             answer = device.execute(command.decode("latin-1"), now)
             outcome = Outcome(answer.lines, answer.tail, not answer.refused, busy=busy, flagged=flagged)
         else:
+            if sound and line.entered:
+                device.enter(now)
             outcome = Outcome(damaged=not sound, busy=busy, flagged=flagged)
         if self._serial and memory.checksum != before:
             mode = mode._replace(checksum=memory.checksum)

@@ -130,6 +130,10 @@ def _lexium(name: str, *, ethernet: bool = False) -> Model:
     return Model(version=f"{name} 6.002, Hw: 3.2", part=f"{name}571", ethernet=ethernet)
 
 
+MODULE = _lexium("LMMCM")._replace(part="LMMCM15", points=MODULE_POINTS, auxiliary=False, free_ms=True)
+"""The Motion Module prints LMMCM as its product (5.1.141). No manual shows its part number."""
+
+
 MDRIVE = Model(
     version="3.010",
     part="MDI1FRD23A7",
@@ -166,7 +170,7 @@ MODELS: Mapping[str, Model] = {
     "LMDCM": _lexium("LMDCM"),
     "LMDOE": _lexium("LMDOE", ethernet=True),
     "LMDCE": _lexium("LMDCE", ethernet=True),
-    "LMM": _lexium("LMM")._replace(part="LMM15", points=MODULE_POINTS, auxiliary=False, free_ms=True),
+    "LMM": MODULE,
     "MDI": MDRIVE,
     "MDIE": MDRIVE._replace(part="MDI1FRD23A7-EQ"),
     "MDIX": MDRIVE._replace(part="MDI3CRL23C7-EQ", points=EXPANDED_POINTS),

@@ -162,13 +162,19 @@ def test_a_value_is_printed_and_ok_prints_nothing():
         ("x1000", "?x1000", "it reads capitals only: X1000"),
         ("MSTZ", "?MSTZ", "perhaps"),
         ("QQQ", "?QQQ", "?QQQ: it does not know that command"),
-        ("HSPD=5000", "?HSQD=5000", "it received 'HSQD=5000'"),
     ],
 )
 def test_a_refusal_says_what_it_means_and_what_to_do(text, answer, told):
     with pytest.raises(Refused) as caught:
         type_(text, Far(**{text: answer}))
     assert told in str(caught.value) and str(caught.value).startswith(f"00 refused '{text}'")
+
+
+@pytest.mark.parametrize("reply", ["?HSQD=5000", "?AT", "?X200"])
+def test_a_refusal_of_another_line_is_none_of_ours(reply):
+    why = "came for 'X100': .*another program.*not known whether 'X100' was executed; it was sent once"
+    with pytest.raises(NoAnswer, match=why):
+        type_("X100", Far(X100=reply))
 
 
 def test_what_acts_after_a_power_cycle_is_said():

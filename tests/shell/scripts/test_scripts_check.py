@@ -72,7 +72,20 @@ def test_a_bare_word_is_refused_before_the_first_line_is_sent(check, word):
     ],
 )
 def test_a_right_script(text, check):
-    assert check(text, FILE="ok", N="2", MODE="5", ADDR="a") == []
+    values = {"FILE": "ok", "N": "2", "MODE": "5", "ADDR": "a"}
+    assert check(text, **{name: value for name, value in values.items() if f"{{{name}}}" in text}) == []
+    with pytest.raises(Diagnostic, match="no line takes the value odd"):
+        check(text, odd="1", **{name: value for name, value in values.items() if f"{{{name}}}" in text})
+
+
+def test_a_value_that_no_line_takes_is_refused_with_what_its_lines_take(check):
+    with pytest.raises(Diagnostic) as caught:
+        check("MR {STEPS}\n/if N > 1\n/end\n", STEPS="1", N="2", STEP="3", M="4")
+    assert str(caught.value) == "s.txt: no line takes the values STEP, M; its lines take N, STEPS"
+    assert check("MR {STEPS}\n/call ok.txt\n", STEPS="1", x="2") == [], "called files have the values, too"
+    assert check("/call ok.txt y=1 x=2\n") == ["s.txt:1: ok.txt: no line takes the value y; its lines take x"]
+    with pytest.raises(Diagnostic, match="its lines take no value"):
+        check("MR 5\n", STEPS="1")
 
 
 @pytest.mark.parametrize(

@@ -40,6 +40,9 @@ class Drive:
             assert hasattr(self, name)
             setattr(self, name, value)
 
+    def enter(self, now: float) -> None:
+        pass
+
     @property
     def values(self) -> dict[str, int]:
         words = {

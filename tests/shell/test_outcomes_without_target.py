@@ -1,0 +1,209 @@
+"""How motions end that no line gives a target: torque mode, jog, trips, programs, joysticks; hMT, and restarts."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from multidrop.dialects.motions import MoveKind
+from multidrop.dialects.tmcl.host.codec import Tmcl, TmclState
+from multidrop.dialects.tmcl.host.motions import effect
+from multidrop.shell.session import Session
+from tests.shell.test_outcomes import at_limit, noted, on, ran, value
+from tests.shell.test_outcomes_pmx_tmcl import SWITCHES, controller
+from tests.shell.test_outcomes_pmx_tmcl import value as asked
+from tests.support.cell_session import bus, drive, session_on
+from tests.support.outcomes import failed, sent
+
+pytestmark = pytest.mark.virtual
+
+SLOW = {"VM": 20000, "A": 100000, "D": 100000}
+
+
+async def typed(session: Session, *lines: str) -> None:
+    for line in lines:
+        await session.run(line)
+
+
+# Motion that a setting begins
+
+
+@pytest.mark.parametrize("pause", ["/sleep 0", "/sleep 30"])
+async def test_torque_mode_is_a_motion_of_its_line(tmp_path: Path, pause: str) -> None:
+    async with at_limit(tmp_path) as session:
+        session.questions.agreed = True
+        failure = await failed(session, "TQ=50", "TS=2000000", "AS=3", pause, "/wait stopped", "R1=777")
+        assert failure.outcome == "limit" and failure.target is None and await value(session, "R1") == 0
+
+
+async def test_torque_mode_that_the_same_script_ends_is_no_failure(tmp_path: Path) -> None:
+    async with on(tmp_path) as session:
+        session.questions.agreed = True
+        await sent(session, "TQ=50", "TS=2000000", "AS=3", "/sleep 0.5", "SL 0", "/wait stopped", "R1=777")
+        assert await value(session, "R1") == 777
+
+
+async def test_a_jog_into_a_limit_fails_the_script_that_enabled_jogs(tmp_path: Path) -> None:
+    async with at_limit(tmp_path, **SLOW) as session:
+        lines = ("IS=2,7,0", "JE=1", "/sim input a 2 0", "/sleep 9", "/wait stopped", "R1=777")
+        assert (await failed(session, *lines)).outcome == "limit"
+        assert await value(session, "R1") == 0
+
+
+async def test_a_joystick_at_a_limit_fails_the_script_that_enabled_it(tmp_path: Path) -> None:
+    async with controller(tmp_path, SWITCHES) as session:
+        failure = await failed(session, "JO", "/sleep 2", "/wait stopped", "V1=777")
+        assert failure.outcome == "limit" and await asked(session, "V1") == 0
+
+
+def test_a_move_of_several_motors_is_one_motion_of_each() -> None:
+    state = TmclState(Tmcl(), "1", motors=3)
+    moves = effect(state, "MVP COORD, 133, 2").begins
+    assert [(each.axis, each.kind) for each in moves] == [("0", MoveKind.POSITION), ("2", MoveKind.POSITION)]
+    assert [each.axis for each in effect(state, "MVP COORD, 1, 2").begins] == ["1"]
+
+
+# Motion that the drive ends by itself
+
+
+TRIP = ("PG 1", "LB T1", "SL 0", "RT", "E", "PG", "TP=5000,T1")
+
+
+async def test_a_trip_that_ends_a_move_is_no_failure(tmp_path: Path) -> None:
+    async with on(tmp_path, **SLOW) as session:
+        await typed(session, *TRIP)
+        await sent(session, "TE=2", "MA 20000", "/wait stopped", "R1=777")
+        assert 5000 <= await value(session, "P") < 20000 and await value(session, "TE") == 0
+        await sent(session, "MA 0", "/wait stopped", "MA 20000", "TE=2", "/wait stopped", "R1=778")
+        assert 5000 <= await value(session, "P") < 20000 and await value(session, "R1") == 778
+
+
+async def test_a_stop_of_someone_else_is_a_failure_where_no_trip_is_armed(tmp_path: Path) -> None:
+    async with on(tmp_path, **SLOW) as session:
+        await typed(session, *TRIP, "MA 3000", "/wait stopped")
+        await sent(session, "MA 0", "/wait stopped")
+        await typed(session, "TE=2", "TE=0")
+        await sent(session, "MA 20000", "/wait stopped")
+
+
+PROGRAM = ("PG 1", "LB G1", "H 300", "SL 0", "E", "PG")
+
+
+@pytest.mark.parametrize("before", ["script", "person"])
+async def test_a_program_that_ran_before_a_move_may_end_it(tmp_path: Path, before: str) -> None:
+    async with on(tmp_path, **SLOW) as session:
+        await typed(session, *PROGRAM)
+        if before == "person":
+            await session.run("EX G1")
+        own = ["EX G1"] if before == "script" else []
+        await sent(session, *own, "MA 20000", "/wait stopped", "R1=777")
+        assert await value(session, "P") < 20000 and await value(session, "R1") == 777
+
+
+async def test_a_program_of_a_controller_that_ran_before_a_move_may_end_it(tmp_path: Path) -> None:
+    from multidrop.dialects.pmx.manual import program_file
+
+    text = "PRG 0\nDELAY=300\nSTOPX\nEND"
+    async with controller(tmp_path, SWITCHES) as session:
+        await session.drive().download(program_file.read(text, "a.prg"))
+        await typed(session, "ABS", "SR0=1")
+        await sent(session, "X2500", "/wait stopped", "V1=777")
+        assert await asked(session, "PX") < 2500 and await asked(session, "V1") == 777
+
+
+# hMT
+
+
+@pytest.mark.parametrize("mode", [1, 2])
+async def test_a_rotor_that_does_not_follow_the_steps_has_not_arrived(tmp_path: Path, mode: int) -> None:
+    """P counts steps with hMT: it is at the target while the rotor is far away (LL)."""
+    world = "[bus.drive.world]\nlocked = [[0.5, 1000]]"
+    async with on(tmp_path, world, **SLOW, AS=mode) as session:
+        failure = await failed(session, "MA 40000", "/wait stopped", "R1=777")
+        assert (failure.outcome, failure.reason) == ("stall", "error 104: locked rotor")
+        assert await value(session, "R1") == 0
+
+
+@pytest.mark.parametrize("mode", [1, 2])
+async def test_a_rotor_that_makes_up_its_lag_has_arrived_then(tmp_path: Path, mode: int) -> None:
+    async with on(tmp_path, "[bus.drive.world]\nlocked = [[0.5, 2.2]]", **SLOW, AS=mode, LT=60000) as session:
+        await sent(session, "MA 40000", "/wait stopped", "R1=777")
+        assert abs(await value(session, "LL")) < 512 and await value(session, "R1") == 777
+
+
+async def test_a_lag_limit_is_a_failure(tmp_path: Path) -> None:
+    world = "[bus.drive.world]\nlocked = [[0.5, 1000]]"
+    async with on(tmp_path, world, **SLOW, AS=1, LG=5000, LT=60000) as session:
+        failure = await failed(session, "MA 40000", "/wait stopped", "R1=777")
+        assert failure.outcome == "error" and failure.reason.startswith("error 107")
+
+
+async def test_torque_mode_with_a_locked_rotor_is_a_stall(tmp_path: Path) -> None:
+    async with on(tmp_path, "[bus.drive.world]\nlocked = [[0.5, 1000]]") as session:
+        session.questions.agreed = True
+        failure = await failed(session, "TQ=50", "TS=2000000", "AS=3", "/sleep 5", "/wait stopped", "R1=777")
+        assert failure.outcome == "stall" and await value(session, "R1") == 0
+
+
+# The deadband of the encoder
+
+
+@pytest.mark.parametrize(("deadband", "arrives"), [(100, True), (50, False)])
+async def test_a_move_ends_within_the_deadband(tmp_path: Path, deadband: int, arrives: bool) -> None:
+    """The wall is 91 counts short of the target, and SF keeps the drive from calling that a stall."""
+    settings = {**SLOW, "VM": 8000, "EE": 1, "SM": 1, "SF": 2000, "DB": deadband}
+    async with on(tmp_path, "[bus.drive.world]\nstall_at = 50040", **settings) as session:
+        lines = ("MA 4000", "/wait stopped", "R1=777")
+        if arrives:
+            await sent(session, *lines)
+        else:
+            assert (await failed(session, *lines)).outcome == "error"
+        assert await value(session, "R1") == (777 if arrives else 0)
+
+
+# Restarts
+
+
+CYCLE = ("/sleep 0.3", "/sim power a off", "/sleep 0.1", "/sim power a on", "/sleep 3")
+
+
+@pytest.mark.parametrize("line", ["SL 3000", "HM 1", "MR 40000", "EX G1"])
+async def test_a_motion_that_a_restart_ended_is_a_failure(tmp_path: Path, line: str) -> None:
+    cell = bus("press", drive("LMDCM", "a", CK=0, **SLOW), baud=0)
+    async with session_on(tmp_path, cell) as session:
+        await typed(session, "IS=3,1,0", "PG 1", "LB G1", "MA 90000", "H", "E", "PG", "S", "/sleep 1")
+        failure = await failed(session, line, *CYCLE, "/wait stopped", "R1=777")
+        assert (failure.outcome, failure.reason) == ("power", "it was restarted")
+        assert await value(session, "R1") == 0
+        await sent(session, "SL 3000", "/sleep 0.2", "SL 0", "/wait stopped", "R1=778")
+        assert await value(session, "R1") == 778
+
+
+async def test_a_restart_ends_the_script_at_its_next_line_and_is_an_outcome(tmp_path: Path) -> None:
+    cell = bus("press", drive("LMDCM", "a", CK=0, **SLOW), baud=0)
+    async with session_on(tmp_path, cell) as session:
+        await typed(session, "S", "/sleep 1")
+        failure = await failed(session, "SL 3000", *CYCLE, "R1=777")
+        assert str(failure).endswith("stopped: it was restarted; 'R1=777' was not sent")
+        assert await ran(session, tmp_path, "SL 3000", *CYCLE, "/wait ended", "/print {outcome}") == ["power"]
+
+
+# Lines that clear a sign
+
+
+@pytest.mark.parametrize("line", ["ER=0", "CF", "ST=0"])
+async def test_a_line_that_clears_a_sign_is_not_sent_after_a_failed_motion(tmp_path: Path, line: str) -> None:
+    async with at_limit(tmp_path, **SLOW) as session:
+        failure = await failed(session, "SL 30000", "/sleep 9", line, "/wait stopped", "R1=777")
+        assert failure.outcome == "limit" and str(failure).endswith(f"'{line}' was not sent")
+        await typed(session, "SL -30000", "/sleep 1", line)
+        assert not any("was not sent" in each for each in noted(session)[-2:])
+
+
+async def test_an_error_of_a_controller_is_not_cleared_after_a_failed_motion(tmp_path: Path) -> None:
+    async with controller(tmp_path, SWITCHES) as session:
+        failure = await failed(session, "JX+", "/sleep 5", "CLRX", "/wait stopped", "V1=777")
+        assert failure.outcome == "limit" and str(failure).endswith("'CLRX' was not sent")
+        await sent(session, "CLRX", "ABS", "X0", "/wait stopped", "V1=778")
+        assert await asked(session, "V1") == 778
