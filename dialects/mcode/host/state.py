@@ -138,11 +138,9 @@ class MCodeState(DriveState):
 
     # Single step
 
-    def steps(self) -> None:
-        self.running = self.stepping = True
-
-    def may_not_step(self) -> None:
-        self.stepping = False
+    def steps(self, on: bool = True) -> None:
+        """Record that it runs its program step by step, or that it may not do that any more."""
+        self.running, self.stepping = on or self.running, on
 
     # Program mode
 
