@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from multidrop.dialects.files import split_lines
 from multidrop.dialects.on_demand import OnDemand
-from multidrop.dialects.program_files import ProgramFiles, errors
+from multidrop.dialects.program_files import FileLanguage, ProgramFiles, errors
 from multidrop.dialects.text import visible
 
 if TYPE_CHECKING:
@@ -60,7 +60,7 @@ TABLE: Mapping[str, Row] = {
         "multidrop.dialects.tmcl.family:TMCL",
         files=ProgramFiles(
             "TMCL",
-            (".tmc",),
+            (".tmc", ".tmcl"),
             "multidrop.dialects.tmcl.manual.program_file",
             "multidrop.dialects.tmcl.manual.editing",
             ("tmcl",),
@@ -93,18 +93,30 @@ def program_language_of(path: str | os.PathLike[str]) -> str:
 
 
 def correct_in(text: str, besides: str) -> str:
-    """Find the family, another than `besides`, in whose language a program text is correct; empty: there is none.
+    """Find the family, another than `besides`, whose language a program text is; empty: there is none.
 
-    A text without a statement, of remarks alone, is correct in many languages and shows none of them.
+    The text is correct in it; or each of its lines has words of it, and not each has words of the language `besides`. A
+    text without a statement, of remarks alone, is correct in many languages and shows none of them.
     """
-    for name, files in program_languages().items():
-        if name == besides:
-            continue
-        language = files.language
-        stated = any(part.kind != "remark" for line in split_lines(text) for part in language.parts(line))
-        if stated and not errors(language.check(text)):
-            return name
-    return ""
+    known = program_languages()
+    stated = {name: _shares(text, files.language) for name, files in known.items()}
+    others = [name for name in known if name != besides and stated[name][0]]
+    correct = (name for name in others if not errors(known[name].language.check(text)))
+    spoken_throughout = (name for name in others if stated[name][1] and not stated[besides][1])
+    return next(correct, "") or next(spoken_throughout, "")
+
+
+def _shares(text: str, language: FileLanguage) -> tuple[bool, bool]:
+    """Whether a text has a word of a language, and whether each line begins with one and has nothing unknown."""
+    kinds, throughout = set[str](), True
+    for line in split_lines(text):
+        parts = language.parts(line)
+        own = [part for part in parts if part.kind != "remark"]
+        kinds |= {part.kind for part in own}
+        if own or (line.strip() and not parts):
+            begins = bool(own) and own[0].start == len(line) - len(line.lstrip())
+            throughout = throughout and begins and all(part.kind != "wrong" for part in own)
+    return bool(kinds), throughout and bool(kinds & {"word", "starts"})
 
 
 def spoken(data: bytes, besides: str) -> str:

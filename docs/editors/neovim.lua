@@ -1,8 +1,8 @@
 -- Neovim 0.7 to 0.10: put this into ~/.config/nvim/plugin/multidrop.lua.
 vim.api.nvim_create_autocmd({ "BufRead", "BufNewFile" }, {
-  pattern = { "*.mxt", "*.prg", "*.asc", "*.tmc" },
+  pattern = { "*.mxt", "*.prg", "*.asc", "*.tmc", "*.tmcl" },
   callback = function(args)
-    local types = { mxt = "mcode", tmc = "tmcl" }
+    local types = { mxt = "mcode", tmc = "tmcl", tmcl = "tmcl" }
     vim.bo[args.buf].filetype = types[args.file:lower():match("%.(%w+)$")] or "ascript"
   end,
 })

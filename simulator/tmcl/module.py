@@ -23,10 +23,11 @@ from multidrop.dialects.tmcl.manual.commands import (
     Status,
     Version,
 )
-from multidrop.dialects.tmcl.manual.instructions import CONTROL, MEMORY, Wait
+from multidrop.dialects.tmcl.manual.instructions import CONTROL, MEMORY, Wait, Word
 from multidrop.dialects.tmcl.manual.modules import BAUDS, GLOBAL, TEMPERATURE, VOLTAGE, Parameter, module_of
 from multidrop.dialects.tmcl.manual.program_file import compiled, read
 from multidrop.simulator.cell.spec import DriveSpec, WorldSpec
+from multidrop.simulator.tmcl.coordinates import EVERY_MOTOR, NUMBERS, Coordinates
 from multidrop.simulator.tmcl.motor import Motor
 from multidrop.simulator.tmcl.program import Program
 from multidrop.simulator.world import World
@@ -110,6 +111,7 @@ class TmclModule:
         self._global = {number: row.fresh for number, row in {**GLOBAL, **self.table.banks[0]}.items()}
         self._interrupts = dict.fromkeys(self.table.banks[3], 0)
         self._kept_variables: dict[int, int] = {}
+        self._coordinates = Coordinates(len(self.motors))
 
     def __getitem__(self, parameter: Global) -> int:
         return self._global[parameter]
@@ -170,6 +172,7 @@ class TmclModule:
             motor.power(on, now)
         self._outputs = dict.fromkeys(self._outputs, 0)
         self._variables = dict(self._kept_variables)
+        self._coordinates.power_up()
         if on and self._global[Global.AUTOSTART]:
             self.program.run(now)
 
@@ -233,6 +236,8 @@ class TmclModule:
                 return Answer(value=self._global_parameter(call))
             case Command.SIO | Command.GIO:
                 return Answer(value=self._port(call, now))
+            case Word.SCO | Word.GCO | Word.CCO:
+                return Answer(value=self._coordinate(call, now))
         if call.command not in tuple(Command):
             raise Refused(Status.INVALID_COMMAND)
         if call.command == Command.READ_PROGRAM:
@@ -283,9 +288,14 @@ class TmclModule:
             case Command.MST:
                 self._start(motor, Axis.TARGET_VELOCITY, 0, now)
             case Command.MVP:
-                if call.type not in (Move.ABS, Move.REL):
+                if call.type not in tuple(Move):
                     raise Refused(Status.WRONG_TYPE)
+                if call.type == Move.COORD and call.value not in NUMBERS:
+                    raise Refused(Status.INVALID_VALUE)
                 motor.end_search()
+                if call.type == Move.COORD:
+                    motor.go(self._coordinates.of(call.motor, call.value), now)
+                    return call.value
                 if call.type == Move.REL:
                     motor.go_by(call.value, now)
                     return motor.read(Axis.TARGET_POSITION, now)
@@ -303,6 +313,24 @@ class TmclModule:
                 pass
             case _:
                 return self._axis_parameter(motor, call, now)
+        return call.value
+
+    def _coordinate(self, call: Call, now: float) -> int:
+        """Set, read or take a coordinate; motor 255 of SCO and GCO: copy from or to EEPROM."""
+        if call.type not in NUMBERS:
+            raise Refused(Status.WRONG_TYPE)
+        if call.motor == EVERY_MOTOR and call.command == Word.SCO:
+            self._coordinates.restore(call.type)
+            return call.value
+        if call.motor == EVERY_MOTOR and call.command == Word.GCO:
+            self._coordinates.keep(call.type)
+            return call.value
+        if call.motor >= len(self.motors):
+            raise Refused(self.table.wrong_motor)
+        if call.command == Word.GCO:
+            return self._coordinates.of(call.motor, call.type)
+        position = call.value if call.command == Word.SCO else self.motors[call.motor].position(now)
+        self._coordinates.set(call.motor, call.type, position, lasting=bool(self._global.get(Global.COORDINATES)))
         return call.value
 
     def _start(self, motor: Motor, parameter: Axis, value: int, now: float) -> None:

@@ -55,9 +55,10 @@ OPERANDS: Mapping[int, tuple[str, str]] = {
     Word.CALCV: ("V", "value"),
 }
 """Target and second operand: the accumulator, the X register, a user variable, a second one, the value of the line."""
-FROM_ACCUMULATOR: Mapping[int, Command] = {
+FROM_ACCUMULATOR: Mapping[int, Command | Word] = {
     Word.AAP: Command.SAP,
     Word.AGP: Command.SGP,
+    Word.ACO: Word.SCO,
     Word.MVPA: Command.MVP,
     Word.ROLA: Command.ROL,
     Word.RORA: Command.ROR,

@@ -58,12 +58,12 @@ def test_a_test_runs_in_virtual_time(multidrop: Command) -> None:
 
 @pytest.mark.usefixtures("folder")
 def test_a_refused_line_fails_the_test_and_names_its_line(multidrop: Command) -> None:
-    Path("over.tmc").write_text("  SAP 140, 0, 9\n  CALC DIV, 0\n  SCO 1, 0, 5\n  STOP\n")
+    Path("over.tmc").write_text("  SAP 140, 0, 9\n  CALC DIV, 0\n  64 1, 0, 5\n  STOP\n")
     done = multidrop("program", "test", "over.tmc")
     assert done.returncode == 1 and done.stderr.splitlines() == [
         "over.tmc:1: SAP 140, 0, 9 at 0.0010 s: refused with status 4; the line is passed over",
         "over.tmc:2: CALC DIV, 0 at 0.0020 s: division by 0; the line is passed over",
-        "over.tmc:3: SCO 1, 0, 5 at 0.0030 s: the simulated module does not have it; the program ends",
+        "over.tmc:3: 64 1, 0, 5 at 0.0030 s: the simulated module does not have it; the program ends",
     ]
 
 

@@ -13,7 +13,7 @@ from multidrop.dialects.errors import Diagnostic
 from multidrop.dialects.files import split_lines
 from multidrop.dialects.program_files import Block, Offer, Span, UserName, Word, replaced
 from multidrop.dialects.tmcl.manual import help, instructions
-from multidrop.dialects.tmcl.manual.program_file import NAME, Divided, Piece, divided, remark_at
+from multidrop.dialects.tmcl.manual.program_file import NAME, Divided, Piece, divided, negated, remark_at
 
 _LAST = re.compile(r"[A-Za-z_]\w*\Z", re.ASCII)
 _WORD = re.compile(r"[A-Za-z_]\w*", re.ASCII)
@@ -43,8 +43,9 @@ def names(text: str) -> list[UserName]:
     places: dict[str, list[Span]] = {}
     for number, _, found in _divided(text):
         for piece in (found.label, found.name, found.value, *found.fields):
-            if piece is not None and piece.text.upper() in kinds:
-                places.setdefault(piece.text.upper(), []).append(_span(number, piece))
+            named = piece if piece is None else negated(piece) or piece
+            if named is not None and named.text.upper() in kinds:
+                places.setdefault(named.text.upper(), []).append(_span(number, named))
     return [
         UserName(written[word], kinds[word], tuple(declared[word]), tuple(spans), remarks[word])
         for word, spans in places.items()

@@ -75,7 +75,7 @@ RELATIVE_FROM: Mapping[int, str] = {
     1: "counts from here",
     2: "counts from the encoder's position",
 }
-"""The values of axis parameter 127; only some modules have it (in the maker's tables 1240, 1241 and 1276)."""
+"""The values of axis parameter 127; only some modules have it, those that count in microsteps."""
 USER = Parameter("user variable; STGP keeps it without power", INT32)
 USERS = range(256)
 """The numbers of the user variables, in bank 2."""

@@ -1,10 +1,11 @@
-"""Program files of TMCL modules (`.tmc`), in the mnemonics of the maker's IDE: read, checked, assembled, written.
+"""Program files of TMCL modules (`.tmc`, `.tmcl`), in the mnemonics of the maker's IDE: read, assembled, written.
 
 A line is a label, a command, both, or a constant, and a remark:
 
     Speed = 51200           // a name for a number
-    Loop: MVP ABS, 0, Speed
-        WAIT POS, 0, 0
+    Loop: ROR 0, Speed
+        WAIT TICKS, 0, 100
+        ROR 0, -Speed       // the constant with the other sign
         JA Loop             ; the other mark of a remark
 
 Capitals and small letters mean the same. A label is the address of the command that follows it. The file of a program
@@ -100,8 +101,22 @@ class Assembled:
     constants: dict[str, int] = field(default_factory=dict)
     problems: list[Problem] = field(default_factory=list)
 
+    def constant(self, piece: Piece) -> int | None:
+        """The value of a constant, with the other sign behind a minus; None for what is no constant."""
+        opposite = negated(piece)
+        number = self.constants.get((opposite or piece).text.upper())
+        return number if number is None or opposite is None else -number
+
     def wrong(self, line: int, place: Piece, what: str, hint: str = "") -> None:
         self.problems.append(Problem(line, place.column, what, hint))
+
+
+def negated(piece: Piece) -> Piece | None:
+    """The name behind a minus, `Speed` of `-Speed`; None for any other text."""
+    name = piece.text[1:].lstrip(BLANKS)
+    if not piece.text.startswith("-") or not NAME.fullmatch(name):
+        return None
+    return Piece(name, piece.column + len(piece.text) - len(name))
 
 
 def remark_at(line: str) -> int:
@@ -167,7 +182,7 @@ def _declare(made: Assembled, line: Divided, name: Piece, names: dict[str, int])
 
 def _constant(made: Assembled, line: Divided, value: Piece) -> int:
     number = number_of(value.text)
-    number = made.constants.get(value.text.upper()) if number is None else number
+    number = made.constant(value) if number is None else number
     if number is None or number not in instructions.BY_NUMBER[-1].valid:
         hint = "valid: a number, or a constant of a line before"
         made.wrong(line.number, value, f"a constant cannot be {value.text!r}", hint)
@@ -205,8 +220,8 @@ def _value(made: Assembled, line: Divided, given: Piece, wanted: Field) -> int |
     """The number of one field; None where it is wrong, and noted unless another field of the line is."""
     name = given.text.upper()
     number = wanted.read(given.text)
-    if number is None and name in made.constants:
-        number = wanted.read(str(made.constants[name]))
+    if number is None and (constant := made.constant(given)) is not None:
+        number = wanted.read(str(constant))
     if number is None and wanted.label:
         number = made.labels.get(name)
     if number is not None:
@@ -220,7 +235,10 @@ def _value(made: Assembled, line: Divided, given: Piece, wanted: Field) -> int |
         hint = f"is {near[0]} meant? (in any letters)" if near else wanted.hint
         made.wrong(line.number, given, f"no label {given.text}", hint)
     else:
-        made.wrong(line.number, given, f"{wanted.name} cannot be {given.text!r}", wanted.hint)
+        opposite = negated(given)
+        unknown_name = opposite is not None and opposite.text.upper() not in made.constants
+        hint = f"no constant {opposite.text}" if opposite is not None and unknown_name else wanted.hint
+        made.wrong(line.number, given, f"{wanted.name} cannot be {given.text!r}", hint)
     return None
 
 

@@ -81,7 +81,7 @@ def test_no_refusal_names_a_range_that_contains_the_value(
 ) -> None:
     name, value = write
     device = drive(personality=product)
-    for line in before:
+    for line in (*before, "ER=0"):
         device.execute(line, 0.0)
     refusal = typed(ModbusPort(device), f"{name}={value}", product)
     if "exception 03" not in refusal:

@@ -10,6 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from multidrop.dialects.families import correct_in, program_language_of
 from multidrop.dialects.files import SourceLine
 from multidrop.dialects.program_files import errors
 from multidrop.dialects.tmcl.manual import editing, instructions, program_file
@@ -227,3 +228,67 @@ def test_the_editor_knows_labels_constants_and_fields() -> None:
     assert [each.text for each in editing.offers("  DJ", named.values(), "")] == ["DJNZ"]
     assert editing.describe("DJNZ", "")[1].endswith("DJNZ variable, label")
     assert [each.name for each in program_file.entries(text)] == ["0", "Loop"]
+
+
+# A minus before a constant
+
+
+def test_a_minus_before_a_constant_gives_the_opposite_number() -> None:
+    text = "Dist = 1000\nBack = -Dist\nROR 0, -dist\nMVP REL, 0, - Back\nMVP ABS, 0, Back\nSAP 194, 0, -5\nSTOP\n"
+    assert check(text) == []
+    assert [each.call.value for each in compiled(program_file.read(text, "x"))] == [-1000, 1000, -1000, -5, 0]
+
+
+@given(st.integers(-(2**31) + 1, 2**31 - 1), st.booleans())
+def test_any_constant_may_be_negated(number: int, hexadecimal: bool) -> None:
+    written = f"0x{number:X}" if hexadecimal and number >= 0 else str(number)
+    text = f"N = {written}\nM = -N\nROR 0, -N\nROR 0, M\nROR 0, -M\nSTOP\n"
+    assert errors(check(text)) == []
+    assert [each.call.value for each in compiled(program_file.read(text, "x"))] == [-number, -number, number, 0]
+
+
+@pytest.mark.parametrize(
+    ("text", "line", "what", "hint"),
+    [
+        ("ROR 0, -Speed\nSTOP", 1, "value cannot be '-Speed'", "no constant Speed"),
+        ("N = 5\nMVP ABS, -N, 1\nSTOP", 2, "motor cannot be '-N'", "valid: 0 to 255"),
+        ("N = -2147483648\nM = -N\nSTOP", 2, "a constant cannot be '-N'", "valid: a number, or a constant of a line"),
+        ("M = -N\nN = 5\nSTOP", 1, "a constant cannot be '-N'", "valid: a number, or a constant of a line before"),
+        ("L: JA -L", 1, "label cannot be '-L'", "no constant L"),
+        ("N = 5\nROR 0, --N\nSTOP", 2, "value cannot be '--N'", "valid: "),
+    ],
+)
+def test_what_a_minus_cannot_precede(text: str, line: int, what: str, hint: str) -> None:
+    first = errors(check(text))[0]
+    assert (first.line, first.what) == (line, what) and first.hint.startswith(hint), first
+
+
+def test_a_constant_is_renamed_behind_a_minus_too() -> None:
+    text = "Dist = 10\nROR 0, -Dist ; -Dist\nROR 0, Dist\nSTOP\n"
+    (name,) = editing.names(text)
+    assert [(place.line, place.start, place.stop) for place in name.places] == [(0, 0, 4), (1, 8, 12), (2, 7, 11)]
+    assert editing.renamed(text, name, "Far", "") == "Far"
+
+
+# Whose language a text is
+
+
+WHOLE = "Dist = 1000\nLoop: MVP ABS, 0, Dist\nWAIT POS, 0, 0\n  JA Loop // on\n"
+
+
+def test_a_file_whose_lines_are_all_tmcl_is_named_as_such_even_with_errors() -> None:
+    for text in (WHOLE, WHOLE.replace("JA Loop", "JA Lop"), WHOLE.replace("ABS, 0", "ABS, 999"), "MVP ABS, 0, Foo\n"):
+        assert correct_in(text, "mcode") == correct_in(text, "pmx") == "tmcl"
+    assert correct_in(WHOLE + "JUMP Loop\n", "mcode") == ""  # a line that is none
+    assert correct_in("PRG 0\nX1000\nWAITZ\nJOGX+\nEND\n", "mcode") == "pmx"
+
+
+def test_a_text_of_its_own_language_stays_that_with_errors() -> None:
+    assert correct_in(WHOLE.replace("JA Loop", "JA Lop"), "tmcl") == ""
+    assert correct_in("STOP\n", "pmx") == "tmcl"  # correct in both; asked only where it is wrong in its own
+    assert correct_in("PG 1\nLB K1\nMR 5\nBR K2\nE\nPG\n", "mcode") == ""
+
+
+@pytest.mark.parametrize("ending", [".tmc", ".tmcl", ".TMCL"])
+def test_the_endings_of_a_file(ending: str) -> None:
+    assert program_language_of("shuttle" + ending) == "tmcl"

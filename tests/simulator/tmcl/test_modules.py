@@ -32,7 +32,7 @@ def test_the_tables_have_the_numbers_of_the_makers_library():
     assert done.returncode == 0, done.stderr
     for name, (axis, bank_0, bank_3, ports, motors) in json.loads(done.stdout).items():
         own = MODULES[name]
-        assert sorted(own.axis) == sorted(axis.values()), name
+        assert set(own.axis) == set(axis.values()), name  # a number may have two names
         assert [sorted(own.banks[bank]) for bank in (0, 3)] == [sorted(bank_0.values()), sorted(bank_3.values())], name
         inputs = {n for word, n in ports.items() if word.startswith(("IN", "AIN"))}
         analog = {n for word, n in ports.items() if word.startswith(("AIN", "VIN"))}
