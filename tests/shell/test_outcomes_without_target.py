@@ -207,3 +207,23 @@ async def test_an_error_of_a_controller_is_not_cleared_after_a_failed_motion(tmp
         assert failure.outcome == "limit" and str(failure).endswith("'CLRX' was not sent")
         await sent(session, "CLRX", "ABS", "X0", "/wait stopped", "V1=778")
         assert await asked(session, "V1") == 778
+
+
+# What is said of an end
+
+
+async def test_bridges_that_are_switched_off_on_the_way_are_the_reason(tmp_path: Path) -> None:
+    async with on(tmp_path, **SLOW) as session:
+        failure = await failed(session, "MA 25000", "/sleep 0.2", "DE=0", "/wait stopped", "R1=777")
+        assert (failure.outcome, failure.reason) == ("power", "its output bridges are off (DE=0)")
+        await typed(session, "DE=1")
+        await sent(session, "MA 0", "/wait stopped", "DE=0", "/wait stopped", "R1=778")
+        assert await value(session, "R1") == 778
+
+
+async def test_an_error_of_the_program_that_was_started_is_not_called_old(tmp_path: Path) -> None:
+    async with on(tmp_path, **SLOW) as session:
+        await typed(session, "PG 1", "LB G1", "MR 500", "H", "VM=1", "E", "PG")
+        failure = await failed(session, "EX G1", "/wait idle", "R1=777")
+        assert failure.reason.startswith("error 21")
+        assert not any("old error" in each for each in noted(session))

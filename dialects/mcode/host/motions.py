@@ -35,7 +35,7 @@ SIGNS = ("EF", "MV", "BY", "ST", "P", "AF", "TE")
 """What is read before a motion."""
 END = ("EF", "BY", "MP", "ST", "EE", "P", "DB", "AF", "AS")
 """What is read at its end."""
-FLAGS = frozenset({"EF", "MV", "BY", "MP", "ST", "EE", "JE", "FL", "LK"})
+FLAGS = frozenset({"EF", "MV", "BY", "MP", "ST", "EE", "JE", "FL", "LK", "DE"})
 """Those of one digit: no separator follows them, as a line has at most 64 characters."""
 FREE = ("TE", "JE", "FL")
 """What lets a drive move without a line of ours: armed trips, jog inputs, a clock that it follows."""
@@ -222,8 +222,10 @@ def _judge(access: Access[S], state: S, evidence: Evidence) -> Procedure[Ending 
         return ending
     if found.get("EE") and found.get("MP"):
         return None  # position maintenance may still correct it
-    free = yield from access.values(state, FREE)
-    return ending if any(free.values()) else replace(ending, outcome=Outcome.STOPPED)
+    free = yield from access.values(state, (*FREE, "DE"))
+    if not free.get("DE", 1):
+        return replace(ending, outcome=Outcome.POWER, reason="its output bridges are off (DE=0)")
+    return ending if any(free.get(each) for each in FREE) else replace(ending, outcome=Outcome.STOPPED)
 
 
 def _makes_up(access: Access[S], state: S, found: Mapping[str, int]) -> Procedure[bool]:
