@@ -9,7 +9,7 @@ WORKERS := $(shell $(PYTHON) -c 'import os; print((os.cpu_count() or 1) + 2)')
 PYTEST = $(BIN)/python -m pytest --dist worksteal -n $(WORKERS)
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
 
-.PHONY: demo test quick nightly check format lint types types-here types-darwin types-win32 contracts measured unmeasured coverage bench readme shipped pictures docs package release fuzz soak simulate snapshots windows clean
+.PHONY: demo test quick nightly check format lint types types-here types-darwin types-win32 contracts measured unmeasured mutants coverage bench readme shipped pictures docs package release fuzz soak simulate snapshots windows clean
 
 demo: $(VENV)/.run
 	$(BIN)/multidrop demo
@@ -18,8 +18,9 @@ test: $(VENV)/.dev
 	$(PYTEST)
 
 # One process a core: nothing here waits, and each collects for seconds.
+QUICK := not process and not tui and not wide and not slow
 quick: $(VENV)/.dev
-	$(BIN)/python -m pytest --dist worksteal -n $(shell $(PYTHON) -c 'import os; print(os.cpu_count() or 1)') -m "not process and not tui and not wide and not slow" --hypothesis-profile=quick
+	$(BIN)/python -m pytest --dist worksteal -n $(shell $(PYTHON) -c 'import os; print(os.cpu_count() or 1)') -m "$(QUICK)" --hypothesis-profile=quick
 
 nightly: $(VENV)/.dev
 	MULTIDROP_KILLS=12 $(PYTEST) --nightly --hypothesis-profile=search
@@ -57,10 +58,17 @@ contracts: $(VENV)/.dev
 measured: $(VENV)/.dev
 	$(PYTEST) --cov --cov-report=
 
-# Choose anew the tests that coverage leaves out, once `make check` has become slow: it takes half an hour.
+# Measure again which tests coverage leaves out, and which tests execute which line (for `make mutants`): half an hour.
 unmeasured: $(VENV)/.dev
-	$(PYTEST) --measure-all --cov --cov-report= --cov-context=test --durations=0 > $(VENV)/durations.txt
+	-$(PYTEST) --measure-all --cov --cov-report= --cov-context=test --durations=0 > $(VENV)/durations.txt
 	$(BIN)/python -m tests.support.choose_measured .coverage $(VENV)/durations.txt
+	$(BIN)/python -m pytest --collect-only -q -m "$(QUICK)" > $(VENV)/quick.txt
+	$(BIN)/python -m soak.drawn --measured .coverage $(VENV)/durations.txt $(VENV)/quick.txt
+
+# Draw mutants of the product by a seed, and say which of them the tests and the seeds see: ROOM=drives N=100 SEED=7.
+mutants: $(VENV)/.dev
+	$(BIN)/python -m soak.drawn $(if $(ROOM),--room $(ROOM)) $(if $(N),--count $(N)) $(if $(SEED),--seed $(SEED)) \
+	  $(if $(JOBS),--jobs $(JOBS))
 
 coverage: measured
 	$(BIN)/coverage report

@@ -44,7 +44,9 @@ _MODULES = {
 _PLACES = {name: f"multidrop.dialects.{module}:{name}" for module, names in _MODULES.items() for name in names}
 
 
-def __getattr__(name: str) -> Any:
-    if name not in _PLACES:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return imported(_PLACES[name])
+if not TYPE_CHECKING:  # else a checker of types would take any name
+
+    def __getattr__(name: str) -> Any:
+        if name not in _PLACES:
+            raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+        return imported(_PLACES[name])

@@ -97,7 +97,7 @@ class Reply:
     acknowledged: bool = False
     """The drive confirmed execution: a prompt `>`, or ACK."""
     detail: str = ""
-    """The damage, for DAMAGED."""
+    """The damage, for DAMAGED; what came in place of the reply, for TIMEOUT."""
     raw: bytes = b""
     """The bytes of the reply; set by the line."""
     body: bytes = b""
@@ -260,9 +260,20 @@ class Codec(ABC):
         """
         return ()
 
+    def repeated(self, sent: bytes, rest: bytes, over: bool) -> bool:
+        """Whether an adapter, and no drive, has repeated the bytes of a request. `rest`: what came after them.
+
+        `over`: no more comes. A language whose drives repeat nothing needs no more than the bytes.
+        """
+        return True
+
     def damaged(self, line: str) -> bool:
         """Whether a checksum shows that an unsolicited line was damaged on the wire."""
         return False
+
+    def printed(self, line: str) -> bool:
+        """Whether a drive can send this line without a question: its program prints it, or it reports by itself."""
+        return True
 
     def answers_host(self, line: str) -> bool:
         """Whether an unsolicited line is a late reply: only a question of multidrop has this form."""

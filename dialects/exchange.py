@@ -11,7 +11,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Generic, TypeVar
 
-from multidrop.dialects.codec import End, Procedure, Reply, Request
+from multidrop.dialects.codec import End, Kind, Procedure, Reply, Request
 from multidrop.dialects.errors import NoAnswer, Refused, Stopped
 from multidrop.dialects.state import DriveState
 
@@ -36,8 +36,8 @@ class Exchange(Generic[S]):
     """
     lost: Callable[[S, Request], None]
     """Record that the reply to a request may arrive late."""
-    refusal: Callable[[S, Request, Reply], Refused]
-    """Describe a refusal."""
+    refusal: Callable[[S, Request, Reply], Refused | NoAnswer]
+    """Describe a refusal; NoAnswer: that of another line."""
     send: Callable[[S, Request], Procedure[Reply]] = lambda state, request: _once(request)
     """Send a request once."""
 
@@ -57,6 +57,8 @@ class Exchange(Generic[S]):
             yield from self.beyond_doubt(state, request)
         state.settings_confirmed()
         if reply.end is End.REFUSED:
+            if request.kind is Kind.COMMAND and not (reply.doubtful or state.programming):
+                yield from self.beyond_doubt(state, request)  # the refusal of another program's line has no other sign
             raise self.refusal(state, request, reply)
         return reply
 
@@ -92,4 +94,7 @@ def unanswered(who: str, request: Request, reply: Reply | None = None) -> NoAnsw
             f"{who}: the reply to '{request.text}' is damaged ({reply.detail}); it may have been executed and "
             "was not sent again"
         )
-    return NoAnswer(f"{who} does not reply: it is not known whether '{request.text}' was executed; it was sent once")
+    why = f" ({reply.detail})" if reply is not None and reply.detail else ""
+    return NoAnswer(
+        f"{who} does not reply{why}: it is not known whether '{request.text}' was executed; it was sent once"
+    )

@@ -9,8 +9,9 @@ import os
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from multidrop.dialects.files import split_lines
 from multidrop.dialects.on_demand import OnDemand
-from multidrop.dialects.program_files import ProgramFiles
+from multidrop.dialects.program_files import ProgramFiles, errors
 from multidrop.dialects.text import visible
 
 if TYPE_CHECKING:
@@ -40,6 +41,7 @@ TABLE: Mapping[str, Row] = {
             "multidrop.dialects.mcode.manual.editing",
             ("mcode", "mxt"),
             {"lexium": "multidrop.dialects.mcode.manual.conversion"},
+            "multidrop.dialects.mcode.manual.supported:unsupported",
         ),
     ),
     "modbus": Row("multidrop.dialects.modbus.family:MODBUS", scheme="modbus"),
@@ -88,6 +90,21 @@ def program_language_of(path: str | os.PathLike[str]) -> str:
     ending = os.path.splitext(path)[1].lower()
     found = (name for name, files in program_languages().items() if ending in files.endings)
     return next(found, DEFAULT)
+
+
+def correct_in(text: str, besides: str) -> str:
+    """Find the family, another than `besides`, in whose language a program text is correct; empty: there is none.
+
+    A text without a statement, of remarks alone, is correct in many languages and shows none of them.
+    """
+    for name, files in program_languages().items():
+        if name == besides:
+            continue
+        language = files.language
+        stated = any(part.kind != "remark" for line in split_lines(text) for part in language.parts(line))
+        if stated and not errors(language.check(text)):
+            return name
+    return ""
 
 
 def spoken(data: bytes, besides: str) -> str:

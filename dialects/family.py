@@ -222,6 +222,8 @@ class Protection:
     """What may keep a drive of a product silent, or have it refuse every value; no product: not known which."""
     word: Callable[[str], str]
     """The word to which a line gives a value; empty: it gives none."""
+    besides: str = ""
+    """Another cause of silence, which is named before it."""
 
 
 @dataclass(frozen=True)
@@ -302,6 +304,11 @@ class Family(Generic[S]):
     """Whether the tables show nothing for which a drive of a product would refuse a line."""
     protection: Protection | None = None
     """None: its drives have none."""
+    addressed: Callable[[str, str], tuple[str, str] | None] = lambda text, product: None
+    """A line that is one of the language only after an address at its head, as on the wire: the address, and the rest.
+
+    The second argument is the product of the drive for which it was typed. None: the line has no address.
+    """
     prepare: Callable[[], object] | None = None
     """Slow work before the first message, safe in any thread; None: there is none."""
 

@@ -17,6 +17,7 @@ from typing import Any, NamedTuple, Protocol, cast
 from multidrop.dialects.comments import ENTER, behind_number, enter_in, grouped_at
 from multidrop.dialects.errors import Diagnostic, Refused
 from multidrop.dialects.files import SourceLine
+from multidrop.dialects.on_demand import imported_if
 
 
 class Problem(NamedTuple):
@@ -211,6 +212,16 @@ class ProgramFiles(NamedTuple):
     """The names by which editors know the language."""
     converters: Mapping[str, str] = MappingProxyType({})
     """By the name of what they convert to: modules that are a `Converter`."""
+    unsupported_at: str = ""
+    """The place of a function that warns of what one unit lacks: of a text, a product, a version and a part number.
+
+    Empty: every unit of a product has all of its commands, as far as is known.
+    """
+
+    def unsupported(self, text: str, product: str, version: str, part: str) -> list[Problem]:
+        """Warn of what a program uses and one unit lacks, by the version and the part number that it reports."""
+        found: Callable[[str, str, str, str], list[Problem]] | None = imported_if(self.unsupported_at)
+        return found(text, product, version, part) if found is not None and (version or part) else []
 
     @property
     def language(self) -> FileLanguage:

@@ -46,8 +46,6 @@ class Outcome:
 
     remarks: tuple[str, ...] = ()
     """Replies that could not be read, in words."""
-    echo: bool = False
-    """The adapter repeats what it sends: the search ended, to begin again with `echo=local`."""
 
 
 Found = Callable[[S], None]

@@ -98,6 +98,8 @@ class DriveState:
     """In program mode: the drive stores every line."""
     error: bool = False
     """The drive's error flag is set from before, or may be; the next refusal must be distinguished from it."""
+    others_heard: bool = False
+    """Bytes came without a request since the flag was seen clear: another program may have caused an error."""
     last_error: int = 0
     """The number of the last error that was read of it, which cleared it; 0: none was read."""
     errors: ErrorsRead = field(default_factory=ErrorsRead)
@@ -110,6 +112,8 @@ class DriveState:
     """A program was started or seen to run."""
     unreferenced: frozenset[str] = frozenset()
     """The axes whose position does not count since a restart; the empty name is an only axis."""
+    recounts: int = 0
+    """How often something may have changed the length or the direction of what its axes count."""
     restore: Owed | None = None
     """Its settings before a conversation changed them for a while; None once they are restored."""
     sync_marks: int = 0
@@ -172,6 +176,10 @@ class DriveState:
 
     # Settings and error flag
 
+    def came_unasked(self) -> None:
+        """Record bytes that no request asked for, unless a program of the drive prints."""
+        self.others_heard = not self.running
+
     def settings_may_have_changed(self) -> None:
         """Record a restart, a lost reply to a setting, or a broadcast: the settings are unknown."""
         self.settings_unknown = True
@@ -186,7 +194,7 @@ class DriveState:
 
     def error_flag_read(self, flag: bool, code: int = 0) -> None:
         """Record the error flag. `code`: the number of the error, which the drive cleared as it was read."""
-        self.error = flag
+        self.error, self.others_heard = flag, self.others_heard and flag
         if code:
             self.last_error = code
             self.errors.add(code)
@@ -201,10 +209,18 @@ class DriveState:
         """Take over what is known of the same drive from before a lost connection."""
         self.reference_lost(before.unreferenced)
         self.last_error, self.errors.at = before.last_error, before.errors.at
+        self.recounts = before.recounts + 1  # it was out of sight
 
     def referenced(self, *axes: str) -> None:
         """Record that a homing of these axes has ended, or that their position was set; none: of all axes."""
         self.unreferenced = self.unreferenced - frozenset(axes) if axes else frozenset()
+
+    def counts_may_have_changed(self, restarted: bool = False) -> None:
+        """Record that its settings may give a count another length or direction than when they were last read.
+
+        `restarted`: it was switched off and on, or may have been, and is set as it was saved.
+        """
+        self.recounts += 1
 
     # What is to be restored
 

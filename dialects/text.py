@@ -6,6 +6,8 @@ clipboard, and a C1 code is an escape sequence in one character. Direction chara
 
 from __future__ import annotations
 
+DECIMAL = r"[+-]?(?:\d{1,16}(?:\.\d{0,24})?|\.\d{1,24})"
+"""The number of a quantity, in a pattern; also with all the places of a Python number: 0.30000000000000004."""
 ACTING = (
     (0x00, 0x1F),  # C0
     (0x7F, 0x9F),  # DEL and C1
@@ -66,3 +68,26 @@ def real(text: str) -> float | None:
 def counted(number: int, one: str, many: str = "") -> str:
     """Format a number of things, as `1 line` or `3 lines`. `many`: a plural that is not made by an s."""
     return f"{number} {one if number == 1 else many or f'{one}s'}"
+
+
+# Names and texts of others in command lines and tables.
+
+_FORMULA = ("=", "+", "-", "@", "\t", "\r", "\n")
+"""A spreadsheet takes a cell that begins so for a formula, and a shell a word that begins with `-` for an option."""
+NOT_FIRST = "not -, =, + or @ first"
+
+
+def acts_first(name: str) -> bool:
+    """Whether a name would act by its first character in a command line or in a table."""
+    return name[:1] in _FORMULA
+
+
+def cell(text: str) -> str:
+    """Return a text as a cell of a CSV file: with `'` before what a spreadsheet would take for a formula."""
+    acts = acts_first(text.lstrip("'")) and real(text) is None
+    return f"'{text}" if acts else text
+
+
+def of_cell(text: str) -> str:
+    """Return the text of such a cell."""
+    return text[1:] if text.startswith("'") and acts_first(text.lstrip("'")) else text

@@ -18,9 +18,10 @@ from fractions import Fraction
 from functools import cached_property
 from typing import Any, Generic, NamedTuple, TypeVar
 
-from multidrop.dialects.codec import Procedure
+from multidrop.dialects.codec import Procedure, Request
 from multidrop.dialects.errors import Diagnostic
 from multidrop.dialects.state import DriveState
+from multidrop.dialects.text import DECIMAL
 
 LENGTH, ANGLE, MOTOR = "length", "angle", "motor"
 """The kinds of units; each own word is a kind of its own."""
@@ -44,14 +45,15 @@ SPOILT = Fraction(1, 100)
 """The greatest part of a value by which rounding to a count may change it."""
 DIGITS = 3
 """The least number of digits that a shown value has: typed back, it is not spoilt."""
+LOW, HIGH = -(2**31), 2**31 - 1
+"""The numbers that every family takes; a word may take fewer, as its drive then says."""
 MOST = 16
 """The greatest number of decimal places."""
-_NUMBER = r"[+-]?(?:\d{1,16}(?:\.\d{0,16})?|\.\d{1,16})"
-QUANTITY = re.compile(rf"\{{(?P<number>{_NUMBER}) (?P<unit>[A-Za-z][A-Za-z0-9_/]*)\}}", re.ASCII)
+QUANTITY = re.compile(rf"\{{(?P<number>{DECIMAL}) (?P<unit>[A-Za-z][A-Za-z0-9_/]*)\}}", re.ASCII)
 """A quantity in a line; any other braces are none."""
-_VALUE = re.compile(rf"\s*({_NUMBER})\s+(\S+)\s*", re.ASCII)
-_SCALE = re.compile(rf"\s*({_NUMBER})\s+([^\s/]+)\s*/\s*(\S+)\s*", re.ASCII)
-_TRAVEL = re.compile(rf"\s*({_NUMBER})\s*\.\.\s*({_NUMBER})\s+(\S+)\s*", re.ASCII)
+_VALUE = re.compile(rf"\s*({DECIMAL})\s+(\S+)\s*", re.ASCII)
+_SCALE = re.compile(rf"\s*({DECIMAL})\s+([^\s/]+)\s*/\s*(\S+)\s*", re.ASCII)
+_TRAVEL = re.compile(rf"\s*({DECIMAL})\s*\.\.\s*({DECIMAL})\s+(\S+)\s*", re.ASCII)
 _COMMA = re.compile(r"\d,\d")
 _OWN = re.compile(r"[A-Za-z][A-Za-z0-9_]*", re.ASCII)
 KEYS = ("scale", "zero", "travel", "full_steps")
@@ -244,11 +246,15 @@ def _loads(own: Sequence[str]) -> tuple[str, ...]:
     return (*(name for name, (kind, _) in PLACES.items() if kind != MOTOR), *own)
 
 
+Settings = tuple[tuple[str, str], ...]
+"""Names and values."""
+
+
 @dataclass(frozen=True)
 class Basis:
     """What the counting of an axis rests on, as read from its drive."""
 
-    settings: tuple[tuple[str, str], ...] = ()
+    settings: Settings = ()
     """Names and values; where one differs later, no quantity is sent."""
     turn: Fraction | None = None
     """Counts of one turn of the motor; None where nothing tells."""
@@ -287,6 +293,8 @@ class Measure:
         """The drive's number for a quantity. Raises Diagnostic where it cannot be that, or rounding spoils it."""
         count, zero = self._factors(given, takes)
         number = round((given.base - zero) / count)
+        if not LOW <= number <= HIGH:
+            raise Diagnostic(f"{given} is {number} for the drive", "", f"its numbers go from {LOW} to {HIGH}")
         back = number * count + zero
         if given.value and abs(back - given.base) > SPOILT * abs(given.base):
             near = f"{decimal(back / given.unit.factor, 9)} {given.unit.name}"
@@ -385,6 +393,24 @@ class Measure:
 BY_STEP = "give the scale by the step, as in 0.4 um/step, or full_steps"
 
 
+def strange_brace(text: str) -> str:
+    """The first brace of a line, with what it encloses, that is of no quantity; empty: there is none.
+
+    What is in quotation marks is a text. No language of a drive has braces.
+    """
+    bare = QUANTITY.sub("", re.sub(r'"[^"]*(?:"|$)', '""', text))
+    found = re.search(r"\{[^{}]*\}?|\}", bare)
+    return found[0].strip() if found is not None else ""
+
+
+def unsendable(text: str) -> str:
+    """The reason for which a line with braces must not go to a drive as it is; empty: its braces are in a text."""
+    for match in quantities(text):
+        return f"{match[0]} is not converted here"
+    brace = strange_brace(text)
+    return f"{brace} is not a quantity" if brace else ""
+
+
 def _places(value: Fraction) -> int:
     """Decimal places that the first digit of a value has; negative for whole numbers of several digits."""
     return -math.floor(math.log10(value))
@@ -437,6 +463,8 @@ class Units(Generic[S]):
     """Read what the counting of an axis rests on; the last: its full steps a turn, where a person gave them."""
     disturbs: Callable[[S, str], Collection[str]]
     """The axes whose positions may count from elsewhere, or otherwise, after a line."""
+    recounts: Callable[[Request], bool]
+    """Whether a request, once executed, may change what the counting of an axis rests on."""
     reads: Callable[[S, str], tuple[str, Takes] | None]
     """What a question prints: its axis, and how that counts; None: no quantity."""
     setting: Callable[[S, str], tuple[str, Takes] | None] | None = None

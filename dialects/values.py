@@ -191,7 +191,7 @@ def differing(
 
 
 UNREAD = -1
-"""An error is set, and to read its number would clear it."""
+"""An error is set, and it has no number, or to read the number would clear it."""
 Facts = Mapping[str, Value]
 """What parts have read, by name."""
 
@@ -226,6 +226,10 @@ class Conditions:
     error: int = 0
     """The number of the error that is set; 0: none; UNREAD: its number is not known."""
     error_text: str = ""
+    clears: str = ""
+    """The line that clears the error, where the axis takes no move before it; empty: it takes moves."""
+    cause: str = ""
+    """What caused an error without a number, in few words, as far as readings that change nothing show it."""
     program: str = ""
     """The label of the program that runs, or `running`; empty: none runs."""
     runs: bool | None = None
@@ -250,6 +254,16 @@ class Conditions:
     pace: Pace | None = None
     modes: str = ""
     """How the drive is set to reply, as short as a person knows it: `EM1 CK1`."""
+
+    @property
+    def error_name(self) -> str:
+        """`error`, with its number where the family gives a meaning to that: `/help NUMBER` explains it."""
+        return "error" if self.error == UNREAD or self.clears else f"error {self.error}"
+
+    @property
+    def blocked(self) -> str:
+        """The reason for which the axis takes no move, and what ends that; empty: it takes moves."""
+        return f"{self.error_text}: {self.clears} clears it" if self.error and self.clears else ""
 
     @property
     def speed_unit(self) -> str:

@@ -24,7 +24,9 @@ from multidrop.dialects.program_files import Held, ProgramFiles
 from multidrop.dialects.state import DriveState
 from multidrop.dialects.values import Value
 from multidrop.drives.conversations import ASKING, Conversation, Conversations, OnOver, awaited, refuse_stranger
+from multidrop.drives.counting import Counting, note
 from multidrop.drives.events import Changed, Outcome, Transaction
+from multidrop.drives.line_checks import check_name, check_quantities
 from multidrop.drives.link import Link
 from multidrop.drives.motion_record import MotionRecord
 from multidrop.drives.port_journal import GLOBAL
@@ -80,6 +82,8 @@ class Drive:
         """Settings as last read, by the part of the conditions, and the number of `commands` then."""
         self.anchored: frozenset[str] = frozenset()
         """The axes whose positions are places of the machine: setting a position gives them no reference."""
+        self.counting = Counting()
+        """What the scales of its axes rest on."""
         self.missing = False
         """It did not reply to the last request; replies since then are not compared yet."""
         self.started_at = float("-inf")
@@ -207,13 +211,15 @@ class Drive:
 
     def check_line(self, text: str) -> None:
         """Raise Inexpressible for a line that cannot be sent whole, or that its language lacks."""
-        if "{" in text:
-            from multidrop.dialects.units import quantities
-
-            for match in quantities(text):
-                raise Inexpressible(f"{self.shown}: '{text}': {match[0]} is not converted here; nothing was sent")
+        check_quantities(self.shown, text)
+        self.check_address(text)
         if self.state.address not in GLOBAL or self.codec.broadcasts:  # else each drive that the line is for checks it
             self.family.check_line(self.state, text)
+
+    def check_address(self, text: str) -> None:
+        """Raise Inexpressible for a line that begins with the address of a drive of this line, as on the wire."""
+        found = self.family.addressed(text, self.state.product)
+        check_name(self.shown, text, found, [(each.address, each.state.name) for each in self._neighbours.all_drives])
 
     async def _send(self, text: str, check: Check | None) -> tuple[str, ...]:
         to_all = self.state.address in GLOBAL
@@ -333,6 +339,7 @@ class Drive:
         for drive in others:
             drive._disturbed(text)
             drive.calm = False  # what was read of it before says nothing of what is read next
+            drive.resting = (drive.resting[0], drive.commands - 1, {})
             drive.settings.clear()
             if self.state.settings_unknown:
                 drive.state.settings_may_have_changed()
@@ -379,6 +386,10 @@ class Drive:
 
         return self.start(family.motion(self.state, priority), over)
 
+    def scale_holds(self, axis: str) -> bool:
+        """Whether the scale of an axis rests on what was accepted, as far as is known."""
+        return self.counting.holds(axis, self.state.recounts)
+
     async def rest(self) -> tuple[int, ...] | None:
         """Read whether it rests: None while it moves; else what a reading REST later must show again, too."""
         at = self.link.now()
@@ -413,6 +424,8 @@ class Drive:
             self.requests += transaction.sent
             if transaction.request.kind not in ASKING:
                 commanded, self.commands = True, self.commands + transaction.sent
+            if transaction.sent:
+                note(self._meant, transaction.request)
 
         def over(outcome: Outcome[T]) -> None:
             self._neighbours.conversation_ended(self, address, commanded or isinstance(outcome.error, Stopped))
@@ -421,6 +434,7 @@ class Drive:
                 self.missing = True
             elif self.missing and outcome.error is None and not state.programming:
                 self.missing = False
+                self.state.counts_may_have_changed()  # it may have been switched off and on
                 self._neighbours.replied_again(self)
             if (state.address, state.programming, state.codec) != before:
                 link.publish(Changed(link.now(), state.address))

@@ -150,6 +150,15 @@ class Lost(NamedTuple):
     error: TransportLost
 
 
+class Restarted(NamedTuple):
+    """A drive was restarted: what was known of its program and its settings is not what it holds."""
+
+    at: float
+    address: str
+    certain: bool = True
+    """False: it may have been, and nothing that is read of it would show that."""
+
+
 class Changed(NamedTuple):
     """A drive or the bus changed state: opened, lost, in or out of program mode, renamed."""
 
@@ -157,7 +166,9 @@ class Changed(NamedTuple):
     address: str = ""
 
 
-BusEvent = Sent | Ended | Unsolicited | Notice | Traffic | Sample | Valued | Conditioned | Silent | Lost | Changed
+BusEvent = (
+    Sent | Ended | Unsolicited | Notice | Traffic | Sample | Valued | Conditioned | Silent | Lost | Restarted | Changed
+)
 
 
 E = TypeVar("E")

@@ -180,9 +180,13 @@ class Debris:
         self._sent += data.decode("latin-1")
         self._until = transmitted + LASTS
 
+    def may_come(self, now: float) -> bool:
+        """Whether bytes may still be those that a stop leaves."""
+        return now <= self._until
+
     def removed(self, lines: tuple[str, ...], known: re.Pattern[str] | None, now: float) -> tuple[str, ...]:
         """Unsolicited lines without debris. `known`: what only a stop leaves in this language."""
-        if now > self._until:
+        if not self.may_come(now):
             return lines
         expect = self._asked.expect if self._asked is not None else None
 
@@ -276,6 +280,44 @@ class LocalEcho:
         return self.wrote(b"")
 
 
+WATCHED = 24
+"""Requests of an opening in which the repetition of our own bytes is looked for."""
+ENOUGH = 4
+"""Fewer bytes than these prove nothing where others came before them."""
+
+
+class EchoWatch:
+    """Looks for an adapter that repeats what it sends, in the first requests on a port.
+
+    A drive may repeat a line, too: the codec of the request says which of the two it was.
+    """
+
+    def __init__(self) -> None:
+        self._left = WATCHED
+        self._codec: Codec | None = None
+        self._sent = self._heard = b""
+
+    def wrote(self, data: bytes, codec: Codec | None) -> None:
+        """Look for these bytes from now on. `codec`: that of a request; None: they are not looked for."""
+        self._left -= codec is not None
+        self._codec = codec if self._left >= 0 else None
+        self._sent, self._heard = data, b""
+
+    def repeated(self, data: bytes, over: bool = False) -> bytes:
+        """Take received bytes; return ours once it is certain that the adapter repeats them, else nothing.
+
+        `over`: no more is expected.
+        """
+        if self._codec is None or not self._sent:
+            return b""
+        self._heard = (self._heard + data)[:LONGEST_TAIL]
+        at = self._heard.find(self._sent)
+        line_begins = self._heard[:at].endswith(TERMINATORS) and len(self._sent) >= ENOUGH
+        if at < 0 or (at and not line_begins):  # a drive may repeat what it refuses, after a sign of its own
+            return b""
+        return self._sent if self._codec.repeated(self._sent, self._heard[at + len(self._sent) :], over) else b""
+
+
 TAIL = 0.05
 """Quiet time after which no more of an unterminated line is awaited, s."""
 NEVER_QUIET = 1.0
@@ -287,19 +329,27 @@ LONGEST_TAIL = 4096
 class Inbox:
     """The buffer of a line. It removes the local echo and sorts out unsolicited lines."""
 
-    def __init__(self, codec: Codec, local_echo: bool, publish: Callable[[float, Iterable[str]], None]) -> None:
+    def __init__(
+        self,
+        codec: Codec,
+        local_echo: bool,
+        publish: Callable[[float, Iterable[str]], None],
+        on_echo: Callable[[], None] = lambda: None,
+    ) -> None:
+        """`on_echo`: called once it is found that the adapter repeats what it sends."""
         self.codec = codec
         """The codec that parses unsolicited lines."""
         self.buffer = b""
         self.received_at = float("-inf")
         """When the last bytes came."""
         self.echo = LocalEcho() if local_echo else None
+        self.watch = EchoWatch()
         self._begun_at = float("-inf")
         self._tail = b""
         """The beginning of a line that was published before its end came: its check byte covers both parts."""
         self._cut_off: tuple[Request, int] | None = None
         """A PR that a stop interrupted, and how many bytes of its reply came before; the rest is not program output."""
-        self._publish = publish
+        self._publish, self.on_echo = publish, on_echo
 
     # Bytes
 
@@ -311,6 +361,7 @@ class Inbox:
             before, data = self.echo.sift(data)
             self._publish_rest(before, now)
         self.buffer += data
+        self.notice_echo(data, now)
 
     def consume(self, used: int, now: float) -> None:
         self.buffer, self._begun_at = self.buffer[used:], now
@@ -334,10 +385,22 @@ class Inbox:
 
     # Local echo
 
-    def wrote(self, data: bytes, now: float) -> None:
-        """Expect the repetition of these bytes, if the adapter repeats them."""
+    def wrote(self, data: bytes, now: float, codec: Codec | None = None) -> None:
+        """Expect the repetition of these bytes, if the adapter repeats them. `codec`: that of their request."""
         if self.echo:
             self._publish_rest(self.echo.wrote(data), now)
+        else:
+            self.watch.wrote(data, codec)
+
+    def notice_echo(self, data: bytes, now: float, over: bool = False) -> None:
+        """Remove our own bytes from now on, once it is certain that the adapter repeats them. `over`: as in it."""
+        own = b"" if self.echo else self.watch.repeated(data, over)
+        if not own:
+            return
+        self.echo = LocalEcho()
+        before, _, self.buffer = self.buffer.partition(own)
+        self._publish_rest(before, now)
+        self.on_echo()
 
     # Stops
 

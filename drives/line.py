@@ -114,7 +114,11 @@ class Write(NamedTuple):
     request: Request | None
 
 
-LineEvent = Write | Finished | Unsolicited
+class EchoFound(NamedTuple):
+    """The adapter repeats what it sends: our own bytes are removed from now on."""
+
+
+LineEvent = Write | Finished | Unsolicited | EchoFound
 
 
 @dataclass(frozen=True)
@@ -137,13 +141,15 @@ class Line:
         self, codec: Codec, *, baud: int = 0, local_echo: bool = False, timeout: float = DEFAULT_TIMEOUT
     ) -> None:
         self.timeout = timeout
-        self.inbox = Inbox(codec, local_echo, self._publish)
+        self.inbox = Inbox(codec, local_echo, self._publish, lambda: self._events.append(EchoFound()))
         self.transmitted = float("-inf")
         """Time at which the last byte written has left, calculated from the baud rate, s."""
         self.baud = baud
         """The baud rate of the port; 0 where it is not known."""
         self.byte_time = 10.0 / baud if baud else 0.0
         """The time of a byte on the wire, s; 0: it takes none."""
+        self.unasked = 0
+        """Number of times that bytes came which no request asked for."""
         self.printed_at = float("-inf")
         """Time of the last bytes that no request asked for."""
         self._queue: list[Waiting] = []
@@ -192,13 +198,17 @@ class Line:
             self._state.received_at, self._state.due = now, None
         else:
             self.printed_at = now
+            self.unasked += 1
         self.inbox.receive(data, now)
 
-    def wrote(self, data: bytes, now: float, whole: bool = False) -> None:
-        """Note bytes that were written past the queue: a stop. `whole`: a part of them would do harm in a drive."""
+    def wrote(self, data: bytes, now: float, whole: bool = False, codec: Codec | None = None) -> None:
+        """Note bytes that were written past the queue: a stop. `whole`: a part of them would do harm in a drive.
+
+        `codec`: they are a request of this codec.
+        """
         self.transmitted = now + len(data) * self.byte_time
         self._partial_until = self.transmitted if whole else float("-inf")
-        self.inbox.wrote(data, now)
+        self.inbox.wrote(data, now, codec)
 
     def not_written(self, now: float) -> None:
         """Note that the transport dropped the last Write: no drive receives any of it."""
@@ -351,7 +361,7 @@ class Line:
         request = copy_with(request, tag=ticket)
         data = request.codec.encode(request)
         self.only_stop = False
-        self.wrote(data, now, whole=True)
+        self.wrote(data, now, whole=True, codec=request.codec)
         self._state = Flight(ticket, request, now, self.transmitted, now)
         self._events.append(Write(data, request))
 
@@ -367,6 +377,7 @@ class Line:
         ended = Transaction(flight.request, reply, flight.sent_at, now, flight.transmitted_at, flight.sent)
         self._events.append(Finished(flight.ticket, ended))
         self.inbox.consume(found.used, now)
+        self.unasked += bool(found.strays or self.inbox.buffer)
         self._nak_of = flight.request.address if reply.end is End.NAK else ""
         # A mark that ends the wait for another reply recovers too: an ACK may follow it. After a NAK others wait.
         troubled = weight.ends_wait or reply.end in (End.TIMEOUT, End.DAMAGED) or bool(self._nak_of and self._queue)
@@ -376,7 +387,10 @@ class Line:
 
     def _decoded(self, flight: Flight, now: float) -> Decoded | None:
         """The reply, if it is whole, if quiet ends it, or if time is up."""
-        codec, request, buffer = flight.request.codec, flight.request, self.inbox.buffer
+        codec, request = flight.request.codec, flight.request
+        if now >= min(flight.times(self.inbox.buffer, self.timeout)):
+            self.inbox.notice_echo(b"", now, over=True)
+        buffer = self.inbox.buffer
         if not self._takes_reply(flight):
             return codec.on_timeout(request, b"") if now >= flight.times(buffer, self.timeout)[1] else None
         found = codec.decode(request, buffer) if buffer else None

@@ -13,7 +13,7 @@ from math import inf, nextafter
 from multidrop.dialects import End, Kind, Priority, Request, StopPiece
 from multidrop.drives import events
 from multidrop.drives.inbox import TERMINATORS, Debris, Leftovers
-from multidrop.drives.line import Finished, Line, Write, divided
+from multidrop.drives.line import EchoFound, Finished, Line, Write, divided
 from multidrop.drives.port_journal import GLOBAL, Departure, Keeper
 from multidrop.transports import Transport, TransportLost
 from multidrop.transports.pipe import running_loop
@@ -24,6 +24,9 @@ OnAnswer = Callable[[events.Transaction | TransportLost], None]
 
 HELD_UP = 0.01
 """A timer that is later than this, s, was held up with the loop: what the wire has delivered meanwhile comes first."""
+ECHO = "the adapter repeats what it sends: our own bytes are removed for this session, as with echo=local"
+UNASKED = 10.0
+"""Time between two notices of what came without a question, s: another host may ask all the time."""
 LONGEST_HEARD = 60
 """Most characters shown of a reply that was destroyed."""
 
@@ -59,11 +62,17 @@ class Link:
         """Number of stops written so far, of any kind."""
         self.on_unsolicited: Callable[[Sequence[str]], None] = lambda lines: None
         """Called with unsolicited lines, debris included, before they are published."""
+        self.on_unasked: Callable[[], None] = lambda: None
+        """Called when bytes came that no request asked for."""
+        self.on_echo: Callable[[], None] = lambda: self.notify(ECHO)
+        """Called once it is found that the adapter repeats what it sends."""
         self.departure = Departure(keeper)
         """The note on the command that is on its way."""
         self._keeper = keeper
         self.debris = Debris()
         self.leftovers = Leftovers()
+        self._counted = 0
+        self._came_unasked, self._unasked_said = 0, -inf
         self._orderly = False
         """The port was still open when it was shut."""
         self._rest: list[StopPiece] = []
@@ -176,7 +185,9 @@ class Link:
         try:
             while self._further:
                 self._further, stops, now = False, self.stops, self.now()
-                for event in self.line.events(now):
+                news = self.line.events(now)
+                self._note_unasked(now)
+                for event in news:
                     if isinstance(event, Write):
                         if event.request is not None and event.request.priority is not Priority.POLL:
                             self._news.tell()
@@ -186,6 +197,8 @@ class Link:
                             self.line.put_back()
                     elif isinstance(event, Finished):
                         self._finished(event)
+                    elif isinstance(event, EchoFound):
+                        self.on_echo()
                     else:
                         self._unsolicited(event, now)
         finally:
@@ -196,6 +209,12 @@ class Link:
             if self._timer is None:  # one that fires too early costs less than many timers
                 self._timer = self._loop.call_at(deadline, self._wake, deadline)
         self._news.tell()
+
+    def _note_unasked(self, now: float) -> None:
+        """Tell of bytes that no request asked for, before the end of a request that may be blamed for them."""
+        before, self._counted = self._counted, self.line.unasked
+        if self._counted != before and not self.debris.may_come(now):
+            self.on_unasked()
 
     @contextmanager
     def received(self) -> Iterator[bytearray]:
@@ -271,11 +290,23 @@ class Link:
             if damaged := [each for each in lines if codec.damaged(each)]:
                 self.notify(f"a printed line was damaged on the line (received {_short(damaged)})", warning=True)
                 lines = tuple(each for each in lines if each not in damaged)
+        if unasked := [each for each in lines if not self.line.inbox.codec.printed(each)]:
+            lines = tuple(each for each in lines if each not in unasked)
+            self._unasked(unasked, now)
         lines, left = self.leftovers.divided(lines, self.line.inbox.codec.answers_host, now)
         if left:
             self.notify(f"left by a session before, not printed by a program: {_short(left)}", warning=True)
         if lines:
             self.publish(events.Unsolicited(event.at, lines))
+
+    def _unasked(self, lines: Sequence[str], now: float) -> None:
+        """Say, not too often, what came without a question where drives only reply."""
+        self._came_unasked += len(lines)
+        if now < self._unasked_said + UNASKED:
+            return
+        more = f" ({self._came_unasked} in all)" if self._came_unasked > len(lines) else ""
+        self._unasked_said = now
+        self.notify(f"received without a question{more}, and not a drive's output: {_short(lines)}", warning=True)
 
     # The end
 

@@ -25,7 +25,7 @@ def silent(error: E, link: Link, family: Family[Any], product: str = "") -> E:
     """Return the failure, with the protection that may cause it where nothing was ever received on the link."""
     known = protection(link, family) if link.unheard else None
     text = known.text(product) if known is not None else ""
-    return type(error)(f"{error}; {text}") if text else error
+    return type(error)(f"{error}; {known.besides}{text}") if known is not None and text else error
 
 
 class Values:

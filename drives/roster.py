@@ -11,17 +11,18 @@ until a homing or a set position is seen as done. Only reads are sent.
 from __future__ import annotations
 
 import asyncio
+import math
 from collections.abc import Callable, Coroutine, Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import Any
 
-from multidrop.dialects import DriveError, DriveState, Family, Hints, NoAnswer, StopPiece
+from multidrop.dialects import DriveError, DriveState, Family, Hints, Motion, NoAnswer, StopPiece
 from multidrop.dialects.families import FAMILIES, family_of, seen
 from multidrop.dialects.values import Value
 from multidrop.drives.conversations import Conversations
 from multidrop.drives.drive import Drive, still
-from multidrop.drives.events import isolated
+from multidrop.drives.events import Restarted, isolated
 from multidrop.drives.link import Link
 from multidrop.drives.port_journal import GLOBAL, Keeper
 from multidrop.drives.protected_units import protection, silent
@@ -33,6 +34,10 @@ PAUSE = 0.25
 """Seconds between two looks at a line that is away, or at a drive that homes."""
 BOOT = 1.0
 """Seconds after a sign-on before the drive is asked."""
+TOGETHER = 3.0
+"""Seconds after a restart in which those of other drives of the line are found, if the same cause restarted them."""
+SAME_CAUSE = 60.0
+"""Seconds within which a drive that was silent may have been restarted by what has restarted another one."""
 NAMED = 4
 """Most settings that a message names."""
 
@@ -40,8 +45,12 @@ NAMED = 4
 class Restarts:
     """Looks for restarts of the drives of one link, and for the homings after them."""
 
-    def __init__(self, link: Link) -> None:
-        self._link = link
+    def __init__(self, link: Link, all_drives: Callable[[], Iterable[Drive]]) -> None:
+        self._link, self._all_drives = link, all_drives
+        self._found: dict[Drive, tuple[float, bool]] = {}
+        """When a restart of each drive was last found, and whether it is certain."""
+        self._counts: dict[Drive, int] = {}
+        self._together: asyncio.Task[None] | None = None
         self._tasks: dict[Drive, asyncio.Task[None]] = {}
         self._homings: dict[tuple[Drive, str], asyncio.Task[None]] = {}
 
@@ -63,7 +72,8 @@ class Restarts:
         self._homings[drive, axis] = self._begin(f"watching the homing of {drive.shown}", work)
 
     def close(self) -> None:
-        for task in (*self._tasks.values(), *self._homings.values()):
+        others = [self._together] if self._together is not None else []
+        for task in (*self._tasks.values(), *self._homings.values(), *others):
             task.cancel()
 
     def _begin(self, what: str, work: Callable[[], Coroutine[Any, Any, None]]) -> asyncio.Task[None]:
@@ -96,7 +106,9 @@ class Restarts:
         at_rest = all(axis.velocity == 0 for axis in axes)
         jumped = [axis for axis in axes if at_rest and axis.position == 0 != rested.get(axis.axis, 0)]
         changed = [name for name, value in settings.items() if name in before and value != before[name]]
-        if not (sign or jumped or changed) or (drive.hold and drive.state.unreferenced):  # or that was said
+        if not (sign or jumped or changed):
+            return self._maybe(drive, rested, axes)
+        if drive.hold and drive.state.unreferenced:  # that was said
             return
         if not sign:  # with one, that was recorded as it came
             drive.motions.restarted()
@@ -109,6 +121,7 @@ class Restarts:
             signs.append(f"{_shown(name)} {_text(before[name])} before, {_text(settings[name])} now")
         more = f"; {len(signs) - NAMED} more differ" if len(signs) > NAMED else ""
         drive.state.reference_lost(axis.axis for axis in axes)
+        self.restarted(drive)
         drive.hold = f"it was restarted ({signs[0]})" if drive.strict else ""
         verb = f"/referenced {drive.address}".rstrip()
         self._link.notify(
@@ -117,6 +130,61 @@ class Restarts:
             drive.address,
             warning=True,
         )
+
+    def count(self, drive: Drive) -> int:
+        """How often this drive was restarted so far, or may have been."""
+        return self._counts.get(drive, 0)
+
+    def restarted(self, drive: Drive, certain: bool = True) -> None:
+        """Record and publish that a drive was restarted, or may have been; then look at the others of its line."""
+        now = self._link.now()
+        self._found[drive] = now, certain
+        self._counts[drive] = self.count(drive) + 1
+        drive.state.counts_may_have_changed(restarted=True)
+        self._link.publish(Restarted(now, drive.address, certain))
+        if certain and (self._together is None or self._together.done()):
+            before = {each: each.rested for each in self._all_drives()}
+            work = partial(self._look_at_others, before, now)
+            self._together = self._begin("looking for restarts of other drives", work)
+
+    async def _look_at_others(self, before: Mapping[Drive, Mapping[str, int]], since: float) -> None:
+        """Name the drives that nothing shows to have run on, where another drive of their line was restarted.
+
+        A restart sets positions to 0: a drive that rests where it rested before, and elsewhere, has run on.
+        """
+        await asyncio.sleep(TOGETHER)
+        unsure = []
+        for drive, rested in before.items():
+            if drive.programming:
+                continue
+            try:
+                axes = await drive.motion()
+            except (DriveError, TransportLost):
+                continue  # once it replies again, it is looked at by itself
+            if (looking := self._tasks.get(drive)) is not None and not looking.done():
+                await asyncio.wait([looking])
+            if self._found.get(drive, NEVER)[0] < since - TOGETHER and not _ran_on(rested, axes):
+                unsure.append(drive)
+        self._unsure(unsure)
+
+    def _maybe(self, drive: Drive, rested: Mapping[str, int], axes: Sequence[Motion]) -> None:
+        """Take it that a drive that was silent may have been restarted, if another one of the line was."""
+        since = self._link.now() - SAME_CAUSE
+        others = any(certain and at >= since for other, (at, certain) in self._found.items() if other is not drive)
+        if others and self._found.get(drive, NEVER)[0] < since and not _ran_on(rested, axes):
+            self._unsure([drive])
+
+    def _unsure(self, drives: Sequence[Drive]) -> None:
+        for drive in drives:
+            self.restarted(drive, certain=False)
+        if drives:
+            names = ", ".join(each.shown for each in drives)
+            self._link.notify(
+                f"{names} may have been restarted, too, and nothing that can be read shows whether: the program, the "
+                f"settings and the position may be other ones than before",
+                drives[0].address if len(drives) == 1 else "",
+                warning=True,
+            )
 
     async def _to_its_end(self, drive: Drive, axis: str) -> None:
         """Wait until the drive rests; the axis is referenced if nothing was sent in between and no error is set."""
@@ -131,6 +199,14 @@ class Restarts:
             name = f" {axis}" if axis else ""
             check = "; check its place, as a homing may leave the position" if axis in drive.anchored else ""
             self._link.notify(f"{drive.shown}{name} is referenced: the homing has ended{check}", drive.address)
+
+
+NEVER = (-math.inf, False)
+
+
+def _ran_on(rested: Mapping[str, int], axes: Sequence[Motion]) -> bool:
+    """Whether positions show that a drive was not restarted, which sets them to 0: it rests elsewhere, as before."""
+    return any(rested.get(axis.axis) == axis.position != 0 for axis in axes)
 
 
 def _shown(name: str) -> str:
@@ -158,13 +234,14 @@ class Roster:
         """Addresses of the drives that are being looked for."""
         self.sweep: tuple[StopPiece, ...] = ()
         """A stop of the whole link ends with it: of addresses that a search has asked, and that have not replied."""
-        self.restarts = Restarts(self.link)
+        self.restarts = Restarts(self.link, lambda: self.drives.values())
         self.homes = self.restarts.homes
         self.stated: tuple[str, ...] = ()
         """The addresses that the first search was given."""
         self.on_stored_stop: Callable[[Drive], None] = lambda drive: None
         """Called with a drive that has stored a stop instead of executing it."""
         self.link.on_unsolicited = self._unsolicited
+        self.link.on_unasked = self._came_unasked
 
     @property
     def all_drives(self) -> list[Drive]:
@@ -247,6 +324,10 @@ class Roster:
             self.conversations.link.line.inbox.codec = drive.state.codec
             break
 
+    def _came_unasked(self) -> None:
+        for drive in self.drives.values():
+            drive.state.came_unasked()
+
     def _unsolicited(self, lines: Sequence[str]) -> None:
         """Note and report a restart: the drive is set as it was saved; and a drive that stored a stop."""
         codec = self.link.line.inbox.codec
@@ -261,6 +342,7 @@ class Roster:
             drive.state.restarted(alone=len(self.drives) == 1)
             if len(self.drives) == 1:
                 drive.motions.restarted()
+            self.restarts.restarted(drive, certain=len(self.drives) == 1)
         which = f"one of {', '.join(self.drives)}" if len(self.drives) > 1 else next(iter(self.drives), "")
         text = f"{which or 'the drive'} was restarted (sign-on); its settings are read before the next line"
         self.link.notify(text, warning=True)

@@ -16,19 +16,21 @@ from __future__ import annotations
 
 import asyncio
 from collections import deque
-from collections.abc import Callable, Hashable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import partial
 from math import inf
-from typing import Any, Generic, NamedTuple, TypeVar
+from typing import Any, NamedTuple
 
-from multidrop.dialects import DriveError, End, Motion, NoAnswer, Priority, Refused
+from multidrop.dialects import DriveError, Motion, NoAnswer, Priority, Refused
 from multidrop.dialects.values import Part
 from multidrop.dialects.values import Value as Fact
-from multidrop.drives.conversations import Conversation, OnOver
 from multidrop.drives.drive import Drive, Running
-from multidrop.drives.events import Conditioned, Outcome, Sample, Silent, Valued, isolated
+from multidrop.drives.events import Conditioned, Sample, Silent, Valued
+from multidrop.drives.poller import Due, Poller
+from multidrop.drives.poller import Subscription as Subscription
+from multidrop.drives.recount import recount
 from multidrop.drives.roster import Roster
 from multidrop.transports import TransportLost
 
@@ -40,26 +42,16 @@ USUAL = 0.05
 """Default period of a value, s."""
 PERIOD = 1.0
 """Default period of a drive's conditions, s."""
-MOST_SILENCES = 5
-"""Most polls without an answer in a row that make the pause longer."""
-AFTER_DEFECT = 60.0
-"""Pause after a poll that failed by a defect, s: each one is reported."""
-FAILED = f"the poll failed ({{}}); it is polled again in {AFTER_DEFECT:g} s"
-PRINT_QUIET = 0.1
-"""Quiet time after a print before the next poll of a party line, s."""
-LONGEST_WAIT = 0.2
-"""Longest time for which prints hold up a poll, s."""
 RATE_OVER = 2.0
 """Time over which the rate is averaged, s."""
 NAKS = 3
 """NAKs in a row after which a value counts as refused."""
 AGED = 30
 """Periods after which settings are read again."""
+SCALES = 5
+"""Periods between two readings of what the scales of a drive rest on."""
 LEAST = 3.0
 """Seconds between two readings of a setting, however many commands are sent."""
-
-Thing = TypeVar("Thing", bound=Hashable)
-Read = TypeVar("Read")
 
 
 class Value(NamedTuple):
@@ -69,202 +61,7 @@ class Value(NamedTuple):
     word: str
 
 
-class Subscription(Generic[Thing]):
-    """A request for readings of some things, each every `period` s, until it is closed."""
-
-    def __init__(self, things: Sequence[Thing], period: float, ended: Callable[[Subscription[Thing]], None]) -> None:
-        self.things, self.period = tuple(things), period
-        self._ended = ended
-
-    def close(self) -> None:
-        """End it; a second call has no effect."""
-        self._ended(self)
-
-
-@dataclass
-class _Due:
-    """When a thing is read next, s, and polls without an answer in a row."""
-
-    at: float = 0.0
-    """Infinite: it is not read again."""
-    silences: int = 0
-    refusals: int = 0
-    """NAKs in a row: noise damages a request now and then, and a value that is gone is refused each time."""
-
-
-class _Poller(Generic[Thing]):
-    """Reads things of one link, each as often as the most eager subscription asks."""
-
-    shortest: float
-    """Shortest period, s."""
-    retry: float
-    """Pause after a thing could not be asked, s."""
-    after_silence: float = 1.0
-    """Pause after a poll without an answer, s; longer by the same with each further one."""
-
-    def __init__(self, roster: Roster) -> None:
-        self.periods: dict[Thing, float] = {}
-        """The shortest period requested for each thing, s."""
-        self._roster, self._link = roster, roster.link
-        self._open: list[Subscription[Thing]] = []
-        self._due: dict[Thing, _Due] = {}
-        self._busy = self._paused = False
-        self._under_way: Conversation[Any] | None = None
-        self._timer: asyncio.TimerHandle | None = None
-        self._waits_since: float | None = None
-        """When prints began to hold up the next poll."""
-
-    def subscribe(self, things: Sequence[Thing], period: float) -> Subscription[Thing]:
-        def end(subscription: Subscription[Thing]) -> None:
-            if subscription in self._open:
-                self._open.remove(subscription)
-                self._count()
-
-        subscription = Subscription(things, max(period, self.shortest), end)
-        self._open.append(subscription)
-        self._count()
-        return subscription
-
-    def close(self) -> None:
-        self._open.clear()
-        self._count()
-        if self._under_way is not None:
-            self._under_way.interrupt()
-
-    def pause(self) -> None:
-        self._paused = True
-
-    def resume(self) -> None:
-        self._paused = False
-        self._set_timer(self._link.now())
-
-    def _count(self) -> None:
-        self.periods = {}
-        for each in self._open:
-            for thing in each.things:
-                self.periods[thing] = min(each.period, self.periods.get(thing, each.period))
-        now = self._link.now()
-        for thing, period in self.periods.items():
-            due = self._due.setdefault(thing, _Due())
-            if not due.silences and due.at < inf:  # it may have been asked for at a slower rate
-                due.at = max(now, min(due.at, now + period))
-        self._set_timer(now)
-
-    # One poll after the other
-
-    def _set_timer(self, at: float) -> None:
-        if self._timer is not None:
-            self._timer.cancel()
-        wanted = self.periods and at < inf
-        self._timer = asyncio.get_running_loop().call_at(at, self._next) if wanted else None
-
-    def _next(self) -> None:
-        """Read the thing that is due for longest, or wait for the next one that is due."""
-        if self._busy or self._paused or self._link.away or not self.periods:
-            return
-        now = self._link.now()
-        thing = min(self.periods, key=lambda each: self._due[each].at)
-        due = self._due[thing]
-        if due.at > now:
-            return self._set_timer(due.at)
-        if left := self._held_up(now):
-            return self._set_timer(now + left)
-        drive = self._drive(thing)
-        if not self._readable(drive):
-            due.at = now + self.retry
-            return self._set_timer(now)
-        due.at = max(due.at + self.periods[thing], now)
-        with self._isolated(thing, due, f"polling {thing} on {self._link.name}", FAILED, again=False):
-            self._begin(thing, due, drive)
-
-    def _held_up(self, now: float) -> float:
-        """Seconds for which the next poll of a party line waits after a print. What people ask for never waits.
-
-        A program often prints several lines in a row, and the reply of another drive runs into the next.
-        """
-        quiet = self._link.line.printed_at + PRINT_QUIET - now
-        if quiet <= 0 or len(self._roster.drives) < 2:
-            self._waits_since = None
-            return 0.0
-        self._waits_since = now if self._waits_since is None else self._waits_since
-        left = min(quiet, self._waits_since + LONGEST_WAIT - now)
-        if left <= 0:
-            self._waits_since = None
-        return max(left, 0.0)
-
-    def _drive(self, thing: Thing) -> Drive:
-        raise NotImplementedError
-
-    def _readable(self, drive: Drive) -> bool:
-        return not (drive.state.programming or drive.transferring)
-
-    def _begin(self, thing: Thing, due: _Due, drive: Drive) -> None:
-        """Begin to read a thing, which is due."""
-        raise NotImplementedError
-
-    def _converse(
-        self,
-        thing: Thing,
-        due: _Due,
-        start: Callable[[OnOver[Read]], Conversation[Read]],
-        took: Callable[[Thing, float, Read], None],
-    ) -> None:
-        """Read a thing in one conversation; `took` is called with the time of its last request and what was read."""
-
-        def over(outcome: Outcome[Read]) -> None:
-            self._busy, self._under_way, last = False, None, outcome.last
-            if outcome.error is None:
-                due.silences = due.refusals = 0
-                took(thing, last.transmitted_at if last is not None else self._link.now(), outcome.result[0])
-            else:
-                due.refusals += last is not None and last.reply.end is End.NAK
-                self._failed(thing, due, outcome)
-
-        self._busy = True
-        under_way = start(over)
-        self._under_way = under_way if self._busy else None
-
-    def _failed(self, thing: Thing, due: _Due, outcome: Outcome[Any]) -> None:
-        """Set when a thing is read again that was not read."""
-        with self._isolated(thing, due, f"polling {thing} on {self._link.name}", FAILED):
-            try:
-                outcome.value()
-            except TransportLost:  # `resume` begins again
-                pass
-            except NoAnswer:
-                self._back_off(due)
-                self._silent(thing, due)
-            except Refused as refusal:
-                due.at = self._link.now() + self.retry
-                self._refused(thing, due, str(refusal))
-            except DriveError:  # a stop or program mode kept it from being asked: that is not a silence
-                due.at = self._link.now() + self.retry
-
-    @contextmanager
-    def _isolated(self, thing: Thing, due: _Due, what: str, report: str, again: bool = True) -> Iterator[None]:
-        """Report a defect and put the thing off; then set the timer, without a defect if `again`."""
-        trouble: list[str] = []
-        with isolated(what, trouble):
-            yield
-        if trouble:
-            due.at, self._busy = self._link.now() + AFTER_DEFECT, self._busy and again
-            drive = self._drive(thing)
-            self._link.notify(f"{drive.shown}: {report.format(trouble[0])}", drive.address, warning=True)
-        if trouble or again:
-            self._set_timer(self._link.now())
-
-    def _back_off(self, due: _Due) -> None:
-        due.silences += 1
-        due.at = self._link.now() + self.after_silence * min(due.silences, MOST_SILENCES)
-
-    def _silent(self, thing: Thing, due: _Due) -> None:
-        """Report a poll without an answer."""
-
-    def _refused(self, thing: Thing, due: _Due, why: str) -> None:
-        """Report a refusal."""
-
-
-class _MotionPoller(_Poller[str]):
+class _MotionPoller(Poller[str]):
     """Polls position and velocity of drives, by address."""
 
     shortest = FASTEST
@@ -285,7 +82,7 @@ class _MotionPoller(_Poller[str]):
     def _readable(self, drive: Drive) -> bool:
         return super()._readable(drive) and not drive.state.stranger
 
-    def _begin(self, thing: str, due: _Due, drive: Drive) -> None:
+    def _begin(self, thing: str, due: Due, drive: Drive) -> None:
         self._converse(thing, due, partial(drive.start_motion, Priority.POLL), self._took)
 
     def _took(self, address: str, at: float, axes: Sequence[Motion]) -> None:
@@ -302,11 +99,11 @@ class _MotionPoller(_Poller[str]):
         if sample.address in self.periods:  # else the subscription has ended meanwhile
             self._link.publish(sample)
 
-    def _silent(self, thing: str, due: _Due) -> None:
+    def _silent(self, thing: str, due: Due) -> None:
         self._link.publish(Silent(self._link.now(), thing))
 
 
-class _ValuePoller(_Poller[Value]):
+class _ValuePoller(Poller[Value]):
     """Polls values by their words, which a person named."""
 
     shortest = 0.002
@@ -319,7 +116,7 @@ class _ValuePoller(_Poller[Value]):
     def _drive(self, thing: Value) -> Drive:
         return self._roster.at(thing.address)
 
-    def _begin(self, thing: Value, due: _Due, drive: Drive) -> None:
+    def _begin(self, thing: Value, due: Due, drive: Drive) -> None:
         procedure = drive.family.values.again(drive.state, thing.word, Priority.POLL)
         self._converse(thing, due, partial(drive.start, procedure, typed=True), self._took)
 
@@ -327,11 +124,11 @@ class _ValuePoller(_Poller[Value]):
         self._set_timer(self._link.now())
         self._link.publish(Valued(at, value.address, value.word, read))
 
-    def _silent(self, thing: Value, due: _Due) -> None:
+    def _silent(self, thing: Value, due: Due) -> None:
         if due.refusals >= NAKS:
             self._refused(thing, due, f"{self._drive(thing).shown}: NAK to '{thing.word}'")
 
-    def _refused(self, thing: Value, due: _Due, why: str) -> None:
+    def _refused(self, thing: Value, due: Due, why: str) -> None:
         """Read a value no longer, and say so once: each refusal may start a subroutine for errors in the drive."""
         due.at = inf
         self._link.notify(f"{why}; it is not read again", thing.address, warning=True)
@@ -346,9 +143,13 @@ class _Facts:
     read: dict[str, tuple[float, int]] = field(default_factory=dict)
     """Time of each part's last reading, and the drive's commands so far."""
     refused: set[str] = field(default_factory=set)
+    restarts: int = 0
+    """The restarts of the drive so far."""
+    scaled_at: float = -inf
+    """When what its scales rest on was last read."""
 
 
-class _ConditionPoller(_Poller[str]):
+class _ConditionPoller(Poller[str]):
     """Reads the conditions of drives that were found, by address, part by part."""
 
     shortest = 0.1
@@ -387,42 +188,58 @@ class _ConditionPoller(_Poller[str]):
     def _readable(self, drive: Drive) -> bool:
         return drive in self._roster.drives.values()
 
-    def _begin(self, thing: str, due: _Due, drive: Drive) -> None:
+    def _begin(self, thing: str, due: Due, drive: Drive) -> None:
         due.at = self._link.now() + self.periods[thing]
         self._busy = True
         self._task = asyncio.get_running_loop().create_task(self._read(thing, due))
 
-    async def _read(self, address: str, due: _Due) -> None:
+    async def _read(self, address: str, due: Due) -> None:
         with self._isolated(address, due, f"reading the conditions of {address} on {self._link.name}", "{}"):
             try:
                 await self._read_parts(address, due)
             finally:
                 self._busy = False
 
-    async def _read_parts(self, address: str, due: _Due) -> None:
+    async def _read_parts(self, address: str, due: Due) -> None:
         """Read the parts of a drive that are due, and publish its conditions."""
         drive, known = self._roster.drives.get(address), self._known.get(address)
         if drive is None or address not in self.periods:
             return  # nobody wants them any more
-        if known is None or known.drive is not drive:  # another drive is at this address
-            known = self._known[address] = _Facts(drive)
+        restarts = self._roster.restarts.count(drive)
+        if known is None or known.drive is not drive or known.restarts != restarts:  # it holds other settings
+            known = self._known[address] = _Facts(drive, restarts=restarts)
         values = drive.family.values
         ready, begun, period = False, self._link.now(), self.periods[address]
-        for name in [part.name for part in values.parts(drive.state, known.facts)]:
+        parts = values.parts(drive.state, known.facts)
+        for name in [part.name for part in parts]:
             part = next((each for each in values.parts(drive.state, known.facts) if each.name == name), None)
             if part is None or not self._part_due(known, part, period):
                 continue
-            # Nothing is read of a drive that stores lines, or whose settings are to be found out first.
-            barred = drive.programming or drive.transferring or drive.state.settings_unknown
-            barred = barred or self._paused or self._link.away is not None or address not in self.periods
-            if barred or not await self._read_part(known, due, part):
+            if self._barred(drive) or not await self._read_part(known, due, part):
                 return
             ready = True
+        if parts and drive.counting.axes and not self._barred(drive) and self._scale_due(known, period):
+            await self._read_scales(known)
         if ready and known.facts:
             conditions = values.fold(drive.state, known.facts)
             if (runs := next((each.runs for each in conditions if each.runs is not None), None)) is not None:
                 drive.running = Running(begun, runs)
             self._link.publish(Conditioned(self._link.now(), drive.address, conditions))
+
+    def _barred(self, drive: Drive) -> bool:
+        """Whether nothing is read: it stores lines, its settings are to be found out first, or nobody asks any more."""
+        storing = drive.programming or drive.transferring or drive.state.settings_unknown
+        return storing or self._paused or self._link.away is not None or drive.address not in self.periods
+
+    def _scale_due(self, known: _Facts, period: float) -> bool:
+        holds = all(map(known.drive.scale_holds, known.drive.counting.axes))
+        return not holds or self._link.now() - known.scaled_at >= SCALES * period
+
+    async def _read_scales(self, known: _Facts) -> None:
+        """Read what the scales of a drive rest on: a program or another master may have changed it."""
+        known.scaled_at = self._link.now()
+        with suppress(DriveError, TransportLost):  # the polls of motion report a silence
+            await recount(known.drive, Priority.POLL)
 
     def _part_due(self, known: _Facts, part: Part[Any], period: float) -> bool:
         if part.name in known.refused:
@@ -431,7 +248,7 @@ class _ConditionPoller(_Poller[str]):
         age = self._link.now() - at
         return not part.slow or age > AGED * period or (age > LEAST and commands != known.drive.commands)
 
-    async def _read_part(self, known: _Facts, due: _Due, part: Part[Any]) -> bool:
+    async def _read_part(self, known: _Facts, due: Due, part: Part[Any]) -> bool:
         """Read one part; return whether the next may follow."""
         while left := super()._held_up(self._link.now()):
             await asyncio.sleep(left)

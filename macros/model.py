@@ -15,14 +15,14 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from multidrop.dialects.errors import Diagnostic
-from multidrop.dialects.text import counted, visible
+from multidrop.dialects.text import DECIMAL, counted, visible
 from multidrop.macros.atomic import reserved
 
 _UNIT = r"(?:(?:[mcu]?m|in|deg|rad|m?turn)(?:/s2?|/min)?|m?rpm)"
-_QUANTITY = r"\{[+-]?(?:\d{1,16}(?:\.\d{0,16})?|\.\d{1,16}) [A-Za-z][A-Za-z0-9_/]*\}"
+_QUANTITY = rf"\{{{DECIMAL} [A-Za-z][A-Za-z0-9_/]*\}}"
 """A quantity, which is no name of a value: it has a space."""
 _BRACES = re.compile(rf"(?P<quantity>{_QUANTITY})|\{{\{{|\}}\}}|\{{(?P<name>[A-Za-z0-9_-]+)\}}|[{{}}]", re.ASCII)
-_VALUE = re.compile(rf"[+-]?(?:\d{{1,16}}(?:\.\d{{0,16}})?|\.\d{{1,16}}) {_UNIT}", re.ASCII)
+_VALUE = re.compile(rf"{DECIMAL} {_UNIT}", re.ASCII)
 """A value that is a quantity."""
 _TEXTS = ("/print", "/expect")
 """Verbs that take text: a value that is a quantity is text there, too."""

@@ -13,7 +13,10 @@ if TYPE_CHECKING:
     """The values of `--set`."""
 
 
-def __getattr__(name: str) -> Any:
-    if name in ("session", "values"):
-        raise ImportError(f"multidrop.script has a {name} only under `multidrop run SCRIPT.py`; use multidrop.connect")
-    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+if not TYPE_CHECKING:  # else a checker of types would take any name
+
+    def __getattr__(name: str) -> Any:
+        if name in ("session", "values"):
+            what = f"multidrop.script has a {name} only under `multidrop run SCRIPT.py`; use multidrop.connect"
+            raise ImportError(what)
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

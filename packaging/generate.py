@@ -42,16 +42,16 @@ LISTS = {
   printf '%s\n' sim: 'sim:#press' 'sim:#eth' 'sim:#pmx' tcp:// udp:// modbus:// rfc2217:// ssh://
   for each in /dev/serial/by-id/* /dev/ttyUSB* /dev/ttyACM*; do [ -e "$each" ] && printf '%s\n' "$each"; done
   file={CONFIG}/multidrop.toml"
-  [ -r "$file" ] && sed -n 's/^ *\[connections\.\([A-Za-z0-9_-]*\)\].*/\1/p' "$file"
+  [ -r "$file" ] && sed -n 's/^ *\[connections\.\([A-Za-z0-9_][A-Za-z0-9_-]*\)\].*/\1/p' "$file"
 """,
     "drive": rf"""
   printf '%s\n' all
   file={CONFIG}/multidrop.toml"
-  [ -r "$file" ] && sed -n 's/.*[?&]drives=\([^"&]*\).*/\1/p' "$file" | tr , '\n' | sort -u
+  [ -r "$file" ] && sed -n 's/.*[?&]drives=\([^"&]*\).*/\1/p' "$file" | tr , '\n' | grep -v '^[-=+@]' | sort -u
 """,
     "macro": rf"""
   for each in macros/*.toml {CONFIG}/macros"/*.toml; do
-    [ -e "$each" ] && printf '%s\n' "${{each##*/}}" | sed 's/[.]toml$//'
+    [ -e "$each" ] && printf '%s\n' "${{each##*/}}" | sed 's/[.]toml$//; /^[-=+@]/d'
   done
 """,
 }
@@ -66,15 +66,15 @@ FISH_LISTS = {
   find /dev/serial/by-id -type l 2>/dev/null
   find /dev -maxdepth 1 '(' -name 'ttyUSB*' -o -name 'ttyACM*' ')' 2>/dev/null{FISH_CONFIG}
   test -r "$folder/multidrop.toml"; or return
-  sed -n 's/^ *\[connections\.\([A-Za-z0-9_-]*\)\].*/\1/p' "$folder/multidrop.toml"
+  sed -n 's/^ *\[connections\.\([A-Za-z0-9_][A-Za-z0-9_-]*\)\].*/\1/p' "$folder/multidrop.toml"
 """,
     "drive": rf"""
   printf '%s\n' all{FISH_CONFIG}
   test -r "$folder/multidrop.toml"; or return
-  sed -n 's/.*[?&]drives=\([^"&]*\).*/\1/p' "$folder/multidrop.toml" | tr , '\n' | sort -u
+  sed -n 's/.*[?&]drives=\([^"&]*\).*/\1/p' "$folder/multidrop.toml" | tr , '\n' | grep -v '^[-=+@]' | sort -u
 """,
     "macro": rf"""{FISH_CONFIG}
-  find macros "$folder/macros" -maxdepth 1 -name '*.toml' 2>/dev/null | sed 's!.*/!!; s/[.]toml$//'
+  find macros "$folder/macros" -maxdepth 1 -name '*.toml' 2>/dev/null | sed 's!.*/!!; s/[.]toml$//; /^[-=+@]/d'
 """,
 }
 POWERSHELL_LISTS = {
@@ -82,16 +82,17 @@ POWERSHELL_LISTS = {
   'sim:', 'sim:#press', 'sim:#eth', 'sim:#pmx', 'tcp://', 'udp://', 'modbus://', 'rfc2217://', 'ssh://'
   try { [System.IO.Ports.SerialPort]::GetPortNames() } catch { }
   Select-String -Path (Join-Path (_multidrop_folder) 'multidrop.toml') -ErrorAction SilentlyContinue `
-    -Pattern '^ *\[connections\.([A-Za-z0-9_-]+)\]' | ForEach-Object { $_.Matches[0].Groups[1].Value }
+    -Pattern '^ *\[connections\.([A-Za-z0-9_][A-Za-z0-9_-]*)\]' | ForEach-Object { $_.Matches[0].Groups[1].Value }
 """,
     "drive": r"""
   'all'
   Select-String -Path (Join-Path (_multidrop_folder) 'multidrop.toml') -ErrorAction SilentlyContinue `
-    -Pattern '[?&]drives=([^"&]*)' | ForEach-Object { $_.Matches[0].Groups[1].Value -split ',' }
+    -Pattern '[?&]drives=([^"&]*)' | ForEach-Object { $_.Matches[0].Groups[1].Value -split ',' } |
+    Where-Object { $_ -notmatch '^[-=+@]' }
 """,
     "macro": r"""
   Get-ChildItem -Path 'macros', (Join-Path (_multidrop_folder) 'macros') -Filter '*.toml' `
-    -ErrorAction SilentlyContinue | ForEach-Object { $_.BaseName }
+    -ErrorAction SilentlyContinue | ForEach-Object { $_.BaseName } | Where-Object { $_ -notmatch '^[-=+@]' }
 """,
 }
 # bash divides words at colons: they are joined for the parser, and the candidates lose what the line already has.

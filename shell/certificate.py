@@ -37,6 +37,9 @@ HEAD = (
 )
 SPACE = 64 * 1024
 """More bytes than a report has."""
+WRITES = "`multidrop certify URL -o FILE` writes a report"
+FACTS = ("family", "product", "version", "part", "traits")
+"""What a report says of its drive."""
 NO_REPLY, AS_RULED, DONE = "no reply", "as ruled", "ok"
 WAIT, SLEEP = "/wait", "/sleep "
 """Lines of a question that are not sent: until the drive rests, and for a time, s."""
@@ -76,11 +79,48 @@ def load(path: str) -> Report:
     tables = toml_of(text_of(path), path)
     drive, answers = tables.get("drive"), tables.get("answers")
     if not (isinstance(drive, dict) and isinstance(drive.get("family"), str) and isinstance(answers, dict) and answers):
-        raise Diagnostic("is not a report with answers", path, "`multidrop certify URL -o FILE` writes one")
+        raise Diagnostic("is not a report with answers", path, WRITES)
+    _check_keys(tables, ("drive", "answers", "other_than_ruled", "not_asked"), path)
+    _check_keys(drive, FACTS, f"{path}: [drive]")
+    for name, text in drive.items():
+        if not (isinstance(text, str) and text):
+            raise Diagnostic("must be a text, as the drive printed it", f"{path}: [drive] {name}", WRITES)
+    if "product" not in drive:
+        raise Diagnostic("is missing", f"{path}: [drive] product", WRITES)
     for name, lines in answers.items():
-        if not (isinstance(lines, list) and all(isinstance(line, str) for line in lines)):
-            raise Diagnostic("must be a list of texts", f"{path}: [answers] {name}")
-    return Report(dict(drive), dict(answers))
+        _check_texts(lines, f"{path}: [answers] {name}")
+    others, unasked = tables.get("other_than_ruled", {}), tables.get("not_asked", {})
+    if not (isinstance(others, dict) and isinstance(unasked, dict)):
+        raise Diagnostic("other_than_ruled and not_asked must be tables", path, WRITES)
+    _check_keys(others, ("questions",), f"{path}: [other_than_ruled]")
+    _check_texts(unlike := others.get("questions", []), f"{path}: [other_than_ruled] questions", least=0)
+    for why, names in unasked.items():
+        _check_texts(names, f"{path}: [not_asked] {why}")
+    for name in unlike:
+        if name not in answers:
+            raise Diagnostic(f"names {name}, which has no answer", f"{path}: [other_than_ruled] questions", WRITES)
+    return Report(dict(drive), dict(answers), list(unlike))
+
+
+def _check_keys(table: Mapping[str, Any], valid: Sequence[str], where: str) -> None:
+    for key in table:
+        if key not in valid:
+            raise Diagnostic(f"no key {_shown([key])}", where, f"valid: {', '.join(valid)}")
+
+
+def _check_texts(found: Any, where: str, least: int = 1) -> None:
+    if not (isinstance(found, list) and len(found) >= least and all(isinstance(each, str) for each in found)):
+        raise Diagnostic("must be a list of texts", where, WRITES)
+
+
+def _check_answers(questions: Sequence[Question], theirs: Report, file: str) -> None:
+    """Check that a report has one answer for each line of its questions. Raises Diagnostic."""
+    for each in questions:
+        found = theirs.answers.get(each.name, [])
+        most = 1 if each.shows == FITS and found == [AS_RULED] else len(each.lines)
+        if found and len(found) != most:
+            what = f"has {counted(len(found), 'text')}, and the question has {counted(most, 'line')}"
+            raise Diagnostic(what, f"{file}: [answers] {each.name}", WRITES)
 
 
 async def certify(session: Session, drive: Drive, file: str) -> None:
@@ -120,6 +160,7 @@ async def compare(session: Session, drive: Drive, file: str, theirs: Report) -> 
         family = _shown([theirs.drive["family"]])
         raise Diagnostic(f"has answers of the family {family}; {who} is of {drive.family.name}", file)
     asking = Asking(session, drive)
+    _check_answers(asking.questions, theirs, file)
     try:
         await asking.all(theirs.answers)
     finally:
@@ -156,10 +197,14 @@ class Asking:
         known["traits"] = " ".join(sorted(found.traits(state)))
         self.report = Report({key: text for key, text in known.items() if text})
 
+    @property
+    def questions(self) -> list[Question]:
+        """The questions to this drive."""
+        return self._table.questions(self._drive.state)
+
     async def all(self, wanted: Mapping[str, Any] | None = None) -> None:
         """Ask all questions, or those that are `wanted`; those that move the motor come last."""
-        found = self._table.questions(self._drive.state)
-        questions = [each for each in found if wanted is None or each.name in wanted]
+        questions = [each for each in self.questions if wanted is None or each.name in wanted]
         moving = [each for each in questions if each.does == MOVES]
         self.report.unasked = {each.name: UNREACHED for each in questions}
         with running(self._session, f"{self._who}: certify") as progress:

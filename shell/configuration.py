@@ -47,7 +47,7 @@ from typing import TYPE_CHECKING, Any
 
 from multidrop.dialects import Diagnostic
 from multidrop.dialects.files import opened, text_of, toml_of, utf8_of, why
-from multidrop.dialects.text import visible
+from multidrop.dialects.text import NOT_FIRST, acts_first, visible
 from multidrop.macros.atomic import write_atomically
 from multidrop.shell.broken_configuration import TABLES, WrongConfiguration, salvage
 from multidrop.shell.file_owners import other_writer
@@ -331,8 +331,8 @@ def _units(key: str, found: Any, where: str, own: Sequence[str]) -> dict[str, Sc
 
 def _connection(name: str, found: Any, where: str, own: Sequence[str]) -> SavedConnection:
     key = f"connections.{name}"
-    if not re.fullmatch(r"[A-Za-z0-9_-]+", name):
-        raise Diagnostic(f"{key}: not a name", where, "valid: letters, digits, - and _")
+    if not re.fullmatch(r"[A-Za-z0-9_-]+", name) or acts_first(name):
+        raise Diagnostic(f"{key}: not a name", where, "valid: letters, digits, - and _, not - first")
     table = _table(found, key, ("names", "units", "url"), where, f"write [{key}] with url = ...")
     url = table.get("url")
     if not isinstance(url, str) or not url:
@@ -341,8 +341,8 @@ def _connection(name: str, found: Any, where: str, own: Sequence[str]) -> SavedC
     if not isinstance(names, dict) or not all(isinstance(label, str) and label for label in names.values()):
         raise Diagnostic(f"{key}.names is not a table of names", where, 'as in { a = "gantry" }')
     for label in names.values():
-        if not re.fullmatch(r"[^\s:@/]+", label) or visible(label) != label:
-            hint = "invalid: spaces, control characters, :, @ and /"
+        if not re.fullmatch(r"[^\s:@/]+", label) or visible(label) != label or acts_first(label):
+            hint = f"invalid: spaces, control characters, :, @ and /; {NOT_FIRST}"
             raise Diagnostic(f"{key}.names: {label!r} is not a name", where, hint)
     scales = _units(f"{key}.units", table.get("units", {}), where, own)
     return SavedConnection(name, url, names, scales, os.path.abspath(os.path.dirname(where)))

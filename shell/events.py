@@ -214,6 +214,8 @@ class SettingsRead(NamedTuple):
     bus: str
     address: str
     readings: Readings
+    known: bool = True
+    """False: the drive was restarted, or may have been, and what was read before is not how it is set."""
 
 
 class Phase(Enum):

@@ -19,7 +19,7 @@ from multidrop.drives.inbox import LocalEcho
 from multidrop.drives.stopping import Halt
 from multidrop.shell.connect.opening import BAUDED, Naming, Opened, Opener, first, open_buses, port_name
 from multidrop.shell.connect.reconnect import Newcomer
-from multidrop.shell.connect.urls import Connection, parse
+from multidrop.shell.connect.urls import Connection, parse, with_echo
 from multidrop.shell.line_syntax import EVERYONE, split_target
 from multidrop.shell.raw import RawLine
 from multidrop.shell.secrets import url_without_secrets
@@ -321,6 +321,7 @@ class _Opening:
                     record.doubt = doubts.get(connection.name, "") or doubts.get("", "")
                 if each.limits:
                     workspace.notify(f"{each.bus.name}: {each.limits}", bus=each.bus.name, warning=True)
+                each.bus.link.on_echo = partial(_echo_found, workspace, each.bus)
             late: list[tuple[Bus, Halt]] = []
             for bus in [each.bus for each in found] if self._stops != workspace.stops else ():
                 late.append((bus, bus.halt()))  # the stop that came meanwhile, before anything else
@@ -415,6 +416,20 @@ class _Newcomers:
         except Diagnostic:
             return ""
         return f"search ({about})? Enter alone begins it, and it asks before other baud rates and languages; "
+
+
+ECHO = (
+    "the adapter repeats what it sends; multidrop removes its own bytes for this session. To state that in the URL: {}"
+)
+
+
+def _echo_found(workspace: Workspace, bus: Bus) -> None:
+    """Say that the adapter repeats what it sends, once, and keep that with the connection."""
+    record = workspace.of(bus)
+    if record.connection is not None:
+        record.connection = with_echo(record.connection)
+        text = ECHO.format(url_without_secrets(record.connection.text))
+        workspace.notify(f"{bus.name}: {text}", bus=bus.name, warning=True)
 
 
 def label(bus: Bus, connection: Connection) -> None:

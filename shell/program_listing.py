@@ -11,10 +11,11 @@ from multidrop.dialects import Diagnostic, SourceLine
 from multidrop.dialects.family import Programs
 from multidrop.dialects.program_files import Held, Stored
 from multidrop.dialects.text import counted
+from multidrop.dialects.values import Readings
 from multidrop.drives.drive import Drive
 from multidrop.shell import new_file
 from multidrop.shell.channel import Channel, running, transferring
-from multidrop.shell.events import Phase, ProgramRead, ProgramSeen
+from multidrop.shell.events import Phase, ProgramRead, ProgramSeen, SettingsRead
 from multidrop.shell.line_syntax import EVERYONE
 from multidrop.shell.state.backups import Copy, Sources
 from multidrop.shell.workspace import Workspace
@@ -89,6 +90,21 @@ class Sight:
 
     def _place(self) -> tuple[float, str, str]:
         return self._channel.now(), self._drive.link.name, self._drive.address
+
+
+def say_none(workspace: Workspace, drive: Drive) -> None:
+    """Say that a listing is empty because the drive holds no program."""
+    workspace.notify(f"{workspace.display_name(drive)}: no program", outcome=True)
+
+
+def forget(workspace: Workspace, drive: Drive) -> None:
+    """Take nothing of what was read of a drive that was restarted, or may have been, for what it holds."""
+    workspace.names.forget(drive)
+    sight = Sight(workspace, drive)
+    sight.changes()
+    sight.breaks("")
+    at, bus, address = workspace.now(), drive.link.name, drive.address
+    workspace.publish(SettingsRead(at, bus, address, Readings(), known=False))
 
 
 async def readable(workspace: Workspace, drive: Drive) -> list[str]:

@@ -31,6 +31,10 @@ class KnownNames:
     def learn(self, drive: Drive, held: Held) -> None:
         self._held[drive] = held, drive.commands
 
+    def forget(self, drive: Drive) -> None:
+        """Offer no name of a drive until its names are read again."""
+        self._held.pop(drive, None)
+
     def offered(self, drive: Drive, line: str) -> Sequence[tuple[str, str]]:
         """The names that may end a line being typed, each with its meaning."""
         known = self._held.get(drive)

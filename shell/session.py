@@ -20,11 +20,12 @@ from multidrop.dialects import Diagnostic, DriveError, Refused, Stopped
 from multidrop.dialects.on_demand import imported
 from multidrop.drives.bus import Bus
 from multidrop.drives.drive import Drive
+from multidrop.drives.events import Restarted
 from multidrop.shell import motions
 from multidrop.shell.automation import AGREED, ENDING, Automations, only_ends
 from multidrop.shell.configuration import Settings
 from multidrop.shell.connect.opening import Opener, open_buses
-from multidrop.shell.events import FAILURES, By, Entered, Failed, Printed
+from multidrop.shell.events import FAILURES, By, Entered, Failed, OnBus, Printed, SessionEvent
 from multidrop.shell.line_syntax import (
     EVERYONE,
     DriveLine,
@@ -50,7 +51,7 @@ from multidrop.shell.workspace import LATCHED, Workspace
 if TYPE_CHECKING:
     from multidrop.shell.units import Units
 
-_MAYBE_QUANTITY = re.compile(r"\{|\d ?[A-Za-z]\w*(?:/\w+)?(?![\w/])")
+_MAYBE_QUANTITY = re.compile(r"[{}]|\d ?[A-Za-z]\w*(?:/\w+)?(?![\w/])")
 """Matches each line that may hold a number with a unit, and few others: most lines go without `units`."""
 _published: ContextVar[list[BaseException] | None] = ContextVar("published", default=None)
 """The failures published in this task's outermost `run`."""
@@ -71,6 +72,14 @@ CALL = "multidrop.shell.verbs.call:Call"
 def _units(session: Session) -> Units:
     made: Units = imported("multidrop.shell.units:Units")(session)
     return made
+
+
+def _forget_restarted(session: Session, event: SessionEvent) -> None:
+    """Forget the program and the settings that were read of a drive that was restarted, or may have been."""
+    if isinstance(event, OnBus) and isinstance(event.event, Restarted) and event.bus in session.buses:
+        drive = session.buses[event.bus].drives.get(event.event.address)
+        if drive is not None and not session.watching:
+            imported("multidrop.shell.program_listing:forget")(session, drive)
 
 
 def _apart(session: Session, drive: Drive, axis: str, steps: int) -> str:
@@ -108,6 +117,7 @@ class Session(Workspace):
         self._background: dict[asyncio.Task[Any], None] = {}
         self.on_opened.append(lambda bus: self.units.opened(bus))
         self.on_changed.append(self.twins.changed)
+        self.subscribe(partial(_forget_restarted, self), Restarted)
 
     # Buses
 
@@ -336,6 +346,8 @@ class LinePath:
             session.changed()
         for each in printed:
             session.publish(Printed(session.now(), bus.name, drive.address, each, by))
+        if session.scaled:
+            await session.units.look(drive, text)
 
     async def _raw_text(self, raw: RawLine, parsed: DriveLine, by: By) -> None:
         session, name, typed = self._session, raw.bus.name, parsed.typed.strip()
@@ -411,6 +423,8 @@ class LinePath:
                 yield
             return
         drive.check_start(text)
+        if self._session.scaled:
+            imported("multidrop.shell.travel:unchecked")(self._session.units, drive, text)
         self._session.addressed.add((drive.link.name, drive.address))
         if not text:  # a program may be among it
             drive.motions.runs()

@@ -31,10 +31,11 @@ def example(units: Units, drive: Drive, name: str) -> str:
     """What a word takes, for a person: `a velocity without sign, as in {12.5 mm/s}; 1 mm/s is 10240`; else empty."""
     found = taken(drive, name)
     axis = units.of(drive, found[0]) if found is not None else None
-    if found is None or axis is None or axis.measure is None or not axis.measure.counts(found[1]):
+    measure = axis.current if axis is not None else None
+    if found is None or axis is None or measure is None or not measure.counts(found[1]):
         return ""
     takes = Takes.DISTANCE if found[1] is Takes.PLACE else found[1]
-    unit, one = axis.measure.unit_for(takes), f"{abs(1 / axis.measure.value(1, takes)):.6g}"
+    unit, one = measure.unit_for(takes), f"{abs(1 / measure.value(1, takes)):.6g}"
     return f"{found[1].value}, as in {{12.5 {unit}}}; 1 {unit} is {one} ({axis.scale}){'' if axis.sure else '?'}"
 
 

@@ -38,10 +38,23 @@ async def ask(units: Units, drive: Drive, text: str, by: By) -> None:
                 await _check(units, each, field, limited[field.axis], text, by)
 
 
+def unchecked(units: Units, drive: Drive, text: str) -> None:
+    """Say that the travel is not checked of what a verb starts: a program, or a line that begins one."""
+    family = drive.family
+    if text and any(field.moves for field in family.units.fields(drive.state, text)):
+        return
+    ends = bool(text) and family.guards is not None and family.guards.only_ends(text)
+    for name, axis in units.axes(drive).items():
+        if axis.scale.travel is not None and not ends:
+            what = f"the end of '{text}'" if text else "what a program does"
+            _unchecked(units, drive, name, axis, f"{what} is not known")
+
+
 def _unchecked(units: Units, drive: Drive, name: str, axis: Axis, why: str) -> None:
     if not axis.told:
         axis.told = True
-        units.workspace.notify(f"{units.name(drive, name)}: travel not checked: {why}", bus=drive.link.name)
+        told = f"{units.name(drive, name)}: travel not checked: {why}"
+        units.workspace.notify(told, bus=drive.link.name, warning=True)
 
 
 async def _check(units: Units, drive: Drive, field: Field, axis: Axis, text: str, by: By) -> None:

@@ -20,7 +20,6 @@ from multidrop.dialects import Diagnostic, DriveError, Procedure, Refused
 from multidrop.dialects.errors import Differs
 from multidrop.dialects.units import (
     PLACES,
-    QUANTITY,
     SHORT,
     Basis,
     Field,
@@ -29,19 +28,19 @@ from multidrop.dialects.units import (
     Takes,
     quantities,
     quantity,
+    strange_brace,
 )
 from multidrop.drives.drive import confirmed_motion
 from multidrop.drives.events import Unsolicited
 from multidrop.shell.events import OnBus, SessionEvent
 from multidrop.shell.line_syntax import EVERYONE
+from multidrop.shell.scale_checks import ScaleChecks
 
 if TYPE_CHECKING:
     from multidrop.drives.bus import Bus
     from multidrop.drives.drive import Check, Drive
     from multidrop.shell.workspace import Workspace
 
-_BRACES = re.compile(r"\{\s*[+-]?[.,]?\d[^{}\"]*\s[^{}\"]*\}")
-"""Braces that hold a number and more: a quantity, or one that is written wrongly."""
 _BARE = re.compile(r"([+-]?(?:\d+[.,]?\d*|[.,]\d+)) ?([A-Za-z]\w*?(?:/(?:s2|s|min))?)(?![a-z0-9_/])", re.ASCII)
 _UNQUOTED = re.compile(r'"[^"]*(?:"|$)')
 
@@ -56,9 +55,16 @@ class Axis:
     """None: there is no basis yet, or the scale cannot be used (`problem`)."""
     problem: str = "what it rests on has not been read"
     sure: bool = False
-    """Nothing that could change what it rests on has run since it was read."""
+    """No program that could change what it rests on has run since it was read."""
+    holds: bool = True
+    """What it rests on is what was accepted, as far as is known; else the drive's own numbers are shown."""
     told: bool = False
     """It was said that moves are not checked."""
+
+    @property
+    def current(self) -> Measure | None:
+        """The measure to show numbers with; None: the drive's own are shown."""
+        return self.measure if self.holds else None
 
     def accept(self, basis: Basis) -> None:
         """Take what was read as what the scale rests on."""
@@ -96,6 +102,7 @@ class Units:
         """Positions are shown in units where an axis has a scale."""
         self._axes: WeakKeyDictionary[Drive, dict[str, Axis]] = WeakKeyDictionary()
         workspace.subscribe(self._overhear, Unsolicited)
+        self.look = ScaleChecks(workspace).look
 
     def _overhear(self, event: SessionEvent) -> None:
         """Note the commands of others that show: an echo of another master's, or a program's print for a drive."""
@@ -149,8 +156,9 @@ class Units:
     def of(self, drive: Drive, axis: str = "") -> Axis | None:
         """The scale of an axis; None: it has none."""
         found = self.axes(drive).get(axis)
-        if found is not None and found.sure and _runs(drive):
-            found.sure = False
+        if found is not None:
+            found.sure = found.sure and not _runs(drive)
+            found.holds = drive.scale_holds(axis)
         return found
 
     def scales(self, drive: Drive) -> dict[str, Scale]:
@@ -158,19 +166,27 @@ class Units:
         return {name: axis.scale for name, axis in self.axes(drive).items()}
 
     def given(self, drive: Drive, axis: str, number: float, takes: Takes = Takes.PLACE) -> tuple[float, str] | None:
-        """A number of an axis in its unit, and the unit with `?` while that is not sure; None: it has no scale."""
+        """A number of an axis in its unit, and the unit with `?` while that is not sure.
+
+        None: it has no scale, or none that holds.
+        """
         found = self.of(drive, axis)
-        if found is None or found.measure is None or not found.measure.counts(takes):
+        measure = found.current if found is not None else None
+        if found is None or measure is None or not measure.counts(takes):
             return None
-        unit = found.measure.unit_for(takes)
-        return round(found.measure.value(number, takes), 9), unit if found.sure else f"{unit}?"
+        unit = measure.unit_for(takes)
+        return round(measure.value(number, takes), 9), unit if found.sure else f"{unit}?"
 
     def words(self, drive: Drive, axis: str, number: float, takes: Takes = Takes.PLACE) -> str:
-        """` (12.5 mm)`, to follow a number of an axis; empty where it has no scale, or a person wants no units."""
+        """` (12.5 mm)`, to follow a number of an axis.
+
+        Empty where it has no scale, or none that holds, or a person wants no units.
+        """
         found = self.of(drive, axis) if self.shown else None
-        if found is None or found.measure is None or not found.measure.counts(takes):
+        measure = found.current if found is not None else None
+        if found is None or measure is None or not measure.counts(takes):
             return ""
-        return f" ({found.measure.shown(number, takes)}{'' if found.sure else '?'})"
+        return f" ({measure.shown(number, takes)}{'' if found.sure else '?'})"
 
     def referenced(self, drive: Drive, axis: str) -> bool:
         """Whether places of the machine count."""
@@ -187,7 +203,9 @@ class Units:
     async def confirm(self, drive: Drive) -> None:
         """Read what the scales of a drive rest on, and take it as it is. Raises DriveError or TransportLost."""
         for name, axis in self.axes(drive).items():
-            axis.accept(await self.read(drive, name, axis.scale))
+            recounts, basis = drive.state.recounts, await self.read(drive, name, axis.scale)
+            axis.accept(basis)
+            drive.counting.accept(name, basis.settings, recounts)
             if _runs(drive):
                 axis.sure = False
         self.workspace.changed()
@@ -239,10 +257,11 @@ class Units:
         # A quantity that is written wrongly is refused before anything is converted.
         bare = _UNQUOTED.sub(lambda match: " " * len(match[0]), text)
         found = list(quantities(text))
-        for match in _BRACES.finditer(bare):
-            if QUANTITY.fullmatch(match[0]) is None:
-                quantity(match[0][1:-1], self.own)
-                raise Diagnostic(f"not a quantity: {match[0]}", "", "valid: {NUMBER SPACE UNIT}, as in {12.5 mm}")
+        if brace := strange_brace(text):
+            if re.search(r"\d,\d", brace):
+                quantity(brace.strip("{}"), self.own)
+            valid = "valid: {NUMBER SPACE UNIT}, as in {12.5 mm}; a script fills in {NAME}"
+            raise Diagnostic(f"{brace} is not a quantity; nothing was sent", text.strip(), valid)
         for unit in _BARE.finditer(bare):
             if unit[2].partition("/")[0] in (*PLACES, *SHORT, *self.own):
                 written = f"{{{unit[1].replace(',', '.')} {unit[2]}}}"
@@ -350,8 +369,10 @@ class Units:
 
     def _same(self, drive: Drive, name: str, measure: Measure, text: str) -> Procedure[None]:
         """Read what a scale rests on. Raises Differs where it is not what a measure was made with."""
+        recounts = drive.state.recounts
         found = yield from drive.family.units.basis(drive.state, name, measure.scale.full_steps)
         axis = self.axes(drive)[name]
+        drive.counting.saw(name, found.settings, recounts)
         if axis.scale != measure.scale:
             raise Differs(f"{drive.shown}: its scale was changed meanwhile; '{text}' was not sent")
         if found.settings != measure.basis.settings:

@@ -16,6 +16,7 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 from multidrop.dialects import Diagnostic, NoAnswer
+from multidrop.dialects.text import acts_first
 from multidrop.drives.events import BusEvent, Changed, Conditioned, Lost, Notice, Sample, Unsolicited, isolated
 from multidrop.macros import MacroStore, Recorder
 from multidrop.shell import stop_report
@@ -236,8 +237,9 @@ class Workspace(Channel):
     def rename_bus(self, bus: Bus, name: str) -> None:
         """Give an open bus another name. Raises Diagnostic, also while anything runs that knows it by its name."""
         before = bus.name
-        if not re.fullmatch(r"[A-Za-z0-9_.-]{1,32}", name):
-            raise Diagnostic(f"{name!r} is not a name", "/rename", "valid: letters, digits, -, _ and . (32 at most)")
+        if not re.fullmatch(r"[A-Za-z0-9_.-]{1,32}", name) or acts_first(name):
+            hint = "valid: letters, digits, -, _ and . (32 at most), not - first"
+            raise Diagnostic(f"{name!r} is not a name", "/rename", hint)
         if name in self.buses:
             raise Diagnostic(f"a bus {name} is open already", "/rename", "give another name")
         holds = (

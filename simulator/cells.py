@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from multidrop.dialects import Diagnostic
 from multidrop.dialects.files import toml_of, utf8_of
+from multidrop.dialects.text import NOT_FIRST, acts_first
 from multidrop.dialects.units import check_own
 from multidrop.simulator.cell.drive_keys import check_inside
 from multidrop.simulator.cell.spec import BusSpec, Cell, DriveSpec, Endpoint, Faults, MotorSpec
@@ -88,8 +89,9 @@ class Reader:
             table = replace(table, where=f"{where}: [[bus]] {quoted(name)}")
         table.only("name", "serve", "baud", "gather", "drive", "faults")
         name = table.text("name")
-        if not name or not name.isprintable() or set(name) & set("#@:/ "):
-            raise table.wrong("name", f"cannot be {quoted(name)}", "valid: a word without spaces, #, @, : or /")
+        if not name or not name.isprintable() or set(name) & set("#@:/ ") or acts_first(name):
+            hint = f"valid: a word without spaces, #, @, : or /, {NOT_FIRST}"
+            raise table.wrong("name", f"cannot be {quoted(name)}", hint)
         bus = BusSpec(
             name=name,
             serve=tuple(_endpoint(each, table, folder) for each in table.texts("serve")),

@@ -95,7 +95,7 @@ class Bench:
                 self.wire.receive(event.data, self.now)
             elif isinstance(event, Unsolicited):
                 self.strays.extend(event.lines)
-            else:
+            elif isinstance(event, Finished):
                 ended.append(event)
         self.ended += ended
         return ended

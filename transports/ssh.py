@@ -13,6 +13,10 @@ WAYS = (RELAY, SOCAT)
 """The programs on the far side; both are tried in this order unless one is asked for."""
 
 
+WORD = r"[A-Za-z0-9_.][A-Za-z0-9_.-]*"
+"""The name of a user or a host: `ssh` takes a first `-` for an option."""
+
+
 class NotInstalled(Unreachable):
     """None of the programs that were tried is installed on the far side."""
 

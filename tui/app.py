@@ -39,7 +39,7 @@ from multidrop.tui.key_table import bound
 from multidrop.tui.keymap import FunctionKeys, keymap
 from multidrop.tui.leaving import Leaving
 from multidrop.tui.outbox import Outbox
-from multidrop.tui.panels.view import figures_at, name_at
+from multidrop.tui.panels.view import between_at, figures_at, name_at
 from multidrop.tui.polling import Polling
 from multidrop.tui.presenter import Presenter
 from multidrop.tui.screen_model import Record, ScreenModel
@@ -93,8 +93,8 @@ class MultidropApp(Dressed):
         """The main screen has its parts: they can be painted."""
         super().__init__(look, driver)
         self.session, self.urls, self.assist = session, list(urls), assist
-        figures, named = partial(figures_at, session), partial(name_at, session)
-        self.model = model or ScreenModel(lambda: session.selected_bus, lambda: session.buses, figures, named)
+        figures, named, between = partial(figures_at, session), partial(name_at, session), partial(between_at, session)
+        self.model = model or ScreenModel(lambda: session.selected_bus, lambda: session.buses, figures, named, between)
         self.boundary = Boundary(session.settings.state, partial(self.show_line, mark="x"))
         self.boundary.own(self, lambda: self._is_composed)
         self._end_boundary: Callable[[], None] = lambda: None

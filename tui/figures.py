@@ -76,13 +76,13 @@ NATIVE = Figures()
 
 
 def figures_of(axis: Axis | None, referenced: bool) -> Figures:
-    """The figures of an axis: its drive's own numbers where it has no scale, or one of which the basis is not known.
+    """The figures of an axis: its drive's own numbers where it has no scale, or one that does not hold.
 
     `referenced`: its places count.
     """
-    if axis is None or axis.measure is None:
+    if axis is None or axis.current is None:
         return NATIVE
-    return _figures(axis.measure, axis.sure, referenced)
+    return _figures(axis.current, axis.sure, referenced)
 
 
 @lru_cache(maxsize=256)

@@ -27,7 +27,7 @@ REST = 0.5
 LIVELY = 0.25
 OTHERS = 2.0
 CONDITIONS = 1.0
-"""Seconds between two readings of the conditions of the selected drive."""
+"""Seconds between two readings of the conditions of the selected drive, and of each that is plotted."""
 CONDITIONS_OF_OTHERS = 5.0
 """The same of the others of its line; a second for each where there are more."""
 ELSEWHERE = 10.0
@@ -58,7 +58,7 @@ class Polling:
             return
         chosen = list(dict.fromkeys([*(plotted(session) if "plot" in wants else []), *_awaited(session, model)]))
         drives = _drives(session, model, chosen, PLOT if "samples" in wants else REST) if self.on else {}
-        watches = _watches(session) if self.on and "conditions" in wants else {}
+        watches = _watches(session, plotted(session)) if self.on else {}
         values = _values(session, chosen) if self.on else {}
         for (bus, _, addresses), period in drives.items():
             for address in addresses:
@@ -132,15 +132,20 @@ def _drives(session: Session, model: ScreenModel, plotted: Sequence[Series], res
     return wanted
 
 
-def _watches(session: Session) -> Wanted:
-    """The periods at which conditions are read: of the selected drive, the others of its line, other lines."""
+def _watches(session: Session, plotted: Sequence[Series]) -> Wanted:
+    """The periods at which conditions are read: of the selected and plotted drives, others of the line, other lines.
+
+    They are read on every page: each shows drives, if only as tabs.
+    """
     wanted: Wanted = {}
     for bus in _open(session):
         here, chosen = bus.name == session.selected_bus, session.selected
-        own = chosen.address if here and chosen is not None and chosen.address in bus.drives else None
-        others = tuple(address for address in bus.drives if address != own)
-        if own is not None:
-            wanted[bus.name, id(bus), (own,)] = CONDITIONS
+        named = {each.address for each in plotted if each.bus == bus.name}
+        named |= {chosen.address} if here and chosen is not None else set()
+        for address in bus.drives:
+            if address in named:
+                wanted[bus.name, id(bus), (address,)] = CONDITIONS
+        others = tuple(address for address in bus.drives if address not in named)
         if others:
             wanted[bus.name, id(bus), others] = max(CONDITIONS_OF_OTHERS if here else ELSEWHERE, float(len(others)))
     return wanted

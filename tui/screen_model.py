@@ -46,10 +46,19 @@ class Happening(NamedTuple):
 
 SILENT = Happening("no reply to polls", warning=True)
 BACK = Happening("polls get a reply again")
+LATE = 2.5
+"""Seconds between two readings after which a change between them has no single time, and no place."""
+Between = Callable[[float, float], str]
+"""Makes words of two times: ` (between 12:00:01 and 12:00:21)`."""
 
 
-def changes_of(known: Readout, event: Sample | Silent | Conditioned) -> Iterator[Happening]:
-    """Compare an event of a drive with what was read before it."""
+def changes_of(
+    known: Readout, event: Sample | Silent | Conditioned, between: Between = lambda before, after: ""
+) -> Iterator[Happening]:
+    """Compare an event of a drive with what was read before it.
+
+    A change that a late reading shows happened at any time since the one before: both times are named.
+    """
     if isinstance(event, Silent):
         if known.silent_since is None:
             yield SILENT
@@ -59,13 +68,17 @@ def changes_of(known: Readout, event: Sample | Silent | Conditioned) -> Iterator
         axis = next((each for each in known.axes if each.axis == event.axis), None)
         if axis is not None and axis.last is not None and axis.trouble != event.trouble:
             text = event.trouble or f"cleared: {axis.trouble}"
-            yield Happening(_named(text, event.axis), warning=bool(event.trouble))
+            when = between(axis.last.at, event.at) if event.at - axis.last.at > LATE else ""
+            yield Happening(_named(text, event.axis) + when, warning=bool(event.trouble))
     else:
         for each, after in zip(known.axes, event.conditions, strict=False):
-            yield from _conditioned(each, after, known.failed_at)
+            late = each.conditions is not None and event.at - each.conditioned_at > LATE
+            when = between(each.conditioned_at, event.at) if late else ""
+            for found in _conditioned(each, after, known.failed_at, late):
+                yield found._replace(text=found.text + when)
 
 
-def _conditioned(known: Readout, after: Conditions, failed_at: float) -> Iterator[Happening]:
+def _conditioned(known: Readout, after: Conditions, failed_at: float, late: bool) -> Iterator[Happening]:
     """The changes between two readings of an axis, most urgent first: limits, error, alarms, program, current."""
     before, last = known.conditions, known.last
     if before is None:
@@ -73,15 +86,15 @@ def _conditioned(known: Readout, after: Conditions, failed_at: float) -> Iterato
     lit = {(lamp.name, lamp.function) for lamp in before.lamps if lamp.on}
     for lamp in after.lamps:
         if lamp.on and lamp.function in LIMITS and not lamp.output and (lamp.name, lamp.function) not in lit:
-            place = "" if last is None else f" at {known.figures.place(last.position)}"
-            stands = "; it is at rest" if last is not None and last.velocity == 0 else ""
+            place = "" if last is None or late else f" at {known.figures.place(last.position)}"
+            stands = "; it is at rest" if last is not None and last.velocity == 0 and not late else ""
             yield Happening(_named(f"{LIMITS[lamp.function]} reached{place}{stands}", after.axis), warning=True)
     told = failed_at >= known.conditioned_at or (after.error_text and after.error_text == known.trouble)
     if after.error and not before.error and not told:
         if after.error == UNREAD:
-            yield Happening(_named("an error is set", after.axis), True, after.error_text)
+            yield Happening(_named(after.cause or "an error is set", after.axis), True, after.error_text)
         else:
-            yield Happening(_named(f"error {after.error}: {after.error_text}", after.axis), True)
+            yield Happening(_named(f"{after.error_name}: {after.error_text}", after.axis), True)
     values = dict(before.more)
     for name, value in after.more:
         if value != values.get(name, "") and any(word in value for word in ALARMS):
@@ -225,11 +238,13 @@ class ScreenModel:
         opened: Callable[[], Container[str]],
         figures: Callable[[str, str, str], Figures] = lambda bus, address, axis: NATIVE,
         named: Callable[[str, str], str] = lambda bus, address: "",
+        between: Between = lambda before, after: "",
     ) -> None:
         self.figures = figures
         """Returns the figures of an axis: of a bus, an address, its name."""
         self._named = named
         """Returns the name that a person gave to a drive: of a bus, an address."""
+        self._between = between
         self.buses: dict[str, BusFacts] = {}
         self.traces, self.look = Traces(), Look()
         """The plotted samples, and how a person looks at them."""
@@ -289,7 +304,7 @@ class ScreenModel:
                 program.break_point = event.break_point
             case events.SettingsRead():
                 readout = self.bus(event.bus).readout(event.address)
-                readout.settings, readout.settings_at = event.readings, event.at
+                readout.settings, readout.settings_at = event.readings if event.known else None, event.at
 
     def quiet(self, event: events.SessionEvent) -> bool:
         """True if an event alone is not a reason to paint: bytes on the wire, or values that are those before."""
@@ -349,7 +364,7 @@ class ScreenModel:
         if isinstance(inner, Sample | Silent | Conditioned):
             readout = self.bus(event.bus).readout(inner.address)
             readout.show_in(partial(self.figures, event.bus, inner.address))
-            happened = list(changes_of(readout, inner))
+            happened = list(changes_of(readout, inner, self._between))
             readout.note(inner)
             for each in happened:
                 mark = "!" if each.warning else "."

@@ -44,6 +44,7 @@ MCODE = Family(
     programs_at="multidrop.dialects.mcode.host.programs:PROGRAMS",
     guards=Guards(guards.NAMES, guarded, guards.word_of, guards.only_ends, guards.only_reads),
     vouched=classify.vouched,
+    addressed=guards.addressed,
     protection=guards.CYBER_SECURITY,
     debugging_at="multidrop.dialects.mcode.host.debugging:DEBUGGING",
     repairs=True,

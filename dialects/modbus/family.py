@@ -7,12 +7,13 @@ from functools import partial
 from multidrop.dialects.codec import Procedure
 from multidrop.dialects.family import Family, Guard, Guards, Registers
 from multidrop.dialects.mcode.host import classify
-from multidrop.dialects.mcode.manual import grammar, guards, help, points
+from multidrop.dialects.mcode.manual import grammar, guards, points
 from multidrop.dialects.modbus.host import operations
 from multidrop.dialects.modbus.host.codec import USER, Modbus, ModbusState, pdu_codec
-from multidrop.dialects.modbus.host.mapping import ALTERNATIVE, lines_of
+from multidrop.dialects.modbus.host.mapping import lines_of
 from multidrop.dialects.modbus.host.operations import identify
-from multidrop.dialects.modbus.manual.registers import REGISTERS
+from multidrop.dialects.modbus.manual import help
+from multidrop.dialects.modbus.manual.registers import ALTERNATIVE, REGISTERS
 
 
 def guarded(state: ModbusState, text: str) -> Guard | None:

@@ -16,12 +16,13 @@ from collections import deque
 from collections.abc import Callable, Coroutine
 from functools import update_wrapper
 from types import TracebackType
-from typing import Any, Concatenate, Generic, ParamSpec, TypeVar, overload
+from typing import TYPE_CHECKING, Any, Concatenate, Generic, Never, ParamSpec, TypeVar, overload
 
 from multidrop.api import endings
 from multidrop.api.calls import CLOSED, StopReport
 from multidrop.api.drives import AsyncDrive, DriveFacts
 from multidrop.api.events import Event
+from multidrop.api.fixed import Fixed
 from multidrop.api.pictures import table
 from multidrop.api.programs import AsyncParameters, AsyncPrograms
 from multidrop.api.sessions import AsyncSession, Notice, log
@@ -69,8 +70,12 @@ class Reading(Generic[T]):
     def __get__(self, found: Any, kind: type) -> T | Reading[T]:
         return self if found is None else found._call(lambda: self._method(found._awaited))
 
+    if TYPE_CHECKING:
 
-class Session:
+        def __set__(self, found: Any, value: Never) -> None: ...  # at run time `Fixed` refuses it
+
+
+class Session(Fixed):
     """Open connections and their drives: `with connect(URL) as session`. Any thread may use it.
 
     Leaving the block by an exception stops every drive that it has set in motion. So do an interruption (Ctrl+C) of a
@@ -281,7 +286,7 @@ class Drive(DriveFacts):
         return self._session.telemetry(self._target, rate=rate)
 
 
-class Programs:
+class Programs(Fixed):
     """The program of one drive. Raises Inexpressible where its family has none."""
 
     def __init__(self, session: Session, awaited: AsyncPrograms) -> None:
@@ -292,7 +297,7 @@ class Programs:
     download = blocking(AsyncPrograms.download)
 
 
-class Parameters:
+class Parameters(Fixed):
     """The settings of one drive. Raises Inexpressible where the host reads none of its family."""
 
     def __init__(self, session: Session, awaited: AsyncParameters) -> None:

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 from multidrop.api.calls import Calls, Stopping
 from multidrop.api.events import Fault, fault_of
+from multidrop.api.fixed import Fixed
 from multidrop.api.pictures import table
 from multidrop.api.programs import AsyncParameters, AsyncPrograms
 from multidrop.dialects import Diagnostic, DriveError, Family, Inexpressible, Motion, Refused
@@ -85,8 +86,11 @@ async def conditions(drive: Drive, slow: bool = True) -> tuple[Conditions, ...]:
     return found_now
 
 
-class DriveFacts:
+class DriveFacts(Fixed):
     """The facts of a drive that are known without asking it."""
+
+    _own = frozenset({"axis", "programs", "parameters"})
+    _instead = "; write() gives the drive a value, as in write('VM', 500000)"
 
     def __init__(self, calls: Calls, drive: Drive, axis: str) -> None:
         self._drive = drive

@@ -33,7 +33,9 @@ class Fault:
 def fault_of(found: Conditions) -> Fault | None:
     """The error that conditions report; None: there is none."""
     if found.error == UNREAD:
-        return Fault(None, "an error is set; read_error() reads and clears its number")
+        if found.cause and found.cause == found.error_text:
+            return Fault(None, found.cause)  # of a family whose errors have no numbers
+        return Fault(None, f"{found.cause or 'an error is set'}; read_error() reads and clears its number")
     return Fault(found.error, found.error_text or f"error {found.error}") if found.error else None
 
 

@@ -6,6 +6,7 @@ from collections.abc import Collection
 from typing import TYPE_CHECKING
 
 from multidrop.api.calls import Calls
+from multidrop.api.fixed import Fixed
 from multidrop.shell import new_file, program_listing
 from multidrop.shell.params import file as files
 from multidrop.shell.params.work import Difference, Options, differences, restore
@@ -19,7 +20,7 @@ if TYPE_CHECKING:
 Lines = list[str]
 
 
-class AsyncPrograms:
+class AsyncPrograms(Fixed):
     """The program of one drive. Raises Inexpressible where its family has none."""
 
     def __init__(self, calls: Calls, drive: Drive) -> None:
@@ -62,7 +63,7 @@ class AsyncPrograms:
         await self._calls.run(lambda: transfers.download(shell, self._drive, file, wanted, text))
 
 
-class AsyncParameters:
+class AsyncParameters(Fixed):
     """The settings of one drive. Raises Inexpressible where the host reads none of its family."""
 
     def __init__(self, calls: Calls, drive: Drive) -> None:

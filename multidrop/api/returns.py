@@ -2,7 +2,9 @@
 
 Where `reconnect` is wanted, a drive is read while it rests after each command: its positions and its settings. After
 the return of its line these are read again. Where they are not the same, or the last command was too recent for them
-to be known, its position does not count, and nothing starts it (`Drive.hold`) until it counts again.
+to be known, its position does not count, and nothing starts it (`Drive.hold`) until it counts again. So it is where it
+was not at rest. A drive that got no command and was not read yet is compared by its identity only: the program knows
+nothing of it that could have changed.
 """
 
 from __future__ import annotations
@@ -21,17 +23,25 @@ from multidrop.shell.events import OnBus, SessionEvent
 from multidrop.shell.session import Session
 from multidrop.transports import TransportLost
 
+NEVER = float("-inf")
 PAUSE = 0.25
 """The time between two looks for drives to read, s."""
 UNKNOWN = "a command was too recent, when its line was lost, to tell whether it is as it was"
+MOVED = "it moved, or a program ran in it, when it was last read before its line was lost, so its position is not known"
 
 
 class Known(NamedTuple):
-    """What was known of a drive when its line was lost; without positions it had moved or was commanded since."""
+    """What was known of a drive when its line was lost."""
 
     identity: Mapping[str, Value]
     positions: Mapping[str, int]
+    """Empty: it had moved, was commanded since, or was not read yet."""
     settings: Mapping[str, Value] | None
+    """None: it was commanded since, or they were not read yet."""
+    commanded: bool
+    """Something that may do more than ask was sent to it since it was last read, or since it was opened."""
+    read: bool
+    """Its position was read in this session."""
 
 
 def _identity(drive: Drive) -> Mapping[str, Value]:
@@ -91,7 +101,10 @@ class Returns:
         parts = [name for name in parts if (drive, name) not in self._refused]
         current = all(name in drive.settings and drive.settings[name][1] == drive.commands for name in parts)
         settings = {k: value for name in parts for k, value in drive.settings[name][0].items()} if current else None
-        return Known(_identity(drive), drive.rested, settings)
+        at, commands, _ = drive.resting
+        stale = any(drive.settings[name][1] != drive.commands for name in parts if name in drive.settings)
+        commanded = drive.commands != commands or drive.started_at > at or stale
+        return Known(_identity(drive), drive.rested, settings, commanded, read=at > NEVER)
 
     async def _follow(self) -> None:
         while True:
@@ -135,9 +148,14 @@ class Returns:
             axes, now = await drive.motion(), await self._settings(drive)
         except (DriveError, TransportLost) as failure:
             return ["it does not reply since its line was lost" if isinstance(failure, NoAnswer) else str(failure)]
-        if not before.positions or before.settings is None:
+        if before.commanded:
             return [UNKNOWN]
+        if before.read and not before.positions:
+            return [MOVED]
         was = {f"{axis} position".strip(): position for axis, position in before.positions.items()}
         places = {f"{axis.axis} position".strip(): axis.position for axis in axes}
-        found = differing({**before.identity, **before.settings, **was}, {**_identity(drive), **now, **places})
+        identity = {name: value for name, value in _identity(drive).items() if before.identity[name]}
+        now = {**identity, **(now if before.settings is not None else {}), **(places if was else {})}
+        known = {name: value for name, value in before.identity.items() if value}
+        found = differing({**known, **(before.settings or {}), **was}, now)
         return [f"{name.replace('_', ' ')} {old} before its line was lost, {new} now" for name, old, new in found]

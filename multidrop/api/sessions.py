@@ -14,6 +14,7 @@ from multidrop.api import endings
 from multidrop.api.calls import Calls, Stopping
 from multidrop.api.drives import AsyncDrive
 from multidrop.api.events import AsyncEvents
+from multidrop.api.fixed import Fixed
 from multidrop.api.pictures import drives_table, table
 from multidrop.api.returns import Returns
 from multidrop.api.telemetry import RATE, AsyncTelemetry
@@ -67,7 +68,7 @@ def log(text: str, warning: bool) -> None:
     logging.getLogger("multidrop").log(logging.WARNING if warning else logging.INFO, text)
 
 
-class AsyncSession:
+class AsyncSession(Fixed):
     """Open connections and their drives: `async with connect_async(URL) as session`.
 
     Leaving it by an exception stops every drive that it has set in motion.

@@ -10,9 +10,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from multidrop.dialects import Diagnostic
-from multidrop.dialects.families import program_language_of, program_languages
+from multidrop.dialects.families import correct_in, program_language_of, program_languages
 from multidrop.dialects.files import program_text_of
-from multidrop.dialects.program_files import errors
 from multidrop.shell import certificate, configuration, new_file, program_listing, snapshots
 from multidrop.shell.batch import runner
 from multidrop.shell.line_syntax import split_target
@@ -63,11 +62,16 @@ def list_(chosen: argparse.Namespace) -> int:
         if chosen.json:
             held = await program_listing.read(session, drive, "list")
             held.check_listed(name)
+            if not held.lines:
+                program_listing.say_none(session, drive)
             for at, text in held.lines:
                 session.output(json.dumps({"drive": address_of(session, drive), "at": at, "text": text}))
             return
         own = f"{name}: " if is_several(chosen.drive) else ""
-        for line in await program_listing.readable(session, drive):
+        lines = await program_listing.readable(session, drive)
+        if not lines:
+            program_listing.say_none(session, drive)
+        for line in lines:
             session.output(f"{own}{line}")
 
     return _with_drive(chosen, show, unsolicited=not chosen.json)
@@ -129,9 +133,9 @@ def download(chosen: argparse.Namespace) -> int:
 
 def _checked(file: str) -> str:
     """Read a program file. Raises Diagnostic for one that is correct in no language, in the language of its name."""
-    own, text = program_languages()[program_language_of(file)], program_text_of(file)
-    if all(errors(source.language.check(text)) for source in program_languages().values() if source is not own):
-        own.language.read(text, file)
+    language, text = program_language_of(file), program_text_of(file)
+    if not correct_in(text, language):
+        program_languages()[language].language.read(text, file)
     return text
 
 

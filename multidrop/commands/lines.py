@@ -145,9 +145,12 @@ def help_(chosen: argparse.Namespace) -> int:
     elif word:
         having = [each for each in languages() if _has(each, word)]
         lines = explained(word, having[0] if having else FAMILIES[DEFAULT].language)
-        for each in having[1:]:
-            name = next(name for name, family in FAMILIES.items() if family.language is each)
-            lines.append(f"also: multidrop help {quote(word)} --dialect {name}")
+        others = {name: family.language for name, family in FAMILIES.items() if family.language in having[1:]}
+        same = [name for name, each in others.items() if explained(word, each) == lines]
+        lines = [
+            *lines,
+            *(f"also: multidrop help {quote(word)} --dialect {each}" for each in others if each not in same),
+        ]
     for line in lines or overview():
         write(sys.stdout, line)
     return 0

@@ -31,12 +31,16 @@ MOST = 100
 
 def check(chosen: argparse.Namespace) -> int:
     """Check the files in turn; return the highest exit code."""
-    return max(_check_file(file, chosen) for file in chosen.files)
+    reported = dict[str, tuple[str, str]]()
+    if chosen.cell is not None:
+        spec = drive(chosen.cell, None)
+        chosen.personality, reported = spec.personality, {spec.personality: (spec.identity.version, spec.identity.part)}
+    return max(_check_file(file, chosen, reported) for file in chosen.files)
 
 
-def _check_file(file: str, chosen: argparse.Namespace) -> int:
+def _check_file(file: str, chosen: argparse.Namespace, reported: Mapping[str, tuple[str, str]]) -> int:
     try:
-        checked = examine(file, chosen.personality, chosen.language)
+        checked = examine(file, chosen.personality, chosen.language, reported)
         _report(checked, chosen.json)
         if chosen.format:
             rewrite(checked)

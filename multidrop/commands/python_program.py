@@ -53,13 +53,17 @@ class ReportedSession(Session):
         self._file = file
         self._report = report
         self._out = sys.stdout
-        self.stopped_by_person = False
+        self._stopped_by_person = False
         self._sent: list[Entered] = []
         self._printed: list[str] = []
         self._failed: tuple[BaseException, Result] | None = None
         """The last call, if it failed, and its result: the program may end with it, or go on."""
         super().__init__(yes=yes, beyond=beyond, notice=notice)
         self._awaited._shell.subscribe(self._take, Entered, Printed, Output)
+
+    def person_stopped(self) -> None:
+        """Note that a person has pressed the stop key: what fails then is no failure of the program."""
+        self._stopped_by_person = True
 
     def _take(self, event: SessionEvent) -> None:
         if isinstance(event, Entered):
@@ -84,7 +88,7 @@ class ReportedSession(Session):
 
     def resume(self) -> None:
         """Let commands be sent again after a stop of the program's own. Raises Stopped after one of a person."""
-        if self.stopped_by_person:
+        if self._stopped_by_person:
             raise Stopped("Ctrl+X stopped every drive; this program sends nothing more")
         super().resume()
 
@@ -250,7 +254,8 @@ class _Execution:
         shell = session._awaited._shell
 
         def stop() -> None:
-            self._stopped = session.stopped_by_person = True
+            self._stopped = True
+            session.person_stopped()
             shell.stop("Ctrl+X")
             _interrupt()
 

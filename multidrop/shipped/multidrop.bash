@@ -19,7 +19,7 @@ _shtab_multidrop_shell_option_strings=(-h --help --raw --twin --no-reconnect --y
 _shtab_multidrop_send_option_strings=(-h --help --json --yes --beyond --no-config)
 _shtab_multidrop_run_option_strings=(-h --help --on --set --role --json --junit --yes --beyond --no-config)
 _shtab_multidrop_sim_option_strings=(-h --help --allow --json --speed --no-config)
-_shtab_multidrop_program_check_option_strings=(-h --help --language --personality --format --json --no-config)
+_shtab_multidrop_program_check_option_strings=(-h --help --language --personality --cell --format --json --no-config)
 _shtab_multidrop_program_test_option_strings=(-h --help --language --personality --cell --until --run --trace --break --watch --json --no-config)
 _shtab_multidrop_program_sweep_option_strings=(-h --help --language --cell --vary --expect --random --search --seed --run --until --jobs --cluster --yes --json --junit --csv --parquet --resume --svg --no-config)
 _shtab_multidrop_program_convert_option_strings=(-h --help --to --personality -o --output --until --no-config)
@@ -84,6 +84,7 @@ _shtab_multidrop_run___junit_COMPGEN=_shtab_compgen_files
 _shtab_multidrop_sim_pos_0_COMPGEN=_shtab_compgen_files
 _shtab_multidrop_sim___allow_COMPGEN=_shtab_compgen_files
 _shtab_multidrop_program_check_pos_0_COMPGEN=_shtab_compgen_files
+_shtab_multidrop_program_check___cell_COMPGEN=_shtab_compgen_files
 _shtab_multidrop_program_test_pos_0_COMPGEN=_shtab_compgen_files
 _shtab_multidrop_program_test___cell_COMPGEN=_shtab_compgen_files
 _shtab_multidrop_program_sweep_pos_0_COMPGEN=_shtab_compgen_files
@@ -463,7 +464,7 @@ _multidrop_urls() {
   printf '%s\n' sim: 'sim:#press' 'sim:#eth' 'sim:#pmx' tcp:// udp:// modbus:// rfc2217:// ssh://
   for each in /dev/serial/by-id/* /dev/ttyUSB* /dev/ttyACM*; do [ -e "$each" ] && printf '%s\n' "$each"; done
   file="${MULTIDROP_CONFIG_DIR:-${XDG_CONFIG_HOME:-$HOME/.config}/multidrop}/multidrop.toml"
-  [ -r "$file" ] && sed -n 's/^ *\[connections\.\([A-Za-z0-9_-]*\)\].*/\1/p' "$file"
+  [ -r "$file" ] && sed -n 's/^ *\[connections\.\([A-Za-z0-9_][A-Za-z0-9_-]*\)\].*/\1/p' "$file"
   true
 }
 _multidrop_url() {
@@ -479,7 +480,7 @@ _multidrop_drives() {
   local each file
   printf '%s\n' all
   file="${MULTIDROP_CONFIG_DIR:-${XDG_CONFIG_HOME:-$HOME/.config}/multidrop}/multidrop.toml"
-  [ -r "$file" ] && sed -n 's/.*[?&]drives=\([^"&]*\).*/\1/p' "$file" | tr , '\n' | sort -u
+  [ -r "$file" ] && sed -n 's/.*[?&]drives=\([^"&]*\).*/\1/p' "$file" | tr , '\n' | grep -v '^[-=+@]' | sort -u
   true
 }
 _multidrop_drive() {
@@ -493,7 +494,7 @@ _multidrop_drive() {
 _multidrop_macros() {
   local each file
   for each in macros/*.toml "${MULTIDROP_CONFIG_DIR:-${XDG_CONFIG_HOME:-$HOME/.config}/multidrop}/macros"/*.toml; do
-    [ -e "$each" ] && printf '%s\n' "${each##*/}" | sed 's/[.]toml$//'
+    [ -e "$each" ] && printf '%s\n' "${each##*/}" | sed 's/[.]toml$//; /^[-=+@]/d'
   done
   true
 }

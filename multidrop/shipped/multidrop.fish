@@ -15,7 +15,7 @@ function _multidrop_url
   test -d "$folder"; or set folder "$HOME/.config/multidrop"
 
   test -r "$folder/multidrop.toml"; or return
-  sed -n 's/^ *\[connections\.\([A-Za-z0-9_-]*\)\].*/\1/p' "$folder/multidrop.toml"
+  sed -n 's/^ *\[connections\.\([A-Za-z0-9_][A-Za-z0-9_-]*\)\].*/\1/p' "$folder/multidrop.toml"
   true
 end
 
@@ -26,7 +26,7 @@ function _multidrop_drive
   test -d "$folder"; or set folder "$HOME/.config/multidrop"
 
   test -r "$folder/multidrop.toml"; or return
-  sed -n 's/.*[?&]drives=\([^"&]*\).*/\1/p' "$folder/multidrop.toml" | tr , '\n' | sort -u
+  sed -n 's/.*[?&]drives=\([^"&]*\).*/\1/p' "$folder/multidrop.toml" | tr , '\n' | grep -v '^[-=+@]' | sort -u
   true
 end
 
@@ -35,7 +35,7 @@ function _multidrop_macro
   test -n "$folder"; or set folder "$XDG_CONFIG_HOME/multidrop"
   test -d "$folder"; or set folder "$HOME/.config/multidrop"
 
-  find macros "$folder/macros" -maxdepth 1 -name '*.toml' 2>/dev/null | sed 's!.*/!!; s/[.]toml$//'
+  find macros "$folder/macros" -maxdepth 1 -name '*.toml' 2>/dev/null | sed 's!.*/!!; s/[.]toml$//; /^[-=+@]/d'
   true
 end
 
@@ -147,6 +147,7 @@ complete -c multidrop -n '_shtab_multidrop_using program; and test $_shtab_multi
 complete -c multidrop -n '_shtab_multidrop_using program check' -s h -l help -d 'show this help message and exit'
 complete -c multidrop -n '_shtab_multidrop_using program check' -l language -xka "mcode pmx tmcl" -d 'default: pmx for .prg, .asc; tmcl for .tmc; else mcode'
 complete -c multidrop -n '_shtab_multidrop_using program check' -l personality -xka "LMDOM LMDCM LMDOE LMDCE LMM MDI MDIE MDIX" -d 'the drive that the program is for (default: LMDCM)'
+complete -c multidrop -n '_shtab_multidrop_using program check' -l cell -xka "(__fish_complete_path (commandline -ct))" -d 'the drive that the program is for, from a cell file such as a snapshot (CELL, CELL#BUS or CELL#BUS:NAME): commands that its firmware or size lacks are named, too'
 complete -c multidrop -n '_shtab_multidrop_using program check' -l format -d 'rewrite files without errors in canonical spelling; remarks stay'
 complete -c multidrop -n '_shtab_multidrop_using program check' -l json -d 'print one JSON object a line'
 complete -c multidrop -n '_shtab_multidrop_using program check' -l no-config -d 'read no configuration file'

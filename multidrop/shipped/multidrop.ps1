@@ -21,7 +21,7 @@ function _multidrop_url {
   'sim:', 'sim:#press', 'sim:#eth', 'sim:#pmx', 'tcp://', 'udp://', 'modbus://', 'rfc2217://', 'ssh://'
   try { [System.IO.Ports.SerialPort]::GetPortNames() } catch { }
   Select-String -Path (Join-Path (_multidrop_folder) 'multidrop.toml') -ErrorAction SilentlyContinue `
-    -Pattern '^ *\[connections\.([A-Za-z0-9_-]+)\]' | ForEach-Object { $_.Matches[0].Groups[1].Value }
+    -Pattern '^ *\[connections\.([A-Za-z0-9_][A-Za-z0-9_-]*)\]' | ForEach-Object { $_.Matches[0].Groups[1].Value }
   ) | Where-Object { $_ -like "$WordToComplete*" }
 }
 
@@ -30,7 +30,8 @@ function _multidrop_drive {
   @(
   'all'
   Select-String -Path (Join-Path (_multidrop_folder) 'multidrop.toml') -ErrorAction SilentlyContinue `
-    -Pattern '[?&]drives=([^"&]*)' | ForEach-Object { $_.Matches[0].Groups[1].Value -split ',' }
+    -Pattern '[?&]drives=([^"&]*)' | ForEach-Object { $_.Matches[0].Groups[1].Value -split ',' } |
+    Where-Object { $_ -notmatch '^[-=+@]' }
   ) | Where-Object { $_ -like "$WordToComplete*" }
 }
 
@@ -38,7 +39,7 @@ function _multidrop_macro {
   param([string]$WordToComplete)
   @(
   Get-ChildItem -Path 'macros', (Join-Path (_multidrop_folder) 'macros') -Filter '*.toml' `
-    -ErrorAction SilentlyContinue | ForEach-Object { $_.BaseName }
+    -ErrorAction SilentlyContinue | ForEach-Object { $_.BaseName } | Where-Object { $_ -notmatch '^[-=+@]' }
   ) | Where-Object { $_ -like "$WordToComplete*" }
 }
 
@@ -94,7 +95,7 @@ $_shtab_multidrop_option_strings = @{
     '_shtab_multidrop_poll' = @('-h', '--help', '--every', '--drive', '--rows', '--json', '--no-reconnect', '--no-config')
     '_shtab_multidrop_ports' = @('-h', '--help', '--json', '--no-config')
     '_shtab_multidrop_program' = @('-h', '--help')
-    '_shtab_multidrop_program_check' = @('-h', '--help', '--language', '--personality', '--format', '--json', '--no-config')
+    '_shtab_multidrop_program_check' = @('-h', '--help', '--language', '--personality', '--cell', '--format', '--json', '--no-config')
     '_shtab_multidrop_program_convert' = @('-h', '--help', '--to', '--personality', '-o', '--output', '--until', '--no-config')
     '_shtab_multidrop_program_diff' = @('-h', '--help', '--drive', '--json', '--no-config')
     '_shtab_multidrop_program_download' = @('-h', '--help', '--drive', '--save', '--run', '--only-changed', '--no-verify', '--yes', '--no-config')
@@ -164,6 +165,7 @@ $_shtab_multidrop_compgens = @{
     '_shtab_multidrop_plot_pos_0' = '_multidrop_url'
     '_shtab_multidrop_poll___drive' = '_multidrop_drive'
     '_shtab_multidrop_poll_pos_0' = '_multidrop_url'
+    '_shtab_multidrop_program_check___cell' = '_shtab_powershell_compgen_files'
     '_shtab_multidrop_program_check_pos_0' = '_shtab_powershell_compgen_files'
     '_shtab_multidrop_program_convert_pos_0' = '_shtab_powershell_compgen_files'
     '_shtab_multidrop_program_diff___drive' = '_multidrop_drive'
@@ -748,6 +750,7 @@ $_shtab_multidrop_help = @{
     '_shtab_multidrop_program___help' = 'show this help message and exit'
     '_shtab_multidrop_program__h' = 'show this help message and exit'
     '_shtab_multidrop_program_check' = 'Report the errors in program files, by line and column.'
+    '_shtab_multidrop_program_check___cell' = 'the drive that the program is for, from a cell file such as a snapshot (CELL, CELL#BUS or CELL#BUS:NAME): commands that its firmware or size lacks are named, too'
     '_shtab_multidrop_program_check___format' = 'rewrite files without errors in canonical spelling; remarks stay'
     '_shtab_multidrop_program_check___help' = 'show this help message and exit'
     '_shtab_multidrop_program_check___json' = 'print one JSON object a line'

@@ -264,6 +264,7 @@ class _Return:
         self._publish = say
         self._since = bus.now()
         self._unsure = [drive for drive in bus.all_drives if may_move(drive)]
+        self._unread = [drive for drive in bus.all_drives if drive not in self._unsure and _unread(drive)]
         self._stopped = ""
         """The drives to which a stop was sent first; its confirmation reads what moves."""
         self._reason = ""
@@ -279,6 +280,9 @@ class _Return:
         if self._unsure:
             seen = ", ".join(f"{each.shown} {last_seen(each, self._since)}" for each in self._unsure)
             self._say(f"{bus.name}: cannot be stopped from here until the line is back: {seen}{E_STOP}")
+        if self._unread:
+            names = ", ".join(each.shown for each in self._unread)
+            self._say(f"{bus.name}: not known whether these move, as they were not read yet: {names}")
         pauses = Pauses(FIRST, LONGEST)
         while True:
             await asyncio.sleep(pauses.now)
@@ -304,7 +308,7 @@ class _Return:
         if newcomer is not None and bus.drives:
             return await newcomer.found()
         self._say(f"{bus.name} is back after {bus.now() - self._since:.1f} s")
-        for drive in self._unsure:
+        for drive in (*self._unsure, *self._unread):
             if drive.address in bus.drives and not drive.programming and not self._stopped:
                 self._say(f"{bus.name}: {await _motion(drive)}")
 
@@ -337,6 +341,11 @@ async def _motion(drive: Drive) -> str:
     if not velocity and drive.seen is not None and not drive.seen.at_rest():
         return f"{drive.shown} {UNCONFIRMED}; now {where}"
     return f"{drive.shown} moves at {velocity} a second" if velocity else f"{drive.shown} is at rest at {where}"
+
+
+def _unread(drive: Drive) -> bool:
+    """True if a drive was identified, and its velocity was not read yet: it may have been moving all the time."""
+    return drive.seen is None and bool(drive.product) and not drive.state.stranger
 
 
 def may_move(drive: Drive) -> bool:

@@ -15,11 +15,11 @@ from urllib.parse import unquote
 
 from multidrop.dialects import Diagnostic, Hints
 from multidrop.dialects.families import TABLE
-from multidrop.dialects.text import whole
+from multidrop.dialects.text import acts_first, whole
 from multidrop.shell.configuration import SavedConnection
 from multidrop.shell.connect.url_forms import URL_FORMS, sentence
 from multidrop.shell.secrets import holds_password, url_without_secrets, without_secrets
-from multidrop.transports.ssh import WAYS, wrong_path
+from multidrop.transports.ssh import WAYS, WORD, wrong_path
 
 DEFAULT_PORTS = {scheme: form.port or None for scheme, form in URL_FORMS.items() if form.port is not None}
 SCHEMES = tuple(URL_FORMS)
@@ -33,10 +33,6 @@ OF_A_LINE = ("family", "drives", "baud", "party", "checksum", "em", "local_echo"
 """What is not to be given of such a connection."""
 USB = r"(?:[!-?A-~]+(?:@\d+-\d+(?:\.\d+)*)?)?"
 """A controller on USB: its device number with the socket that it is plugged into, or its place in the list."""
-
-
-_WORD = r"[A-Za-z0-9_.][A-Za-z0-9_.-]*"
-"""The name of a user or a host for ssh, which takes a first `-` for an option."""
 
 
 @dataclass(frozen=True)
@@ -151,7 +147,7 @@ def _parsed(text: str) -> Connection:
 def _ssh(base: Connection, body: str) -> Connection:
     """A host as `ssh` takes it, never one of its options, and the path of a port there."""
     example = "as in ssh://user@host/dev/ttyUSB0"
-    found = re.fullmatch(rf"//(?:({_WORD})@)?(\[[0-9A-Fa-f:.]+\]|{_WORD})(?::(\d+))?(/.*)?", body, re.DOTALL)
+    found = re.fullmatch(rf"//(?:({WORD})@)?(\[[0-9A-Fa-f:.]+\]|{WORD})(?::(\d+))?(/.*)?", body, re.DOTALL)
     if found is None:
         raise Diagnostic("ssh: needs //[USER@]HOST[:PORT] and the path of a port there", base.text, example)
     if (port := whole(found[3], 1, 65535) if found[3] else 0) is None:
@@ -179,7 +175,7 @@ def _scheme(text: str) -> tuple[str, str]:
 
 def _host(body: str, scheme: str, text: str) -> tuple[str, int]:
     example = f"as in {scheme}://10.0.0.5:{DEFAULT_PORTS[scheme] or 2217}"
-    found = re.fullmatch(r"//(\[[0-9A-Fa-f:.]+\]|[A-Za-z0-9._-]+)(?::(\d+))?/?", body)
+    found = re.fullmatch(rf"//(\[[0-9A-Fa-f:.]+\]|{WORD})(?::(\d+))?/?", body)
     if found is None:
         raise Diagnostic(f"{scheme}: needs //HOST:PORT", text, example)
     port = whole(found[2], 1, 65535) if found[2] else DEFAULT_PORTS[scheme]
@@ -205,7 +201,7 @@ def _number(low: float, high: float, kind: type) -> tuple[Callable[[str], Any], 
 
 def _names(value: str) -> Any:
     names = tuple(name.strip() for name in value.split(","))
-    good = all(re.fullmatch(r"[!-)+-\]_-~]{1,3}", name) for name in names)
+    good = all(re.fullmatch(r"[!-)+-\]_-~]{1,3}", name) and not acts_first(name) for name in names)
     return names if good and len(set(names)) == len(names) else None
 
 
@@ -260,6 +256,14 @@ def _with_query(connection: Connection, query: str) -> Connection:
         values |= {"family": own, "addressed": False}
     hints = {name: values.pop(name) for name in list(values) if name in HINTED}
     return replace(connection, hints=Hints(**hints), **values)
+
+
+def with_echo(connection: Connection) -> Connection:
+    """The connection with `echo=local`, for an adapter that was found to repeat what it sends."""
+    if connection.local_echo:
+        return connection
+    sign = "&" if "?" in connection.text else "?"
+    return replace(connection, text=f"{connection.text}{sign}echo=local", local_echo=True)
 
 
 HOST = "127.0.0.1"

@@ -8,7 +8,7 @@ person is asked before it is tried. A language with a hazard of its own is searc
 from __future__ import annotations
 
 import asyncio
-from collections.abc import AsyncIterator, Callable, Iterable, Iterator, Sequence
+from collections.abc import AsyncIterator, Callable, Iterable, Sequence
 from contextlib import AsyncExitStack, asynccontextmanager, suppress
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
@@ -22,7 +22,7 @@ from multidrop.drives.stopping import Halt
 from multidrop.shell import stop_report
 from multidrop.shell.channel import Job, running
 from multidrop.shell.connect.opening import BAUDED, Opened, Opener, far_port, port_name
-from multidrop.shell.connect.urls import DIRECT, Connection
+from multidrop.shell.connect.urls import DIRECT, Connection, with_echo
 from multidrop.shell.state.port_state import memory_of
 from multidrop.shell.workspace import Workspace
 from multidrop.transports import TransportLost
@@ -340,7 +340,8 @@ class Scanning:
             self._read.append(halt)
 
     def connection(self, stage: Stage) -> Connection:
-        return next(self._forms(stage))
+        """The connection as a stage opens it."""
+        return replace(self._connection, baud=stage.baud, hints=replace(self._connection.hints, family=stage.family))
 
     async def converse(self, connection: Connection, procedure: Callable[[], Procedure[None]]) -> None:
         """Open the port, and run a conversation with all that is there."""
@@ -402,43 +403,34 @@ class Scanning:
             self._done = min(self._done + 1, total)
             job(self._done, total)
 
-        for connection in self._forms(stage):
-            began = self._workspace.now()
-            buses = await self._opener(connection, str)
-            distance = min((self._workspace.now() - began) * TURNS.get(connection.scheme, 0.0), SLOWEST)
-            if (trip := buses[0].bus.link.transport.round_trip) is not None:
-                distance = SPREAD * trip + JITTER
-            repeats = False
-            async with AsyncExitStack() as open_:
-                for each in buses:
-                    await open_.enter_async_context(self._adopted(each, stage))
-                for each in buses:
-                    self._done = begun
-                    repeats |= await self._searched(each, stage, connection, self._reach(distance, hasty), step)
-            if not repeats:
-                return
-            text = "the adapter repeats what it sends: the search begins again with echo=local"
-            self._warn(port_of(connection, ""), [text])
+        connection, began = self.connection(stage), self._workspace.now()
+        buses = await self._opener(connection, str)
+        distance = min((self._workspace.now() - began) * TURNS.get(connection.scheme, 0.0), SLOWEST)
+        if (trip := buses[0].bus.link.transport.round_trip) is not None:
+            distance = SPREAD * trip + JITTER
+        async with AsyncExitStack() as open_:
+            for each in buses:
+                await open_.enter_async_context(self._adopted(each, stage))
+            for each in buses:
+                self._done = begun
+                await self._searched(each, stage, self._reach(distance, hasty), step)
 
-    def _forms(self, stage: Stage) -> Iterator[Connection]:
-        """The connections of a stage: a second one, with echo=local, for an adapter that repeats what it sends."""
-        hints = replace(self._connection.hints, family=stage.family)
-        given = replace(self._connection, baud=stage.baud, hints=hints)
-        yield given
-        if not given.local_echo:
-            self._connection = replace(self._connection, local_echo=True)
-            yield replace(given, local_echo=True)
+    def _repeats(self) -> None:
+        """Note that the adapter repeats what it sends: every stage opens its port with echo=local from now on."""
+        if not self._connection.local_echo:
+            self._connection = with_echo(self._connection)
+            text = "the adapter repeats what it sends; the URLs that are found have echo=local"
+            self._warn(port_of(self._connection, ""), [text])
 
-    async def _searched(
-        self, opened: Opened, stage: Stage, connection: Connection, reach: Reach, step: Callable[[], None]
-    ) -> bool:
-        """Search one bus; return whether its adapter repeats what it sends."""
+    async def _searched(self, opened: Opened, stage: Stage, reach: Reach, step: Callable[[], None]) -> None:
+        """Search one bus."""
         bus, hints = opened.bus, opened.hints
-        port = port_of(connection, bus.name)
+        port = port_of(self._connection, bus.name)
+        bus.link.on_echo = self._repeats
 
         def found(state: DriveState) -> None:
             bus.roster.probes(state.address)
-            each = FoundDrive(connection, port, state)
+            each = FoundDrive(self.connection(stage), port, state)
             self.found.append(each)
             self._report(each)
             self._warn(port, state.take_messages()[0])
@@ -451,7 +443,6 @@ class Scanning:
             outcome = await bus.search(stage.scan.search(reach, found, step))
         self._other = spoken(bytes(heard), stage.family) or self._other
         self._warn(f"{port}: {stage.words}", filter(None, (*outcome.remarks, self._other)))
-        return bool(outcome.echo)
 
     def _warn(self, where: str, texts: Iterable[str]) -> None:
         for each in texts:

@@ -97,8 +97,8 @@ def named_value(text: str) -> tuple[str, str]:
 
 def role_url(text: str) -> tuple[str, str]:
     name, url = named_value(text)
-    if not (name.replace("-", "").replace("_", "").isalnum() and name.isascii()):
-        raise argparse.ArgumentTypeError(f"{name} is not a name of letters, digits, - and _")
+    if not (name.replace("-", "").replace("_", "").isalnum() and name.isascii()) or name.startswith("-"):
+        raise argparse.ArgumentTypeError(f"{name} is not a name of letters, digits, - and _, not - first")
     return name, url
 
 

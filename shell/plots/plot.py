@@ -60,6 +60,8 @@ class Plot:
         self._on_failure: list[Callable[[str], None]] = []
         self.target = sink.target
         """The target, with the port that is in use."""
+        self._in_units: set[Curve] = set()
+        """The curves in units of which no end was recorded."""
         self.samples = 0
         """The number of samples taken."""
         self.failure = ""
@@ -98,7 +100,15 @@ class Plot:
     def in_units(self, bus: str, sample: Sample, word: str, value: float, unit: str) -> None:
         """Take a quantity of a sample in the unit of its axis, too."""
         if not self._done:
-            self._point(Curve(bus, sample.address, sample.axis, word, unit=unit), sample.at, value)
+            curve = Curve(bus, sample.address, sample.axis, word, unit=unit)
+            self._in_units.add(curve)
+            self._point(curve, sample.at, value)
+
+    def not_in_units(self, bus: str, sample: Sample) -> None:
+        """End the curves of an axis in its unit: its scale does not hold."""
+        for curve in [each for each in self._in_units if each[:3] == (bus, sample.address, sample.axis)]:
+            self._in_units.remove(curve)
+            self._batch.gaps.setdefault(curve, []).append(self._times(sample.at))
 
     def value(self, bus: str, read: Valued) -> None:
         if not self._done:
@@ -241,7 +251,7 @@ def states_of(conditions: Conditions) -> Iterator[tuple[str, str]]:
     """The name of each lane and its state; an empty state is not known."""
     yield "program", conditions.program or "none"
     if conditions.error:
-        number = "set" if conditions.error == UNREAD else str(conditions.error)
+        number = "set" if conditions.error == UNREAD else conditions.error_name.removeprefix("error")
         yield "error", f"{number} {conditions.error_text}".strip()
     else:
         yield "error", "none"
@@ -324,8 +334,8 @@ def _take(workspace: Session, plot: Plot, wanted: set[Series], buses: set[str], 
         return _twin(plot, wanted, bus, inner)
     if isinstance(inner, Sample) and Series(bus, inner.address) in wanted:
         plot.sample(bus, inner)
-        for quantity in _in_units(workspace, bus, inner) if workspace.scaled else ():
-            plot.in_units(bus, inner, *quantity)
+        if workspace.scaled:
+            _also_in_units(workspace, plot, bus, inner)
     elif isinstance(inner, Valued) and Series(bus, inner.address, inner.word) in wanted:
         plot.value(bus, inner)
     elif isinstance(inner, Conditioned) and Series(bus, inner.address) in wanted:
@@ -337,6 +347,14 @@ def _take(workspace: Session, plot: Plot, wanted: set[Series], buses: set[str], 
     elif isinstance(inner, Unsolicited) and bus in buses:
         for text in inner.lines:
             plot.text(bus, "", inner.at, text, "reply")
+
+
+def _also_in_units(workspace: Session, plot: Plot, bus: str, sample: Sample) -> None:
+    quantities = list(_in_units(workspace, bus, sample))
+    for quantity in quantities:
+        plot.in_units(bus, sample, *quantity)
+    if not quantities:
+        plot.not_in_units(bus, sample)
 
 
 def _in_units(workspace: Session, bus: str, sample: Sample) -> Iterator[tuple[str, float, str]]:

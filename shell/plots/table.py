@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from multidrop.dialects import Diagnostic
-from multidrop.dialects.text import visible
+from multidrop.dialects.text import cell, visible
 from multidrop.shell.plots.file import GAP, Locked, SinkBroken, disk_full, pyarrow, synced
 from multidrop.shell.plots.request import PlotTarget
 from multidrop.shell.plots.rerun_calls import TWIN, Batch
@@ -62,7 +62,8 @@ class TableSink(Locked):
         try:
             for elapsed, wall, *row in sorted(_rows(batch), key=lambda row: row[0]):
                 stamp = datetime.fromtimestamp(wall, UTC).isoformat(timespec="milliseconds").replace("+00:00", "Z")
-                self._rows.writerow((stamp, f"{elapsed:.4f}", *row))
+                cells = row if self._parquet else [cell(each) if isinstance(each, str) else each for each in row]
+                self._rows.writerow((stamp, f"{elapsed:.4f}", *cells))
             self._file.flush()
             self._good = self._file.tell()
         except OSError as error:

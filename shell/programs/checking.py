@@ -14,11 +14,12 @@ from __future__ import annotations
 import importlib
 import os
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, cast
 
 from multidrop.dialects import Diagnostic
-from multidrop.dialects.families import program_language_of, program_languages
+from multidrop.dialects.families import correct_in, program_language_of, program_languages
 from multidrop.dialects.files import encoded_program_of, program_text_of, split_lines, why
 from multidrop.dialects.program_files import Conversion, Converter, Problem, errors, in_order, refuse
 from multidrop.simulator.cell.spec import DriveSpec
@@ -58,10 +59,18 @@ class Checked:
         return sum(old != new for old, new in lines) if self.right else 0
 
 
-def examine(file: str, personality: str, language: str = "") -> Checked:
-    """Check one file for a product; its name gives the language. Raises Diagnostic if it cannot be read."""
+def examine(
+    file: str, personality: str, language: str = "", reported: Mapping[str, tuple[str, str]] = MappingProxyType({})
+) -> Checked:
+    """Check one file for a product; its name gives the language. Raises Diagnostic if it cannot be read.
+
+    `reported`: for the product of one unit, the version and the part number that it prints.
+    """
     text, encoding = encoded_program_of(file)
-    return examine_text(text, file, personality, language, encoding)
+    checked = examine_text(text, file, personality, language, encoding)
+    files = program_languages()[language or program_language_of(file)]
+    more = files.unsupported(text, personality, *reported.get(personality, ("", "")))
+    return replace(checked, problems=in_order([*checked.problems, *more]))
 
 
 def examine_text(text: str, file: str, personality: str, language: str = "", encoding: str = "utf-8") -> Checked:
@@ -97,12 +106,11 @@ def ending_of(product: str) -> str:
 
 def _other_language(text: str, language: str) -> Problem | None:
     """Report that a text is a correct program of another language; None if it is not."""
+    if not (name := correct_in(text, language)):
+        return None
     known = program_languages()
-    for name, other in known.items():
-        if name != language and not errors(other.language.check(text)):
-            hint = f"name it {' or '.join(other.endings)}, or check it with --language {name}"
-            return Problem(1, 1, f"this is {other.title}, not {known[language].title}", hint)
-    return None
+    hint = f"name it {' or '.join(known[name].endings)}, or check it with --language {name}"
+    return Problem(1, 1, f"this is {known[name].title}, not {known[language].title}", hint)
 
 
 def rewrite(checked: Checked) -> None:

@@ -15,7 +15,7 @@ from multidrop.dialects import Diagnostic, DriveError, Inexpressible, Procedure,
 from multidrop.dialects.debugging import Debugging, Look, Neighbours
 from multidrop.dialects.program_files import Stored
 from multidrop.drives.drive import Drive
-from multidrop.drives.events import Lost
+from multidrop.drives.events import Lost, Restarted
 from multidrop.shell.events import OnBus, Phase, SessionEvent
 from multidrop.shell.program_listing import Listing, Sight
 from multidrop.shell.session import Session
@@ -257,6 +257,8 @@ class Debugger:
             self._commands = -1
             self._sight.seen(None)
             self._say_left()
+        if isinstance(event, OnBus) and event.bus == link.name and isinstance(event.event, Restarted):
+            self._restarted(event.event)
         if self._stops == link.stops:
             return
         self._stops = link.stops
@@ -267,6 +269,16 @@ class Debugger:
             task = asyncio.get_running_loop().create_task(self._check_stopped())
             self._checks.add(task)
             task.add_done_callback(self._checks.discard)
+
+    def _restarted(self, event: Restarted) -> None:
+        """Forget what was set in the drive: it has no break point, and no program of it waits."""
+        if event.address != self._drive.address:
+            return
+        self._commands, self._place, self.break_point = -1, "", ""
+        self._last, self._free_at, self._waits = None, float("-inf"), False
+        self._debugging.forget(self._drive.state)
+        self._sight.breaks("")
+        self._sight.seen(None)
 
     async def _check_stopped(self) -> None:
         """Read whether a program still runs after a stop, and say so."""

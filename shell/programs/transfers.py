@@ -16,9 +16,9 @@ from weakref import WeakSet
 
 from multidrop.dialects import Diagnostic, DriveError, Refused, SourceLine
 from multidrop.dialects.errors import Differs
-from multidrop.dialects.families import program_languages
+from multidrop.dialects.families import correct_in, program_languages
 from multidrop.dialects.files import check_program_text, program_text_of
-from multidrop.dialects.program_files import LOCKED, Difference, Held, errors, refuse
+from multidrop.dialects.program_files import LOCKED, Difference, Held, errors, in_order, refuse
 from multidrop.dialects.text import counted
 from multidrop.drives.drive import Drive, still
 from multidrop.shell import motions
@@ -69,11 +69,12 @@ async def checked(
         check_program_text(text, file)
     own = drive.program_files
     problems = await asyncio.to_thread(own.language.check, text, drive.product)
-    for other in program_languages().values() if errors(problems) else ():
-        if other is not own and not errors(await asyncio.to_thread(other.language.check, text)):
-            raise Diagnostic(f"is {other.title}, and {workspace.display_name(drive)} runs {own.title}", file)
+    if errors(problems) and (other := await asyncio.to_thread(correct_in, text, drive.family.name)):
+        title = program_languages()[other].title
+        raise Diagnostic(f"is {title}, and {workspace.display_name(drive)} runs {own.title}", file)
     refuse(problems, file)
-    for each in problems:
+    unit = await asyncio.to_thread(own.unsupported, text, drive.product, drive.version, drive.state.part)
+    for each in in_order([*problems, *unit]):
         if each.warning:
             workspace.notify(f"{each.where(file)}: warning: {each.what}", warning=True)
     return text, await asyncio.to_thread(own.language.read, text, file)

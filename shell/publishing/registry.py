@@ -83,7 +83,8 @@ def error_of(conditions: Iterable[Conditions]) -> Fields:
     found = next((each for each in conditions if each.error), None)
     if found is None:
         return {"value": 0, "text": ""}
-    text = "set; to read its number would clear it" if found.error == UNREAD else found.error_text
+    unread = found.cause or "set; to read its number would clear it"
+    text = unread if found.error == UNREAD else found.error_text
     return {"value": found.error, "text": text, "axis": found.axis}
 
 

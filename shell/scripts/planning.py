@@ -134,6 +134,7 @@ class _Planning:
             text = with_numbers(text)
         if value_names(line.text) <= dict.keys(values):
             try:
+                drive.check_address(text)
                 drive.family.check_line(drive.state, text)
             except Inexpressible as problem:
                 raise Diagnostic(str(problem), line.where) from None

@@ -19,7 +19,7 @@ from typing import Any
 
 from multidrop.dialects import Diagnostic
 from multidrop.dialects.files import bytes_of, utf8, why
-from multidrop.dialects.text import counted, whole
+from multidrop.dialects.text import cell, counted, of_cell, whole
 from multidrop.macros.atomic import write_atomically
 from multidrop.shell import new_file
 from multidrop.shell.plots.file import pyarrow
@@ -49,6 +49,8 @@ class Table:
         self._columns = ["case", *keys, "ok", "failed", "why", *kept, *self._facts]
         self._kept = slice(4 + len(keys), 4 + len(keys) + len(kept))
         self._rows: dict[int, bytes] = {}
+        self._cells: dict[int, bytes] = {}
+        """The rows as a CSV file has them: no cell is a formula."""
         self.known: dict[int, Result] = {}
         """The results that the file to resume has."""
         if csv_file and csv_file == parquet:
@@ -90,10 +92,10 @@ class Table:
         if self._files:
             values = self._values(result.number)
             failed = self._reasons.get(result.failed, "")
-            line = io.StringIO()
-            row = [result.number, *values, "true" if result.ok else "false", failed, result.why, *result.cells]
-            csv.writer(line, lineterminator="\n").writerow([*row, *self._facts.values()])
-            self._rows[result.number] = line.getvalue().encode("utf-8", "backslashreplace")
+            row = [str(result.number), *values, "true" if result.ok else "false", failed, result.why, *result.cells]
+            row += self._facts.values()
+            self._rows[result.number] = _line(row)
+            self._cells[result.number] = _line(map(cell, row))
 
     def _values(self, number: int) -> list[str]:
         return [each if isinstance(each, str) else spelled(each) for each in self._plan.values_of(number)]
@@ -107,11 +109,10 @@ class Table:
             self._next = end + max(PERIOD, SHARE * (end - begin))
 
     def _write(self, files: Iterable[str]) -> None:
-        head = io.StringIO()
-        csv.writer(head, lineterminator="\n").writerow(self._columns)
-        data = b"".join([head.getvalue().encode(), *(self._rows[number] for number in sorted(self._rows))])
         for file in files:
             pa = self._files[file]
+            rows = self._cells if pa is None else self._rows
+            data = b"".join([_line(self._columns), *(rows[number] for number in sorted(rows))])
             try:
                 write_atomically(Path(file), data if pa is None else self._as_parquet(pa, data))
             except (OSError, ValueError) as problem:
@@ -135,7 +136,7 @@ class Table:
             head = next(rows, [])
             if head[:1] != ["case"] or not {"ok", "failed", "why", "vary"} <= {*head}:
                 raise _strange(file)
-            for row in rows:
+            for row in (list(map(of_cell, each)) for each in rows):
                 if len(row) != len(head):
                     raise Diagnostic("is not a whole row", f"{file}:{rows.line_num}", "remove it, or name a new file")
                 self._check_facts(file, dict(zip(head, row, strict=True)))
@@ -158,8 +159,8 @@ class Table:
         codes = {text: code for code, text in reversed([*self._reasons.items()])} | {"": HELD}
         ok, failed, said = row[self._kept.start - 3 : self._kept.start]
         number, code, cells = whole(row[0], 1, self._plan.count), codes.get(failed), tuple(row[self._kept])
-        for name, cell in zip(self._columns[self._kept], cells, strict=True):
-            if name.startswith(MARGIN) and cell and not _NUMBER.fullmatch(cell):
+        for name, each in zip(self._columns[self._kept], cells, strict=True):
+            if name.startswith(MARGIN) and each and not _NUMBER.fullmatch(each):
                 return None
         if number is None or code is None or (ok == "true") != (code == HELD):
             return None
@@ -168,10 +169,16 @@ class Table:
         return Result(number, code, said, cells)
 
 
-def _same(cell: str, value: str) -> bool:
+def _line(row: Iterable[str]) -> bytes:
+    line = io.StringIO()
+    csv.writer(line, lineterminator="\n").writerow(row)
+    return line.getvalue().encode("utf-8", "backslashreplace")
+
+
+def _same(found: str, value: str) -> bool:
     """Whether a cell has a value. Parquet writes numbers in another way."""
     try:
-        return cell == value or float(cell) == float(value)
+        return found == value or float(found) == float(value)
     except ValueError:
         return False
 

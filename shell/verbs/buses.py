@@ -117,6 +117,7 @@ async def status(call: Call) -> None:
     units = call.session.units if call.session.scaled else None
     if units is None or not units.shown or not units.axes(drive) or drive.programming:
         return
+    await units.look(drive)
     for each in await drive.motion():
         place = units.words(drive, each.axis, each.position, Takes.PLACE)
         speed = units.words(drive, each.axis, each.velocity, Takes.VELOCITY)

@@ -10,6 +10,7 @@ from typing import Any
 from multidrop.dialects import Diagnostic, Inexpressible, Procedure
 from multidrop.dialects.families import FAMILIES, TABLE
 from multidrop.dialects.family import Registers
+from multidrop.dialects.on_demand import imported
 from multidrop.dialects.text import whole
 from multidrop.drives.drive import Drive
 from multidrop.shell import motions
@@ -19,6 +20,7 @@ from multidrop.shell.params import work
 from multidrop.shell.params.work import Options
 from multidrop.shell.plots.plot import begin
 from multidrop.shell.plots.request import DEFAULT, FILES, TABLES, parse_rate, parse_series, parse_target, read_first
+from multidrop.shell.session import TRAVEL
 from multidrop.shell.verbs.call import Call
 
 FLAGS = ("--dry-run", "--save", "--communication", "--other-product", "--defaults")
@@ -200,6 +202,8 @@ async def register(call: Call) -> None:
     values = [_number(call, text.strip()) for text in found[2].split(",")]
     lines = registers.lines(address, values)
     for line in lines:
+        if call.session.scaled:
+            await imported(TRAVEL)(call.session.units, drive, line, call.by)
         await call.session.path.guard(drive, line, call.by)
     known = len(lines) == len(values) and len([line for line in lines if drive.starts(line)]) < 2
     writes = next(filter(drive.starts, lines), lines[0]) if known else ""

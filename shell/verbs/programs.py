@@ -43,7 +43,9 @@ async def list_(call: Call) -> None:
     if file:
         new_file.check(call.output_file(file), printed=True)
     lines = await program_listing.readable(call.session, drive)
-    if file:
+    if not lines:
+        program_listing.say_none(call.session, drive)
+    if file and lines:
         return program_listing.save_new(call.session, drive, file, lines)
     for line in lines:
         call.session.output(line)
@@ -99,7 +101,8 @@ async def check(call: Call) -> None:
     own = selected.product if selected else ""
     product = wanted or (own if own in valid else PROGRAMS[language].drive.personality)
     call.warn_of_editor(file)
-    checked = await asyncio.to_thread(examine, file, product)
+    reported = {own: (selected.version, selected.state.part)} if selected else {}
+    checked = await asyncio.to_thread(examine, file, product, reported=reported)
     for each in checked.problems:
         call.session.notify(each.line_for(file), warning=True)
     if not checked.right:

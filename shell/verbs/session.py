@@ -242,9 +242,9 @@ WIDTH = 28
 
 async def help_(call: Call) -> None:
     word, selected = call.word(), call.session.selected
-    language, product = (selected.family.language, selected.product) if selected else (FAMILIES[DEFAULT].language, "")
+    language, product = (selected.family.language, selected.product) if selected else (None, "")
     lines = explained(word, language, product) if word else overview()
-    if word and selected and call.session.scaled and language.knows(word):
+    if word and selected and call.session.scaled and selected.family.language.knows(word):
         from multidrop.shell import setting_units
 
         taken = setting_units.example(call.session.units, selected, word.upper())
@@ -256,9 +256,10 @@ async def help_(call: Call) -> None:
         call.session.output(line, columns=True)
 
 
-def explained(word: str, language: Language, product: str = "") -> list[str]:
-    """The help on a verb, a command or an error number. Raises Diagnostic for what is none."""
+def explained(word: str, language: Language | None, product: str = "") -> list[str]:
+    """Return the help on a verb, a command or an error number. Raises Diagnostic for what is none."""
     if word.isdecimal() and word.isascii():
+        language = language or FAMILIES[DEFAULT].language
         return language.describe_error(int(word[:9]), product)
     return described(word, language, product)
 
@@ -277,20 +278,25 @@ def overview() -> list[str]:
 
 
 def described(name: str, language: Language | None = None, product: str = "") -> list[str]:
-    """The help on a verb (with or without its slash) or a command, for a product where that matters.
+    """Return the help on a verb (with or without its slash) or a command, for a product where that matters.
 
-    The selected drive's language (None: the default one) comes before others. Raises Diagnostic for an unknown name.
+    Where a drive is selected, only its language is explained: a word may mean something else to another drive. Without
+    one (None) each language is. Raises Diagnostic for an unknown name.
     """
-    language = language or FAMILIES[DEFAULT].language
     if name.startswith("/") and name in VERBS:
         verb = VERBS[name]
         return [*verb.described(), *["Needs the screen, which multidrop tui shows."] * (verb.fits in ON_SCREEN)]
-    for each in (language, *languages()):
+    for each in [language] if language else languages():
         if each.knows(name):
-            return each.describe(name, product if each is language else "")
+            return each.describe(name, product)
     if f"/{name}" in VERBS:
         return described(f"/{name}")
-    near = difflib.get_close_matches(name.upper(), [*language.names(), *(key.upper() for key in VERBS)], 3)
+    if language and (others := [key for key, family in FAMILIES.items() if family.language.knows(name)]):
+        raise Diagnostic(
+            f"this drive has no command {name}", "/help", f"multidrop help {name} --dialect {others[0]} explains it"
+        )
+    own = language or FAMILIES[DEFAULT].language
+    near = difflib.get_close_matches(name.upper(), [*own.names(), *(key.upper() for key in VERBS)], 3)
     shown = [each.lower() if name.startswith("/") else each for each in near]
     hint = f"similar: {', '.join(shown)}" if shown else "/help lists the verbs"
     raise Diagnostic(f"no verb or command {name}", "/help", hint)

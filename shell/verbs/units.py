@@ -90,7 +90,8 @@ def _meant(call: Call, target: str) -> tuple[Drive, str]:
 def _described(call: Call, drive: Drive, name: str) -> str:
     """A scale in one line: `a: 5 mm/turn, 51200 a turn (MS=256, EE=0), travel 0 mm to 300 mm`."""
     session = call.session
-    axis = session.units.axes(drive)[name]
+    axis = session.units.of(drive, name)
+    assert axis is not None  # it was listed
     shown = session.display_name(drive) or drive.shown
     parts = [f"{shown}.{name}" if name else shown, str(axis.scale)]
     if axis.measure is not None:
@@ -105,6 +106,10 @@ def _described(call: Call, drive: Drive, name: str) -> str:
         parts.append("travel {} to {}".format(*map(axis.scale.shown, axis.scale.travel)))
     if not session.units.referenced(drive, name):
         parts.append("not referenced")
-    if axis.measure is not None and not axis.sure:
-        parts.append("not confirmed since a program ran, or a setting changed")
+    if changes := drive.counting.changes(name):
+        parts.append(f"not shown in units, as {', '.join(changes)}: /units {parts[0]} accepts that")
+    elif not axis.holds:
+        parts.append("not shown in units, as what it rests on may have changed and was not read since")
+    elif axis.measure is not None and not axis.sure:
+        parts.append("not confirmed since a program ran")
     return f"{parts[0]}: {', '.join(filter(None, parts[1:]))}"

@@ -28,7 +28,9 @@ from multidrop.shell.watching import wire
 assert sys.platform != "win32"
 
 MOST = 16
-"""Watchers at one time."""
+"""Watchers at one time, and connections that have not greeted yet."""
+BACKLOG = 128
+"""Connections that may come at once, before the thread that takes them comes to run."""
 WAITING = 512 * 1024
 """The bytes that may wait for a watcher."""
 PATIENCE = 5.0
@@ -55,9 +57,12 @@ class Calls:
 class Watcher:
     """The connection of one watcher."""
 
-    def __init__(self, made: socket.socket, loop: asyncio.AbstractEventLoop, calls: Calls) -> None:
+    def __init__(
+        self, made: socket.socket, loop: asyncio.AbstractEventLoop, calls: Calls, admitted: Callable[[Watcher], bool]
+    ) -> None:
+        """`admitted`, called in its thread once it has greeted, takes a place for it, if there is one."""
         self.name = ""
-        self._socket, self._loop, self._calls = made, loop, calls
+        self._socket, self._loop, self._calls, self._admitted = made, loop, calls, admitted
         self._stops = 0
         self._writer = BoundedWriter(made.send, self._lost, lambda problem: self.close(), WAITING, name="watcher")
 
@@ -104,6 +109,9 @@ class Watcher:
         if wrong := wire.other_version(version, f"the program of {self.name}"):
             self.turn_away(wrong)
             return False
+        if not self._admitted(self):
+            self.turn_away(f"more than {MOST} watchers at a time")
+            return False
         self._socket.settimeout(None)
         return True
 
@@ -131,15 +139,18 @@ class Gate:
         self.path = folder / f"{os.getpid()}.sock"
         self.watchers: list[Watcher] = []
         """Those that have greeted; changed in the loop."""
-        self._loop, self._calls = loop, calls
-        self._open, self._closed = threading.Semaphore(MOST), False
+        self._loop, self._calls, self._closed = loop, calls, False
+        self._lock = threading.Lock()
+        self._waiting: list[Watcher] = []
+        """Connections that have not greeted yet, the oldest first."""
+        self._admitted: set[Watcher] = set()
         self._socket = socket.socket(socket.AF_UNIX)
         try:
             private(folder)
             self.path.unlink(missing_ok=True)
             self._socket.bind(str(self.path))
             self.path.chmod(0o600)
-            self._socket.listen(MOST)
+            self._socket.listen(BACKLOG)
         except OSError as problem:
             self._socket.close()
             hint = "set MULTIDROP_STATE_DIR to a shorter path" if "too long" in str(problem) else ""
@@ -153,17 +164,34 @@ class Gate:
             except OSError:
                 time.sleep(PAUSE)  # the end, or no descriptor is left
                 continue
-            watcher = Watcher(made, self._loop, self._calls)
-            if self._open.acquire(blocking=False):
-                threading.Thread(target=self._serve, args=(watcher,), name="watcher", daemon=True).start()
-            else:
-                watcher.turn_away(f"more than {MOST} watchers at a time")
+            watcher = Watcher(made, self._loop, self._calls, self._admit)
+            with self._lock:
+                self._waiting.append(watcher)
+                oldest = self._waiting.pop(0) if len(self._waiting) > MOST else None
+            if oldest is not None:  # it would keep out one that greets
+                oldest.close()
+            threading.Thread(target=self._serve, args=(watcher,), name="watcher", daemon=True).start()
+
+    def _admit(self, watcher: Watcher) -> bool:
+        """Give a place to a watcher that has greeted; False where all are taken."""
+        with self._lock:
+            self._forget(watcher)
+            there = len(self._admitted) < MOST
+            if there:
+                self._admitted.add(watcher)
+            return there
 
     def _serve(self, watcher: Watcher) -> None:
         try:
             watcher.run()
         finally:
-            self._open.release()
+            with self._lock:
+                self._admitted.discard(watcher)
+                self._forget(watcher)
+
+    def _forget(self, watcher: Watcher) -> None:
+        if watcher in self._waiting:
+            self._waiting.remove(watcher)
 
     def close(self) -> None:
         self._closed = True
@@ -171,7 +199,9 @@ class Gate:
         with contextlib.suppress(OSError):
             self._socket.shutdown(socket.SHUT_RDWR)  # wakes the thread that accepts
         self._socket.close()
-        for each in list(self.watchers):
+        with self._lock:
+            waiting = [*self._waiting]
+        for each in (*self.watchers, *waiting):
             each.close()
 
 

@@ -15,7 +15,7 @@ from pathlib import Path
 from multidrop.dialects import Diagnostic
 from multidrop.shell.watching import wire
 from multidrop.transports import Unreachable
-from multidrop.transports.ssh import RELAY, FarPort
+from multidrop.transports.ssh import RELAY, WORD, FarPort
 
 if sys.platform != "win32":
     from multidrop.shell.watching.host import peer
@@ -26,7 +26,7 @@ assert sys.platform != "win32"
 
 SCREEN = "screen:"
 """The port of `multidrop relay` that is a shared screen; a number may follow."""
-_FAR = re.compile(r"ssh://(?:([^@:/?#\s]+)@)?([^@:/?#\[\]\s]+|\[[0-9A-Fa-f:.]+\])(?::([0-9]{1,5}))?(?:/([0-9]*))?")
+_FAR = re.compile(rf"ssh://(?:({WORD})@)?({WORD}|\[[0-9A-Fa-f:.]+\])(?::([0-9]{{1,5}}))?(?:/([0-9]*))?")
 _READ = 64 * 1024
 
 

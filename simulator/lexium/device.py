@@ -176,6 +176,13 @@ class MCodeDevice(EventLoop):
         self.thread.finish()
         self._timeline.replan()
 
+    def enter(self, now: float) -> None:
+        """Take a carriage return without a command: it ends what IV waits for (manual 5.1.61)."""
+        self.advance(now)
+        if self.memory.awaited:
+            self.memory.await_input("")
+            self.calm = False
+
     def step(self, key: str, now: float) -> None:
         """A key of single step: space or carriage return."""
         self.advance(now)

@@ -8,7 +8,7 @@ happen any more, or when its time is over.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Container, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from math import inf
@@ -29,7 +29,8 @@ from multidrop.simulator.lexium.device import MCodeDevice
 from multidrop.simulator.lexium.state.errors import CRLF, Failure, Fault
 from multidrop.simulator.lexium.state.expressions import Read
 from multidrop.simulator.lexium.state.models import MODELS
-from multidrop.simulator.lexium.state.program_memory import SPACE
+from multidrop.simulator.lexium.state.program_memory import SPACE, Program
+from multidrop.simulator.lexium.stored_setups import refused_later
 from multidrop.simulator.program_run import (
     NO_DEBUGGING,
     BreakPoint,
@@ -103,6 +104,11 @@ class ProgramRun:
         """Load the file without running it; return the refused lines. A refused PG counts as PG 1."""
         return (each for each in self._load(anywhere=True) if each.problem)
 
+    @property
+    def program(self) -> Program:
+        """The program that was stored."""
+        return self._program
+
     # Loading.
 
     def _load(self, anywhere: bool = False) -> Iterator[Event]:
@@ -128,7 +134,9 @@ class ProgramRun:
         self._failures.clear()
 
     def _start(self, label: str) -> None:
+        """Start the program. A download takes longer than a calibration that its header has begun (AS)."""
         device = self._device
+        device.motor.hmt.settle(0.0)
         if not device.running or label:
             device.core.thread.finish()
             labels, address = self._program.labels, whole(label, 0, LAST_ADDRESS)
@@ -296,7 +304,8 @@ def refusals(text: str, file: str, personality: str, found: Sequence[Problem]) -
         tried = [line for line in tried if line.number < begins]
     missing = {line.declares for line in lines if line.number in wrong}
     problems, numbered = [], {line.number: line for line in lines}
-    for failed in ProgramRun(DriveSpec(personality=personality), tried, file).refusals():
+    run = ProgramRun(DriveSpec(personality=personality), tried, file)
+    for failed in run.refusals():
         line, code = numbered[failed.facts["line"]], failed.facts["error"]
         if code == ErrorNumber.PROGRAM_MEMORY_FULL:  # the drive takes none of the others either
             problems.append(_too_big(line, lines, personality))
@@ -305,7 +314,18 @@ def refusals(text: str, file: str, personality: str, found: Sequence[Problem]) -
             what = f"{line.text}: {meaning(code, personality)}"
             problems.append(Problem(line.number, line.column, what, remedy(code, line.text, personality)))
         missing.add(line.declares)
-    return problems
+    told = {each.line for each in errors([*found, *problems])}
+    return [*problems, *_refused_later(run, lines, personality, told)]
+
+
+def _refused_later(
+    run: ProgramRun, lines: Sequence[ProgramLine], personality: str, told: Container[int]
+) -> Iterator[Problem]:
+    """Warn of the set-ups of a program that a drive stores and refuses when it executes them."""
+    for line, code, alone in refused_later(lines, run.program, personality, told):
+        after = "" if alone else ", after the set-ups before it"
+        what = f"{line.text}: a drive refuses it when it executes it{after} ({meaning(code, personality)})"
+        yield Problem(line.number, line.column, what, remedy(code, line.text, personality), warning=True)
 
 
 def _too_big(line: ProgramLine, lines: Sequence[ProgramLine], personality: str) -> Problem:

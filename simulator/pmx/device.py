@@ -7,6 +7,7 @@ to lines for another address. Decisions where the manual is silent (facts that a
 
 - An `@` in the middle of a line begins the line again, so a half-sent line does not cost the next one.
 - The only drive of a bus also takes lines without `@`: TCP gateways are used so.
+- Backspace and Delete take back the character before them, as a terminal sends them.
 - NULs and LFs mean nothing (USB frames are padded with NULs), nor does an empty line without an address.
 - At another baud rate than the wire's, the wire garbles what it receives and sends.
 - A line has 64 characters at most; what follows up to its CR is lost, and the 64 are taken for the command.
@@ -31,6 +32,8 @@ from multidrop.simulator.wire import Port, Transmission
 from multidrop.simulator.world import World
 
 CR, LF, AT = 0x0D, 0x0A, 0x40
+ERASERS = frozenset({0x08, 0x7F})
+"""Backspace and Delete."""
 LINE_BUFFER = 64
 LINES, PROGRAMS = 1275, 2
 FOR_PROGRAMS = "JOYENA="
@@ -195,6 +198,8 @@ class PmxPort(Port):
                 line = bytes(self._line)
                 self._line.clear()
                 self._take(line, now)
+            elif byte in ERASERS:
+                del self._line[-1:]
             elif byte not in (0, LF) and len(self._line) < LINE_BUFFER:
                 self._line.append(byte)
 

@@ -92,8 +92,7 @@ def _programs(world: World) -> Iterator[str | Granted]:
         done = run.download
         if done is None or run.began < 0 or done.new == done.old:
             continue
-        at = world.cut.get((done.line, done.drive), [])
-        if any(run.began <= each <= run.ended for each in at):
+        if done.restarted:  # over Ethernet it loses the old program only as it has booted
             continue
         coded = world.place(done.line).language == "pmx"
         old = [part for line in done.old for part in (re.findall(NUMBER, line) if coded else [line.partition(" ")[2]])]

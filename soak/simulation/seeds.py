@@ -14,6 +14,7 @@ FIXED = {
     797: "the error of a refused Modbus write, whose flag was read too late, which the next line was blamed for",
     15: "a terminal that hung up after the end of the story (of the simulation itself)",
     116: "the error of a Modbus write that was refused after its time-out, which the next line was blamed for",
+    8002542: "a program that was lost as its drive had booted, within a download (of the simulation itself)",
     3025: "a script's line that a macro recorded, and played (of the simulation itself)",
     4478: "a line that waited for the end of a download, taken for one of program mode (of the simulation itself)",
     10177: "a value of a drive that was without power, set while the question ran (of the simulation itself)",

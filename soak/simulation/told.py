@@ -27,6 +27,10 @@ class Download:
     text: str
     old: tuple[str, ...] = ()
     new: tuple[str, ...] = ()
+    restarts: int = 0
+    """How often the drive had lost what it held, as it began."""
+    restarted: bool = False
+    """The drive has begun again while it ran."""
 
 
 @dataclass

@@ -13,6 +13,8 @@ PAIRS = (
     ["name", "each"],
     ["name", "asks"],
     ["word", "form"],
+    ["word", "text"],
+    ["topic", "text"],
     ["of", "value"],
     ["product", "point"],
 )

@@ -94,3 +94,41 @@ def test_lines_after_which_positions_count_from_elsewhere():
     state = FAMILIES["mcode"].new_state(FAMILIES["mcode"].codec, "a")
     assert [line for line in lines if not disturbs(state, line)] == []
     assert [line for line in ("PR P", "MA 0", "VM=5000", "R1=5", "PR MS", "IC R1") if disturbs(state, line)] == []
+
+
+SETS = {
+    "mcode": ("MS=128", "ms 128", "EE=1", "AS 1", "RD=1", "SA=0.9", "EL=500", "FD", "IP"),
+    "modbus": ("MS=128", "EE=1", "IP"),
+    "pmx": ("SLX=1", "POLY=1", "SLY=0"),
+    "tmcl": ("SAP 140, 0, 5", "SAP 154, 0, 3", "RSAP 140, 0", "sap 153, 0, 7"),
+}
+LEAVES = {
+    "mcode": ("PR MS", "P=0", "VM=5000", "MR 128", 'PR "MS=1"', "R1=5", "S"),
+    "modbus": ("VM=5000", "MR 128", "P=0", "PR MS"),
+    "pmx": ("SLX", "PX=0", "HSPDX=1000", "X1000", "SLAX=5", "POLX"),
+    "tmcl": ("SAP 4, 0, 500", "GAP 140, 0", "STAP 140, 0", "MVP ABS, 0, 140", "SAP 1, 0, 0"),
+}
+
+
+def first_request(family, line):
+    """The request that carries a line, after those that are asked before it."""
+    record = FAMILIES[family]
+    address = {"mcode": "a", "modbus": "", "pmx": "00", "tmcl": "1"}[family]
+    state = record.new_state(record.codec, address)
+    state.identified("LMDCE" if family == "modbus" else "TMCM-1140" if family == "tmcl" else "LMDCM", "")
+    return next(record.perform(state, line))
+
+
+@pytest.mark.parametrize("family", SETS)
+def test_requests_after_which_a_count_may_have_another_length(family):
+    recounts = FAMILIES[family].units.recounts
+    assert [line for line in SETS[family] if not recounts(first_request(family, line))] == []
+    assert [line for line in LEAVES[family] if recounts(first_request(family, line))] == []
+
+
+def test_a_register_that_is_written_by_its_number_counts_as_its_word():
+    record = FAMILIES["modbus"]
+    for address, values, counts in ((0x48, [128], True), (0x47, [0, 128], True), (0x87, [128], False)):
+        state = record.new_state(record.codec, "")
+        state.identified("LMDCE", "")
+        assert record.units.recounts(next(record.registers.write(state, address, values))) is counts

@@ -1,6 +1,7 @@
 """Bytes that are not the reply, on the host's line: chatter, late and foreign replies, echoes, stops among them."""
 
 from dataclasses import replace
+from itertools import pairwise
 
 import pytest
 from hypothesis import given
@@ -311,3 +312,42 @@ def test_a_collection_that_nothing_answers_is_silent_and_nothing_is_outstanding(
     line.ask(request("PR P", PARTY, "b"))
     run = LineRun(line, 3.0, {0.6: b"\r\n5\r\n"})
     assert run.doubts == [("qPR VR", False), ("bPR P", False)]
+
+
+# --- an adapter that repeats, found by itself
+
+OWN, ALONE, VALUE = b"PR P\r", MCode(em=0), b"5\r\n"
+ADAPTERS: dict[str, tuple[MCode, bytes, bool]] = {
+    "EM=1": (MCode(em=1), OWN + b"\r\n" + VALUE, True),
+    "EM=2": (MCode(em=2), OWN + VALUE, True),
+    "EM=0": (ALONE, OWN + b"PR P\r\n" + VALUE + b">", True),
+    "EM=0, a drive alone": (ALONE, b"PR P\r\n" + VALUE + b">", False),
+    "EM=3, a drive alone": (MCode(em=3), b"PR P\r\n" + VALUE, False),
+    "a print before": (MCode(em=1), b"!\r\n" + OWN + b"\r\n" + VALUE, True),
+    "a refusal": (MCode(em=1), b"?" + OWN + b"\r\n" + VALUE, False),
+}
+
+
+@examples(60, nightly=600)
+@given(st.sampled_from(sorted(ADAPTERS)), st.lists(st.integers(0, 40), max_size=6))
+def test_an_adapter_that_repeats_is_found_however_its_bytes_are_grouped(name, cuts):
+    codec, stream, repeats = ADAPTERS[name]
+    ends = sorted({*(each for each in cuts if each < len(stream)), 0, len(stream)})
+    pieces = {0.01 * (n + 1): stream[a:b] for n, (a, b) in enumerate(pairwise(ends))}
+    line = Line(codec)
+    line.ask(request("PR P", codec))
+    run = LineRun(line, 5.0, pieces)
+    assert run.echoes == int(repeats)
+    assert (line.inbox.echo is not None) is repeats
+    if name != "a refusal":
+        assert run.finished == [("PR P", End.DONE, ("5",))]
+
+
+def test_after_many_requests_nothing_is_taken_for_an_adapters_repetition():
+    line = Line(MCode(em=1))
+    for _ in range(100):
+        line.ask(request("PR V", MCode(em=1)))
+    answers = {0.01 * n: b"\r\n0\r\n" for n in range(1, 101)}
+    LineRun(line, 9.0, answers)
+    line.ask(request("PR P", MCode(em=1)))
+    assert LineRun(line, 30.0, {20.0: OWN + b"\r\n" + VALUE}, 19.0).echoes == 0

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import traceback
 from collections.abc import Iterator
 from pathlib import Path
@@ -64,3 +65,42 @@ def test_a_wrong_url_is_one_line_after_a_short_traceback(session: Session) -> No
         frames = traceback.extract_tb(failed.value.__traceback__)
         assert len(frames) <= 5 and all("multidrop/api/blocking" in each.filename for each in frames[2:])
         assert "\n" not in str(failed.value) and failed.value.__suppress_context__
+
+
+SETTABLE = ("axis", "programs", "parameters")
+
+
+def test_a_name_that_is_set_by_mistake_is_refused_and_hides_nothing(session: Session) -> None:
+    a = session.drive("a")
+    for each in (a, a._awaited, session, session._awaited, a.programs, a.parameters):
+        for name in sorted({*public(each), "postion", "VM"}):
+            with pytest.raises(AttributeError, match=f"^{name} of a [A-Za-z]+ .*cannot be set"):
+                setattr(each, name, 0)
+            assert name in SETTABLE or name not in vars(each)
+    with pytest.raises(AttributeError, match=r"^position of a Drive cannot be set; write\(\) gives the drive a value"):
+        setattr(a, "position", 7)  # noqa: B010
+    with pytest.raises(AttributeError, match=r"^VM of a Drive does not exist, and cannot be set; write\(\)"):
+        setattr(a, "VM", 7)  # noqa: B010
+    assert a.position == 0 and a.axis == ""
+
+
+def test_a_class_that_a_program_derives_has_names_of_its_own(session: Session) -> None:
+    class Stage(multidrop.Drive):
+        pitch = 5.0
+
+        def __init__(self, drive: multidrop.Drive) -> None:
+            super().__init__(drive._session, drive._awaited)
+            self.offset = 3
+
+    stage = Stage(session.drive("a"))
+    stage.offset = 4
+    assert (stage.offset, stage.position) == (4, 0)
+    with pytest.raises(AttributeError, match="position of a Stage cannot be set"):
+        setattr(stage, "position", 7)  # noqa: B010
+
+
+@pytest.mark.parametrize("room", ["multidrop", "dialects", "drives", "shell", "macros", "simulator", "tui"])
+def test_a_checker_of_types_sees_no_module_that_has_every_name(room: str) -> None:
+    for path in (ROOT / room).rglob("*.py"):
+        found = [each.name for each in ast.parse(path.read_bytes()).body if isinstance(each, ast.FunctionDef)]
+        assert "__getattr__" not in found, f"{path}: belongs under `if not TYPE_CHECKING`"

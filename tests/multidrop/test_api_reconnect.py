@@ -9,6 +9,7 @@ from typing import Any
 import pytest
 
 from multidrop import AsyncSession, DriveError, Lost, Timeout, TransportLost, Unreferenced, connect_async
+from multidrop.api.returns import Returns
 from multidrop.drives.events import Traffic
 from multidrop.shell.events import OnBus
 from tests.support.cell_session import bus, drive, pmx
@@ -127,6 +128,79 @@ async def test_what_moved_when_the_line_was_lost_is_not_known_to_be_as_it_was(tm
         assert b"SL 10000" in b"".join(shop.sent) and b"".join(shop.sent).count(b"SL 10000") == 1
 
 
+@pytest.mark.parametrize("family", CASES)
+async def test_a_drive_that_got_no_command_and_was_not_read_yet_is_moved(
+    tmp_path: Path, family: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(Returns, "note", _reads_nothing)
+    async with opened(tmp_path, family) as session:
+        shop = Shop(session, CASES[family][1])
+        await shop.lose()
+        await shop.a.move(5)
+        await shop.a.wait()
+        assert await shop.a.position() == 5
+
+
+async def test_a_drive_that_was_commanded_and_not_read_is_not_known_to_be_as_it_was(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(Returns, "note", _reads_nothing)
+    async with opened(tmp_path) as session:
+        shop = Shop(session, "a")
+        await shop.a.move(5)
+        await shop.lose()
+        with pytest.raises(Unreferenced, match="a command was too recent"):
+            await shop.a.move(5)
+        await session.drive("b").move(5)  # it got none
+
+
+async def _reads_nothing(returns: Returns, drive: Any) -> None:
+    drive.strict = True
+
+
+async def test_what_moves_by_itself_is_not_said_to_have_been_commanded(tmp_path: Path) -> None:
+    slews = 'program_text = """\nPG 1\nLB SU\nSL 1000\nH\nE\nPG\n"""'
+    (tmp_path / "cell.toml").write_text(
+        bus("line", drive("LMDCM", "a", party=True), drive("LMDCM", "b", slews, party=True), baud=0)
+    )
+    async with connect_async(f"sim:{tmp_path / 'cell.toml'}", reconnect=True) as session:
+        shop = Shop(session, "a")
+        await asyncio.sleep(2)
+        await shop.lose()
+        with pytest.raises(Unreferenced, match="b: it moved, or a program ran in it, when it was last read"):
+            await session.drive("b").move(5)
+        await shop.a.move(5)
+
+
+async def test_a_command_to_all_is_one_to_each(tmp_path: Path) -> None:
+    async with opened(tmp_path) as session:
+        shop = Shop(session, "a")
+        await asyncio.sleep(1)
+        await session.send("@* R1=5")
+        await shop.lose()
+        for each in session.drives:
+            with pytest.raises(Unreferenced, match="a command was too recent"):
+                await each.move(5)
+
+
+async def test_a_drive_that_was_not_read_yet_is_unknown_in_the_report_of_a_loss(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(Returns, "note", _reads_nothing)
+    async with opened(tmp_path) as session:
+        shop = Shop(session, "a")
+        await shop.a.motion()
+        await asyncio.sleep(0.1)
+        await shop.a.motion()  # two readings: at rest
+        await shop.lose()
+        await asyncio.sleep(1)
+        told = [each.message for each in caplog.records]
+        assert "line: not known whether these move, as they were not read yet: b" in told
+        assert not any("cannot be stopped" in each for each in told) and any(
+            "b is at rest at 0" in each for each in told
+        )
+
+
 async def test_a_call_in_flight_says_what_is_known_and_nothing_is_sent_twice(tmp_path: Path) -> None:
     async with opened(tmp_path, baud=9600) as session:
         shop = Shop(session, "a")
@@ -185,7 +259,7 @@ async def test_events_name_a_limit_an_error_the_end_of_a_program_a_loss_and_the_
         await asyncio.sleep(1)
         listening.cancel()
         assert found[1:] == [
-            ("error", "a: an error is set; read_error() reads and clears its number"),
+            ("error", "a: limit+ is active; read_error() reads and clears its number"),
             ("limit", "a: the plus limit is reached"),
             ("lost", f"line: sim:{tmp_path / 'cell.toml'}#line was lost: unplugged"),
             ("back", "line: the line is back"),

@@ -228,3 +228,91 @@ def test_a_program_that_is_too_big_is_one_line_with_its_size_and_that_of_the_dri
 def test_of_many_problems_a_hundred_are_shown(check: Check) -> None:
     shown = check("PG 1\nLB G1\n" + "FROB 7\n" * 150 + "E\nPG\n")[2]
     assert len(shown) == 101 and shown[-1] == "a.mxt: 50 more problems, not shown"
+
+
+# -- set-ups that are stored, and refused when they are executed
+
+
+LATER = "a drive refuses it when it executes it"
+
+
+@pytest.mark.parametrize(
+    ("lines", "personality", "told"),
+    [
+        ("IS=9,1,0", "LMDCM", "error 10"),
+        ("IS=1,99,0", "LMDCM", "error 8"),
+        ("OS=1,3,1", "LMDCM", "error 8"),
+        ("TI=7,Ga\nTE=1", "LMDCM", "error 10"),
+        ("LS=2,5,1", "LMDCM", "error 21"),
+        ("PF=20,1", "LMDCM", "error 21"),
+        ("TT=70000,Ga\nTE=8", "LMDCM", "error 21"),
+        ("S1=99,0,0", "MDI", "error 8"),
+        ("LS=0,500,1\nLS=1,100,1", "LMDCM", "after the set-ups before it (error 21"),
+        ("IS=1,1,0\nIS=2,1,0", "LMDCM", "after the set-ups before it (error 6"),
+    ],
+)
+def test_a_set_up_in_a_program_is_checked_as_one_outside_of_it(
+    check: Check, lines: str, personality: str, told: str
+) -> None:
+    code, _, found = check(f"PG 1\nLB Ga\n{lines}\nE\nPG\n", "--personality", personality)
+    (problem,) = [each for each in found if LATER in each]
+    number = 2 + (lines.count("\n") + 1 if "after" in told else 1)
+    assert problem.startswith(f"a.mxt:{number}:1: warning: ") and told in problem and code == 0
+
+
+@pytest.mark.parametrize(
+    "lines",
+    [
+        "IS=R1,1,0",
+        "IS=1,1,0\nLB Gb\nIS=2,1,0",  # another path may have set input 1 up anew
+        "IS=1,1,0\nCL Ga\nIS=2,1,0",
+        "IS=1,1,0\nIS=1,0,0\nIS=2,1,0",
+        "LS=1,100,1\nLS=0,-100,1",
+        "TR=100,0,5\nTE=16",
+    ],
+)
+def test_nothing_is_said_of_a_set_up_that_the_drive_may_take(check: Check, lines: str) -> None:
+    _, _, found = check(f"PG 1\nLB Ga\n{lines}\nE\nPG\n")
+    assert [each for each in found if LATER in each] == []
+
+
+def test_trips_on_position_that_exclude_each_other_are_named_at_the_line_that_enables_both(check: Check) -> None:
+    _, _, found = check("PG 1\nLB Ga\nTP=5,Ga\nTR=5,Ga\nTE=2\nTE=16\nTE=19\nTE=0\nE\nPG\n")
+    assert [each.partition(": warning: ")[0] for each in found if "error 39" in each] == ["a.mxt:7:1"]
+
+
+# -- what one unit lacks
+
+
+UNIT = """[[bus]]
+name = "line"
+[[bus.drive]]
+name = "a"
+party = true
+[bus.drive.identity]
+version = "LMDOM 5.007, Hw: 3.2"
+part = "LMDOM421"
+"""
+
+
+def test_a_drive_of_a_cell_decides_which_commands_there_are(check: Check, home: Home) -> None:
+    cell = home.file("unit.toml", UNIT.replace('name = "a"', 'name = "a"\npersonality = "LMDOM"'))
+    text = "PG 1\nLS=0,5,1\nO1=1\nPR AF\nE\nPG\n"
+    code, _, found = check(text, "--cell", f"{cell}#line:a")
+    assert code == 1  # an LMDOM has no AF
+    assert found == [
+        "a.mxt:2:1: warning: LS needs firmware 6, and this drive has 5.007; this drive refuses it",
+        "a.mxt:3:1: warning: O1 is not on a NEMA 17 (LMDOM421); this drive refuses it",
+        *[each for each in found if "AF" in each],
+    ]
+    code, _, (told,) = check(text, "--cell", f"{cell}#line:x")
+    assert code == 2 and "no such drive" in told
+
+
+def test_a_download_warns_of_what_the_drive_lacks_by_what_it_reports(home: Home) -> None:
+    cell = home.file("unit.toml", UNIT.replace('name = "a"', 'name = "a"\npersonality = "LMDOM"'))
+    file = home.file("a.mxt", "PG 1\nLB G1\nLS=0,5,1\nE\nPG\n")
+    code, _, err = home.run("program", "download", f"sim:{cell}", file)
+    assert code == 0 and f"{file}:3:1: warning: LS needs firmware 6, and this drive has 5.007" in err
+    code, out, err = home.run("send", f"sim:{cell}", f"/check {file}")
+    assert code == 0 and "LS needs firmware 6, and this drive has 5.007" in err

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+import math
 import os
 import sys
 from collections.abc import Callable
@@ -393,3 +394,27 @@ def test_the_motor_is_varied_and_a_margin_leaves_out_what_an_error_ended(sweep: 
     assert refused.returncode == 2 and refused.stderr == (
         "--vary b.motor=own.csv: motor: is not one of nema17, nema23, nema34; name a file in the cell\n"
     )
+
+
+@given(why=st.text(alphabet="=+-@'\t1x ,\"", max_size=8))
+def test_no_cell_of_a_table_is_a_formula_and_each_is_read_again(kept: Any, why: str) -> None:
+    folder, made, _ = kept
+    table = results.Table(made)
+    cells = (why,) * (len(table._columns[table._kept]))
+    margins = [name.startswith(results.MARGIN) for name in table._columns[table._kept]]
+    cells = tuple("" if margin else cell for cell, margin in zip(cells, margins, strict=True))
+    path = folder / "formula.csv"
+    path.unlink(missing_ok=True)
+    table = results.Table(made, str(path))
+    table.take(Result(1, results.HELD, why, cells))
+    table.save(now=True)
+    for row in csv.reader(path.read_text().splitlines()):
+        assert not [each for each in row if each[:1] in "=+-@" and each[:1] and not _is_number(each)], row
+    assert results.Table(made, resume=str(path)).known[1] == Result(1, results.HELD, why, cells)
+
+
+def _is_number(text: str) -> bool:
+    try:
+        return math.isfinite(float(text))
+    except ValueError:
+        return False

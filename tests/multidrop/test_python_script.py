@@ -52,7 +52,7 @@ def test_a_program_has_the_session_and_the_values(run: Any) -> None:
         ("session.stop()\na.move(1)", 4, "stop: velocity 0 was read from both"),
         ("session.stop()", 0, "stop: velocity 0 was read from both"),
         (
-            "session.stopped_by_person = True\nsession.stop()\nsession.resume()",
+            "session.person_stopped()\nsession.stop()\nsession.resume()",
             4,
             "stop: velocity 0 was read from both",
         ),

@@ -47,3 +47,18 @@ def test_a_wrong_scale_is_named_with_its_file_and_line(multidrop, tmp_path):
         found = multidrop("send", "press", "@a PR P")
         assert found.returncode == 2 and found.stderr.startswith(f"{file}:5: connections.press.units.a: ")
         assert named in found.stderr and len(found.stderr.splitlines()) == 1
+
+
+@pytest.mark.usefixtures("saved")
+def test_send_run_and_a_piped_shell_say_that_the_travel_is_not_checked(multidrop, tmp_path):
+    (tmp_path / "slew.txt").write_text("@a SL 1000\n@a SL 0\n")
+    said = "a: travel not checked: the end of 'SL 1000' is not known"
+    assert said in multidrop("send", "press", "@a SL 1000", "@a SL 0").stderr
+    assert said in multidrop("run", "slew.txt", "--on", "press").stderr
+
+
+@pytest.mark.process
+@pytest.mark.usefixtures("saved")
+def test_a_piped_shell_says_that_the_travel_is_not_checked(home):
+    done = home.process("shell", "press", stdin="@a SL 1000\n@a SL 0\n")
+    assert "a: travel not checked: the end of 'SL 1000' is not known" in done[2]

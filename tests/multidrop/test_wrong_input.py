@@ -218,8 +218,10 @@ def test_a_folder_that_is_gone_is_told(tmp_path: Path) -> None:
         "import os, sys\nos.makedirs('gone'); os.chdir('gone'); os.rmdir('../gone')\n"
         "from multidrop.__main__ import main\nsys.exit(main(['send', 'sim:cell.toml', 'PR P']))"
     )
+    program = tmp_path / "program.py"  # with -c, Python itself searches the folder that is gone for modules
+    program.write_text(code)
     done = subprocess.run(
-        [sys.executable, "-c", code],
+        [sys.executable, str(program)],
         cwd=tmp_path,
         env=environment(tmp_path),
         capture_output=True,

@@ -42,10 +42,11 @@ def test_the_man_page_has_every_command():
 def home(tmp_path):
     (tmp_path / ".config" / "multidrop").mkdir(parents=True)
     (tmp_path / ".config" / "multidrop" / "multidrop.toml").write_text(
-        '[connections.gantry]\nurl = "sim:#press?drives=a,b"\n'
+        '[connections.gantry]\nurl = "sim:#press?drives=a,b"\n[connections.-g]\nurl = "sim:#press?drives=-c,=d,a"\n'
     )
     (tmp_path / ".config" / "multidrop" / "macros").mkdir()
     (tmp_path / ".config" / "multidrop" / "macros" / "shuttle.toml").touch()
+    (tmp_path / ".config" / "multidrop" / "macros" / "-s.toml").touch()
     (tmp_path / "cell.toml").touch()
     return tmp_path
 
@@ -68,6 +69,8 @@ CASES = {
     "multidrop completion f": ["fish"],
     "multidrop macro play shu": ["shuttle"],
     "multidrop params backup gantry --drive a": ["all", "a"],
+    "multidrop params backup gantry --drive ": ["all", "a", "b"],
+    "multidrop macro play ": ["shuttle"],
 }
 
 

@@ -11,6 +11,8 @@ LB Px
   TQ=Tv
   AS=3
   H 2000
+  SL 0
+  H
   AS=0
   H 100
   MA 0

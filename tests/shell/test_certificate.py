@@ -23,7 +23,7 @@ from multidrop.shell.session import Session
 from multidrop.simulator.cells import read
 from multidrop.simulator.floor import Floor
 from multidrop.simulator.lexium.device import Answer
-from multidrop.simulator.lexium.ports import mcode as mcode_port
+from multidrop.simulator.lexium.ports import replies
 from multidrop.simulator.lexium.ports.modbus import ModbusPort
 from multidrop.simulator.serving.endpoints import serve_bus
 from multidrop.simulator.serving.running import RunningFloor
@@ -120,13 +120,13 @@ class Planted:
 @contextlib.contextmanager
 def other_bytes(question):
     """Have simulated drives begin the reply to the last line of a question with a blank."""
-    composed = mcode_port.compose
+    composed = replies.compose
 
     def compose(mode, text, outcome, prompt):
         found = composed(mode, text, outcome, prompt)
         return b" " + found if text.lstrip(b"!").startswith(planted_line(question).encode()) else found
 
-    with mock.patch.object(mcode_port, "compose", compose):
+    with mock.patch.object(replies, "compose", compose):
         yield
 
 
@@ -388,10 +388,10 @@ async def test_a_drive_that_was_not_found_is_not_asked(cell):
 @on(DRIVES["pmx"])
 async def test_a_report_of_another_family_is_refused_and_a_question_that_is_gone_counts(cell, tmp_path):
     file = tmp_path / "r.toml"
-    file.write_text('[drive]\nfamily = "mcode"\n[answers]\nbits = ["ok"]\n')
+    file.write_text('[drive]\nfamily = "mcode"\nproduct = "LMDCM"\n[answers]\nbits = ["ok"]\n')
     with pytest.raises(Diagnostic, match="has answers of the family mcode"):
         await compare(cell.session, cell.session.drive("w"), str(file), load(str(file)))
-    file.write_text('[drive]\nfamily = "pmx"\n[answers]\ngone = ["ok"]\n')
+    file.write_text('[drive]\nfamily = "pmx"\nproduct = "PMX-2ED-SA"\n[answers]\ngone = ["ok"]\n')
     assert await compare(cell.session, cell.session.drive("w"), str(file), load(str(file))) is True
     assert cell.printed() == ["gone: not compared: no question to PMX-2ED-SA"]
 
@@ -406,6 +406,64 @@ def test_another_file_is_no_report(tmp_path, text):
 
 
 def test_answers_are_lists_of_texts(tmp_path):
-    (tmp_path / "r.toml").write_text('[drive]\nfamily = "pmx"\n[answers]\na = ' + json.dumps("ok"))
+    (tmp_path / "r.toml").write_text('[drive]\nfamily = "pmx"\nproduct = "x"\n[answers]\na = ' + json.dumps("ok"))
     with pytest.raises(Diagnostic, match="must be a list of texts"):
         load(str(tmp_path / "r.toml"))
+
+
+REPORT = """[drive]
+family = "mcode"
+product = "LMDCM"
+version = "LMDCM 6.002"
+[answers]
+bits = ["ok", "3"]
+[other_than_ruled]
+questions = ["bits"]
+[not_asked]
+"no reason" = ["gone"]
+"""
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "told"),
+    [
+        ('version = "LMDCM 6.002"', "version = 6.002", r"[drive] version: must be a text"),
+        ('version = "LMDCM 6.002"', 'version = ""', r"[drive] version: must be a text"),
+        ('product = "LMDCM"\n', "", r"[drive] product: is missing"),
+        ('product = "LMDCM"', 'product = ["LMDCM"]', r"[drive] product: must be a text"),
+        ('product = "LMDCM"', 'prodcut = "LMDCM"', r"[drive]: no key prodcut; valid: family, product, version"),
+        ('bits = ["ok", "3"]', 'bits = ["ok", 3]', r"[answers] bits: must be a list of texts"),
+        ('bits = ["ok", "3"]', "bits = []", r"[answers] bits: must be a list of texts"),
+        ('questions = ["bits"]', 'questions = ["gone"]', r"names gone, which has no answer"),
+        ('questions = ["bits"]', 'questions = "bits"', r"questions: must be a list of texts"),
+        ('"no reason" = ["gone"]', '"no reason" = 3', r"[not_asked] no reason: must be a list of texts"),
+        ("[not_asked]", "[not asked]", "Expected"),
+        ("[not_asked]", "[unasked]", r"no key unasked; valid: drive, answers, other_than_ruled, not_asked"),
+    ],
+)
+def test_a_report_with_a_wrong_value_is_refused_and_its_place_is_named(tmp_path, before, after, told):
+    file = tmp_path / "r.toml"
+    file.write_text(REPORT)
+    assert load(str(file)).unlike == ["bits"]
+    assert before in REPORT
+    file.write_text(REPORT.replace(before, after))
+    with pytest.raises(Diagnostic) as caught:
+        load(str(file))
+    assert told in str(caught.value) and "\n" not in str(caught.value)
+
+
+@pytest.mark.virtual
+@on(DRIVES["lexium"])
+async def test_a_report_with_other_than_one_answer_for_each_line_is_refused_before_anything_is_sent(cell, tmp_path):
+    file = tmp_path / "r.toml"
+    lines = next(each.lines for each in FAMILIES["mcode"].certifying.table if each.name == "division")
+    for answers in (["ok"] * (len(lines) - 1), ["ok"] * (len(lines) + 1)):
+        file.write_text(
+            REPORT.replace('bits = ["ok", "3"]', f"bits = {json.dumps(answers)}").replace("bits", "division")
+        )
+        sent = cell.written("w")
+        with pytest.raises(
+            Diagnostic, match=rf"division: has {len(answers)} texts?, and the question has {len(lines)}"
+        ):
+            await compare(cell.session, cell.session.drive("w"), str(file), load(str(file)))
+        assert cell.written("w") == sent

@@ -15,7 +15,7 @@ from multidrop.shell.events import OnBus
 from tests.support.cell_session import ETHERNET, CellSession, bus, party, pmx
 
 pytestmark = pytest.mark.virtual
-STATE = b'PR EF,BY,MV,VC,MP,DE,":",P,":",IN,":",I5,'
+STATE = b'PR EF,BY,MV,VC,MP,DE,ST,":",P,":",IN,":",I5,'
 
 
 def read(cell: CellSession) -> list[tuple[Conditions, ...]]:
@@ -239,3 +239,54 @@ async def test_a_module_that_counts_in_units_of_its_chip_says_so(tmp_path, perso
     async with Watched(tmp_path, f'personality = "{personality}"', "1") as cell:
         first = (await last(cell))[0]
         assert (first.unit, first.speed_unit, first.pace is not None) == ("microsteps", unit, paced)
+
+
+STALL = "\n[bus.drive.world]\nstall_at = 20000"
+LIMIT = "\n[bus.drive.world]\nlimit_plus = 20000"
+
+
+async def test_a_motion_that_nobody_waits_for_and_that_stalls_is_called_stalled(tmp_path):
+    async with Watched(tmp_path, party("a", EE=1) + STALL, "a") as cell:
+        (before,) = await last(cell)
+        assert (before.error, before.cause) == (0, "")
+        (found,) = await last(cell, "@a MA 4000", wait=5)
+        assert (found.error, found.cause) == (UNREAD, "stalled")
+        assert found.error_text == "stalled; PR ER shows and clears it"
+        (after,) = await last(cell, "@a PR ER")
+        assert (after.error, after.cause) == (0, "")
+
+
+async def test_an_error_after_an_old_stall_is_not_called_stalled(tmp_path):
+    async with Watched(tmp_path, party("a", EE=1) + STALL, "a") as cell:
+        await last(cell, "@a MA 4000", "@a PR ER", wait=5)  # ST stays set
+        (found,) = await last(cell, "@a PR ER")
+        assert not found.error
+        cell.device("line:a").errors.set(84)
+        (found,) = await last(cell)
+        assert (found.error, found.cause, found.error_text) == (UNREAD, "", "PR ER shows and clears it")
+
+
+async def test_an_error_that_was_there_at_the_first_reading_has_no_cause(tmp_path):
+    async with CellSession(tmp_path, bus("line", party("a", EE=1) + STALL)) as cell:
+        await cell.session.run("@a MA 4000")
+        await asyncio.sleep(5)
+        watch = cell.session.buses["line"].telemetry.watch(["a"], 1.0)
+        (found,) = await last(cell)
+        assert (found.error, found.cause) == (UNREAD, "")
+        watch.close()
+
+
+async def test_a_limit_switch_that_is_active_is_named_as_the_cause(tmp_path):
+    async with Watched(tmp_path, party("a") + LIMIT, "a") as cell:
+        await last(cell, "@a IS=2,2,0")
+        (found,) = await last(cell, "@a MR 51200", wait=6)
+        assert (found.error, found.cause) == (UNREAD, "limit+ is active")
+
+
+def test_faults_of_the_driver_of_a_module_are_an_error_with_its_cause():
+    family = FAMILIES["tmcl"]
+    state = family.new_state(family.codec, "1")
+    state.motors_counted(2)
+    for flags, cause in ((0, ""), (1 << 1, "the driver is shut down: overtemperature"), (1, ""), ("absent", "")):
+        fine, found = family.values.fold(state, {"DRIVER_FLAGS 0": 0, "DRIVER_FLAGS 1": flags})
+        assert (fine.error, found.error, found.error_text) == (0, UNREAD if cause else 0, cause)

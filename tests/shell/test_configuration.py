@@ -145,8 +145,8 @@ def test_without_the_variables_the_platform_says_where(monkeypatch):
     assert configuration.config_file() == Path("/somewhere/multidrop/multidrop.toml")
 
 
-@pytest.mark.parametrize("label", ["\x1b[31mred", "left\u202e", "a\x9b2J"])
-def test_a_name_that_would_act_on_a_terminal_is_refused(label):
+@pytest.mark.parametrize("label", ["-rf", "=1+1", "+1", "@x", "\x1b[31mred", "left\u202e", "a\x9b2J"])
+def test_a_name_that_would_act_on_a_terminal_or_in_a_command_line_or_a_table_is_refused(label):
     with pytest.raises(Diagnostic, match="control characters"):
         configuration.parse(f"[connections.a]\nurl = 'sim:'\nnames = {{ a = {json.dumps(label)} }}\n", "multidrop.toml")
 
@@ -195,7 +195,9 @@ def test_a_new_file_is_made(file):
     assert configuration.load().connections["clamp"].url == "sim:"
 
 
-@pytest.mark.parametrize(("name", "why"), [("press", "exists already"), ("a b", "not a name"), ("", "not a name")])
+@pytest.mark.parametrize(
+    ("name", "why"), [("press", "exists already"), ("a b", "not a name"), ("", "not a name"), ("-x", "not - first")]
+)
 def test_a_name_that_exists_or_is_none_is_refused_and_nothing_changes(file, name, why):
     file.write_text(OLD)
     with pytest.raises(Diagnostic, match=why):

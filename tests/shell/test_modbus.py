@@ -188,7 +188,9 @@ async def test_programs_are_read_and_written_over_mcode(session, tmp_path):
 
 
 async def test_a_refusal_names_the_exception_and_the_register(session):
-    with pytest.raises(Refused, match=r"exception 03 illegal data value at register 0x0029 \(HC\), which takes 0..100"):
+    with pytest.raises(
+        Refused, match=r"exception 03 illegal data value at register 0x0029 \(HC\), which takes 0 to 100"
+    ):
         await session.run("@modbus: HC=101")
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import AsyncIterator
 from contextlib import AsyncExitStack, asynccontextmanager
 from pathlib import Path
@@ -9,9 +10,9 @@ from pathlib import Path
 import pytest
 
 from multidrop.dialects.errors import MotionFailed
-from multidrop.drives.events import Traffic
+from multidrop.drives.events import Conditioned, Traffic
 from multidrop.shell.configuration import Settings
-from multidrop.shell.events import OnBus
+from multidrop.shell.events import OnBus, SessionEvent
 from multidrop.shell.session import Session
 from multidrop.simulator.cells import read
 from multidrop.simulator.floor import Floor
@@ -19,6 +20,7 @@ from multidrop.simulator.serving.endpoints import serve_bus
 from multidrop.simulator.serving.running import RunningFloor
 from tests.shell.test_outcomes import ENCODER, failed, noted, sent, value
 from tests.support.cell_session import bus, drive
+from tests.support.until import PATIENCE
 
 pytestmark = pytest.mark.slow
 
@@ -96,3 +98,22 @@ async def test_a_device_that_is_no_lexium_is_asked_for_nothing_more(tmp_path: Pa
         await sent(session, "MA 400")
         asked = [each for each in count if isinstance(each, OnBus) and each.event.outgoing]  # type: ignore[union-attr]
         assert len(asked) == 2  # the write, and its check of EF
+
+
+async def test_a_stall_that_nobody_waits_for_is_among_the_conditions(tmp_path: Path) -> None:
+    async with on(tmp_path, STALLS, EE=1) as session:
+        causes: list[str] = []
+
+        def take(event: SessionEvent) -> None:
+            if isinstance(event, OnBus) and isinstance(event.event, Conditioned):
+                causes.extend(each.cause for each in event.event.conditions)
+
+        session.subscribe(take, Conditioned)
+        watch = session.buses["eth"].telemetry.watch([""], 0.1)
+        async with asyncio.timeout(PATIENCE):
+            while not causes:
+                await asyncio.sleep(0.02)
+            await session.run("MA 4000")
+            while "stalled" not in causes:
+                await asyncio.sleep(0.02)
+        watch.close()

@@ -2,17 +2,19 @@
 
 import asyncio
 import contextlib
+import re
 
 import pytest
 
-from multidrop.dialects import Diagnostic, DriveError, NoAnswer, Refused, Stopped
+from multidrop.dialects import Diagnostic, DriveError, Inexpressible, NoAnswer, Refused, Stopped
 from multidrop.drives.events import Notice, Sent, Unsolicited
 from multidrop.macros import Macro, Step
 from multidrop.shell.channel import Front
 from multidrop.shell.events import By, Entered, Failed, Notified, OnBus, Output, Printed, StateChanged
+from multidrop.shell.scripts.executor import play
 from multidrop.shell.streams.stdout import report
 from multidrop.transports import TransportLost
-from tests.support.cell_session import ETHERNET, CellSession, bus, party
+from tests.support.cell_session import ETHERNET, CellSession, bus, drive, party
 
 pytestmark = pytest.mark.virtual
 
@@ -89,6 +91,41 @@ async def test_a_line_goes_where_it_says(both, line, bus, sent):
         await both.run(line)
     other = "eth" if bus == "press" else "press"
     assert sent in both.written(bus) and both.written(other) == b""
+
+
+@pytest.mark.parametrize(
+    ("line", "right"),
+    [
+        ("bMR 10000", "@b MR 10000"),
+        ("  bSL 0", "@b SL 0"),
+        ("@b aPR P", "@a PR P"),
+        ("aMR 10000", "@a MR 10000"),
+        ("*SL 0", "@* SL 0"),
+        ("^MA 0", "@^ MA 0"),
+        ("@* bMR 5", "@b MR 5"),
+    ],
+)
+async def test_an_address_at_the_head_of_a_command_is_refused_with_the_right_spelling(both, line, right):
+    with pytest.raises(Inexpressible, match=re.escape(f"is not a command: write {right}; nothing was sent")):
+        await both.run(line)
+    assert both.written("press") == both.written("eth") == b""
+    with pytest.raises(Diagnostic, match=re.escape(f"write {right}")):
+        await play(both.session, Macro("m", (Step(0.0, line),)), {})
+    assert both.written("press") == both.written("eth") == b""
+
+
+async def test_the_name_of_a_drive_that_is_alone_is_no_part_of_its_commands(tmp_path):
+    async with Press(tmp_path, bus("alone", drive("LMDCM", "b"), baud=0)) as cell:
+        with pytest.raises(Inexpressible, match="write MR 5; nothing was sent"):
+            await cell.run("bMR 5")
+        assert cell.written("alone") == b""
+
+
+@pytest.mark.parametrize("line", ["PR P", "aS=0", "xMR 5", "bX 5", "b", "BX=5"])
+async def test_a_command_that_begins_like_an_address_is_sent_as_it_is(both, line):
+    with contextlib.suppress(Refused):
+        await both.run(line)
+    assert b"a" + line.encode() in both.written("press")
 
 
 async def test_what_a_drive_prints_and_what_it_says_by_itself_are_told(press):

@@ -10,6 +10,7 @@ from typing import Any
 import pytest
 
 from multidrop.api.telemetry import AsyncTelemetry
+from multidrop.dialects import DriveError
 from multidrop.drives.events import Sample
 from multidrop.shell import setting_units, snapshots
 from multidrop.shell.events import Notified, Output
@@ -17,6 +18,7 @@ from multidrop.shell.plots.plot import attach
 from multidrop.shell.roles import Series
 from multidrop.shell.waits import standings
 from multidrop.simulator import cells
+from multidrop.tui.figures import NATIVE, figures_of
 from tests.shell.publishing.test_publish_feed import published
 from tests.support.cases import for_each
 from tests.support.cell_session import CellSession, bus, drive, party, pmx
@@ -150,6 +152,9 @@ class Kept:
     def in_units(self, bus: str, sample: Sample, word: str, value: float, unit: str) -> None:
         self.units.add((sample.address, word, value, unit))
 
+    def not_in_units(self, bus: str, sample: Sample) -> None:
+        """Take no quantity."""
+
 
 async def test_a_recording_has_curves_in_units_beside_those_in_steps(tmp_path: Path) -> None:
     plot: Any = Kept()
@@ -187,3 +192,120 @@ async def test_a_twin_and_its_drive_are_apart_in_units_too(tmp_path: Path) -> No
         rows = await output(shop, "/twin")
     assert said and " mm) from its twin since " in said[0]
     assert any("apart by -2400 steps (-3 mm)" in each for each in rows), rows
+
+
+# A scale that no longer holds
+
+
+CHANGES = {
+    "mcode": (PRESS, "@a ", ("EE=1", "MS=128", "ms 128", "RD=1")),
+    "module": (bus("press", drive("TMCM-1140", "1", 'units = "5 mm/turn"'), baud=0), "@1 ", ("SAP 140, 0, 5",)),
+    "pmx": (bus("press", pmx("00", 'units = { x = "0.4 um/step" }'), baud=0), "@00 ", ("POLX=1",)),
+}
+
+
+@for_each(["floor", "to", "change"], [(floor, to, line) for floor, to, lines in CHANGES.values() for line in lines])
+async def test_a_setting_that_the_scale_rests_on_ends_the_units_in_every_output(
+    floor: str, to: str, change: str, tmp_path: Path
+) -> None:
+    plot: Any = Kept()
+    async with CellSession(tmp_path, floor) as shop:
+        drive, units = next(iter(shop.session.buses["press"].drives.values())), shop.session.units
+        axis = drive.family.units.axes(drive.state)[0]
+        assert "in units" in "\n".join(await output(shop, f"/status {drive.address}"))
+        await shop.session.run(to + change)
+        assert any("its scale rests on that, so its own numbers are shown" in each for each in shop.told(Notified))
+        assert "in units" not in "\n".join(
+            each for each in await output(shop, f"/status {drive.address}") if each.startswith(axis)
+        )
+        assert figures_of(units.of(drive, axis), True) is NATIVE
+        assert units.given(drive, axis, 1000) is None and units.words(drive, axis, 1000) == ""
+        assert "not shown in units, as " in (await output(shop, "/units"))[0]
+        detach = attach(shop.session, plot, [Series("press", drive.address)], 0.5)
+        await asyncio.sleep(2)
+        detach()
+        assert drive.address in plot.samples and not {each for each in plot.units if each[0] == axis or not axis}
+        await shop.session.run(f"/units {drive.address}{f'.{axis}' if axis else ''}")
+        assert units.words(drive, axis, 1000) != ""
+
+
+async def test_a_setting_of_every_drive_ends_the_units_of_each(tmp_path: Path) -> None:
+    floor = bus("press", party("a", 'units = "5 mm/turn"'), party("b", 'units = "5 mm/turn"'))
+    async with CellSession(tmp_path, floor) as shop:
+        await shop.session.run("@* MS=128")
+        shown = [*await output(shop, "/status a"), *await output(shop, "/status b")]
+        assert shown and not any("units" in each for each in shown)
+
+
+async def test_a_setting_that_was_sent_and_changed_nothing_leaves_the_units(tmp_path: Path) -> None:
+    async with CellSession(tmp_path, PRESS) as shop:
+        for line in ("@a EE=0", "@a MS=256", "@a VM=300000", "@a PR MS"):
+            await shop.session.run(line)
+            assert (await output(shop, "/status a"))[-1] == "in units: 0 mm, 0 mm/s", line
+        with pytest.raises(DriveError):
+            await shop.session.run("@a MS=777")  # no such resolution
+        assert (await output(shop, "/status a"))[-1] == "in units: 0 mm, 0 mm/s"
+
+
+async def test_units_come_back_with_the_setting(tmp_path: Path) -> None:
+    async with CellSession(tmp_path, PRESS) as shop:
+        await shop.session.run("@a EE=1")
+        assert not any("units" in each for each in await output(shop, "/status a"))
+        await shop.session.run("@a EE=0")
+        assert (await output(shop, "/status a"))[-1] == "in units: 0 mm, 0 mm/s"
+
+
+async def test_a_setting_that_another_master_or_a_program_made_is_seen_by_the_polls(tmp_path: Path) -> None:
+    program = 'program_text = """PG 1\nLB G1\nMS=128\nE\nPG\n"""'
+    async with CellSession(tmp_path, bus("press", party("a", 'units = "5 mm/turn"', program))) as shop:
+        drive, units = shop.session.drive("press", "a"), shop.session.units
+        watch = shop.session.buses["press"].telemetry.watch(["a"], 1.0)
+        await asyncio.sleep(8)
+        assert units.given(drive, "", 51200) == (5.0, "mm")
+        await shop.session.run("EX G1")
+        await asyncio.sleep(8)
+        watch.close()
+        assert units.given(drive, "", 51200) is None
+        assert [each for each in shop.told(Notified) if "MS was 256 and is 128 now" in each]
+
+
+async def test_settings_that_were_read_contradict_a_scale(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    async with CellSession(tmp_path, PRESS) as shop:
+        drive, units = shop.session.drive("press", "a"), shop.session.units
+        await shop.session.run("/params backup one.toml")
+        assert units.given(drive, "", 51200) == (5.0, "mm")
+        shop.device("press:a").execute("MS=128", shop.floor.now())
+        await shop.session.run("/params backup two.toml")
+        assert units.given(drive, "", 51200) is None
+
+
+async def test_a_drive_that_was_switched_off_and_on_is_not_shown_in_units_before_its_settings_are_read(
+    tmp_path: Path,
+) -> None:
+    async with CellSession(tmp_path, PRESS) as shop:
+        drive, units = shop.session.drive("press", "a"), shop.session.units
+        await shop.session.run("@a MS=128")
+        await shop.session.run("/units a")
+        assert units.given(drive, "", 25600) == (5.0, "mm")
+        await shop.session.run("/sim power a off")
+        with pytest.raises(DriveError):
+            await shop.session.run("@a PR P")
+        await shop.session.run("/sim power a on")
+        await asyncio.sleep(3)
+        await shop.session.run("@a PR P")
+        assert units.given(drive, "", 25600) is None
+
+
+async def test_after_a_silence_samples_have_units_again_once_the_settings_are_read(tmp_path: Path) -> None:
+    async with CellSession(tmp_path, PRESS) as shop:
+        drive = shop.session.drive("press", "a")
+        assert shop.session.units.given(drive, "", 51200) == (5.0, "mm")
+        async with AsyncTelemetry(shop.session, [drive], 10.0) as telemetry:
+            await asyncio.sleep(2)
+            drive.state.counts_may_have_changed()  # as after a reply that was missing, or a line that came back
+            await asyncio.sleep(0.4)
+            gap = [each.unit for each in (await telemetry.samples()).of("a")]
+            await asyncio.sleep(2)
+            later = [each.unit for each in (await telemetry.samples()).of("a")]
+    assert gap[0] == "mm" and "" in gap and later[-1] == "mm"

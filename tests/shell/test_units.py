@@ -121,6 +121,22 @@ REFUSED = [
     ("@a MR {12,5 mm}", "a number has no comma"),
     ("@a MR {12  mm}", "valid: {NUMBER SPACE UNIT}"),
     ("@a MR { 12 mm}", "valid: {NUMBER SPACE UNIT}"),
+    ("@a MR {NaN mm}", "{NaN mm} is not a quantity; nothing was sent"),
+    ("@a MR {inf mm}", "{inf mm} is not a quantity; nothing was sent"),
+    ("@a MR {-inf mm}", "{-inf mm} is not a quantity; nothing was sent"),
+    ("@a MR {--5 mm}", "{--5 mm} is not a quantity; nothing was sent"),
+    ("@a MR {1e3 mm}", "{1e3 mm} is not a quantity; nothing was sent"),
+    ("@a MR {5 mm", "{5 mm is not a quantity; nothing was sent"),
+    ("@a MR {", "{ is not a quantity; nothing was sent"),
+    ("@a MR 5}", "} is not a quantity; nothing was sent"),
+    ("@a MR {X}", "{X} is not a quantity; nothing was sent"),
+    ("@a MR {}", "{} is not a quantity; nothing was sent"),
+    ("@a MR {12mm}", "{12mm} is not a quantity; nothing was sent"),
+    ("@a MR {{12 mm}}", "is not a quantity; nothing was sent"),
+    ("@b MR {NaN mm}", "{NaN mm} is not a quantity; nothing was sent"),
+    ("@a MR {1000000 m}", "1000000 m is 10240000000000 for the drive; nothing was sent"),
+    ("@a MR {-209716 mm}", "its numbers go from -2147483648 to 2147483647"),
+    ("@a SL {9999999 m/s}", "for the drive; nothing was sent"),
     ("@a MR 12.5 mm", "12.5 mm has a unit; nothing was sent; write MR {12.5 mm}"),
     ("@a VM=50mm/s", "write VM={50 mm/s}"),
     ("@b MR {3 mm}", "b has no scale; /units b 5 mm/turn gives it one"),
@@ -394,6 +410,19 @@ async def test_a_place_is_known_although_the_drive_moves(tmp_path):
             await run(shop, "@a MA {301 mm}")
         await run(shop, "@a MR {200 mm}")
         assert any("travel not checked: it moves" in text for text in shop.told(Notified))
+
+
+async def test_what_moves_beyond_any_check_is_said_to_be_unchecked(tmp_path):
+    program = 'program_text = """PG 1\nLB G1\nH 500\nE\nPG\n"""'
+    for line, why in (
+        ("@a MR R1", "the end of 'MR R1' is not known"),
+        ("@a EX G1", "the end of 'EX G1' is not known"),
+        ("/trace G1", "what a program does is not known"),
+    ):
+        async with opened(tmp_path, bus("line", party("a", program), baud=0), units={"a": ANCHORED}) as shop:
+            await run(shop, line)
+            told = [e for e in shop.events if isinstance(e, Notified) and "travel not checked" in e.text]
+            assert [(e.text, e.warning) for e in told] == [(f"a: travel not checked: {why}", True)]
 
 
 async def test_an_end_that_is_not_known_is_said_once(tmp_path):

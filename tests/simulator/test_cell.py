@@ -168,7 +168,13 @@ IS_HINT = 'several lines: IS = ["1,1,0", "2,2,0"]'
         ("[[bus]]\nname = 3", "cell.toml: [[bus]] 1: name must be text, not 3"),
         (
             '[[bus]]\nname = "a#b"',
-            'cell.toml: [[bus]] "a#b": name cannot be "a#b"; valid: a word without spaces, #, @, : or /',
+            'cell.toml: [[bus]] "a#b": name cannot be "a#b"; '
+            "valid: a word without spaces, #, @, : or /, not -, =, + or @ first",
+        ),
+        (
+            '[[bus]]\nname = "-b"',
+            'cell.toml: [[bus]] "-b": name cannot be "-b"; '
+            "valid: a word without spaces, #, @, : or /, not -, =, + or @ first",
         ),
         (
             '[[bus]]\nname = "b"\n[[bus]]\nname = "b"',

@@ -170,3 +170,15 @@ def test_ten_minutes_of_holds_take_no_time() -> None:
     summary = end(tried("PG 1\nLB K1\nH 60000\nIC R1\nBR K1,R1<10\nE\nPG\n"))
     assert summary.t == pytest.approx(600, abs=1)
     assert summary.instructions == 31
+
+
+@pytest.mark.parametrize(
+    ("head", "spec"), [("AS=1\n", {}), ("AS=2\n", {}), ("", {"set": {"AS": 1}}), ("AS=1\nAS=0\nAS=2\n", {})]
+)
+def test_a_program_starts_after_the_calibration_that_its_header_has_begun(head: str, spec: dict[str, object]) -> None:
+    events = tried(f"{head}PG 1\nMR 1000\nH\nPR P\nE\nPG\n", **spec)
+    assert (prints(events), end(events).errors) == (["1000"], ())
+
+
+def test_a_calibration_that_the_program_begins_still_takes_its_time() -> None:
+    assert failures(tried("PG 1\nAS=1\nMR 1000\nE\nPG\n")) == [(88, 3, False)]

@@ -100,6 +100,10 @@ class FakeTelemetry:
         return subscription
 
     @property
+    def watched(self) -> dict[str, float]:
+        return {address: watch.period for watch in self.watches for address in watch.addresses}
+
+    @property
     def polled(self) -> dict[str, float]:
         return {address: held.period for held in self.held for address in held.addresses}
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from multidrop.dialects import End
 from multidrop.drives.events import Unsolicited
-from multidrop.drives.line import Finished, Line, Write
+from multidrop.drives.line import EchoFound, Finished, Line, LineEvent, Write
 
 
 class LineRun:
@@ -12,7 +12,7 @@ class LineRun:
 
     def __init__(self, line: Line, until: float, answers: dict[float, bytes] | None = None, start: float = 0.0) -> None:
         coming, now = dict(answers or {}), start
-        self.seen: list[tuple[float, Finished | Unsolicited | Write]] = []
+        self.seen: list[tuple[float, LineEvent]] = []
         while True:
             self.seen += [(round(now, 4), event) for event in line.events(now)]
             times = [t for t in (line.deadline, *coming) if t is not None]
@@ -43,3 +43,8 @@ class LineRun:
     @property
     def strays(self) -> list[str]:
         return [text for _, event in self.seen if isinstance(event, Unsolicited) for text in event.lines]
+
+    @property
+    def echoes(self) -> int:
+        """How often it was found that the adapter repeats what it sends."""
+        return sum(isinstance(event, EchoFound) for _, event in self.seen)

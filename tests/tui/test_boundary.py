@@ -14,8 +14,8 @@ from textual.pilot import Pilot
 from textual.screen import Screen
 from textual.widget import Widget
 
+from multidrop.drives.poller import Poller
 from multidrop.drives.stopping import Fate
-from multidrop.drives.telemetry import _Poller
 from multidrop.shell.channel import Field
 from multidrop.tui import boundary
 from multidrop.tui.panels import table
@@ -235,7 +235,7 @@ async def test_a_widget_that_cannot_be_rendered_is_rendered_once_it_can(
 
 TIMERS: dict[str, Callable[[Machine, pytest.MonkeyPatch], None]] = {
     "the polls": lambda it, planted: planted.setattr(it.app.polling, "update", boom),  # type: ignore[attr-defined]
-    "a poll of a drive": lambda it, planted: planted.setattr(_Poller, "_converse", boom),
+    "a poll of a drive": lambda it, planted: planted.setattr(Poller, "_converse", boom),
     "the ageing": lambda it, planted: it.app.set_interval(0.01, boom) and None,
     "a timer of the loop": lambda it, planted: asyncio.get_running_loop().call_later(0.01, boom) and None,
     "a task": lambda it, planted: it.app.run_worker(asyncio.to_thread(boom)) and None,

@@ -79,6 +79,14 @@ def test_of_a_lost_drive_nobody_says_that_it_moves() -> None:
     assert Jog().obstacle(readout, readout, State.MOVING, 10.1) == "it moves"
 
 
+def test_an_axis_with_an_error_that_must_be_cleared_is_not_ready() -> None:
+    readout = at_rest(10.0)
+    readout.condition(10.0, [Conditions(error=128, error_text="plus limit error", clears="CLRX")])
+    assert Jog().obstacle(readout, readout, State.STOPPED, 10.1) == "plus limit error: CLRX clears it"
+    readout.condition(10.0, [Conditions(error=86, error_text="stall")])
+    assert Jog().obstacle(readout, readout, State.STOPPED, 10.1) == ""
+
+
 @given(st.lists(st.tuples(st.floats(0.001, 0.6), st.booleans()), max_size=40))
 def test_between_two_moves_there_is_always_a_reading_at_rest(presses: list[tuple[float, bool]]) -> None:
     jog, readout, now, fresh = Jog(), at_rest(0.0), 0.0, True

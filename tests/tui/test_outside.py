@@ -478,6 +478,12 @@ async def test_a_key_that_another_program_gave_to_another_macro_plays_it_at_its_
         await until(pilot, lambda: told(pilot, "macro other: 1 round played"))
 
 
+def painted(app: MultidropApp) -> bool:
+    """Paint once more, and return whether an Enter plays what is shown: no key waited meanwhile."""
+    app.model.changed = True
+    return isinstance(app.screen, MacrosPage) and app.screen._painted
+
+
 async def test_the_page_of_macros_plays_the_lines_that_it_shows(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     pause(monkeypatch)
     macro(folder, "PR 1")
@@ -489,9 +495,7 @@ async def test_the_page_of_macros_plays_the_lines_that_it_shows(folder: Path, mo
         await until(pilot, lambda: told(pilot, "has changed on the disk since it was shown here; nothing was sent"))
         assert not told(pilot, "round played")
         await until(pilot, lambda: "PR 2" in app.screen.lines("steps").plain)  # type: ignore[attr-defined]
-        await until(pilot, lambda: app.keyboard.idle)
-        app.model.changed = True  # an Enter plays what was painted while no key waited
-        await settle(pilot)
+        await until(pilot, lambda: painted(app))
         typed(pilot, "enter")
         await until(pilot, lambda: told(pilot, "macro m: 1 round played"))
 

@@ -2,14 +2,30 @@
 
 import pytest
 
-from multidrop.drives.events import Sample, Silent
+from multidrop.dialects.values import UNREAD, Conditions
+from multidrop.drives.events import Conditioned, Sample, Silent
 from multidrop.shell.events import By, Entered, OnBus, Printed
+from multidrop.shell.roles import Series
 from multidrop.tui.app import MultidropApp
 from multidrop.tui.panels.view import Glance
+from multidrop.tui.polling import CONDITIONS, CONDITIONS_OF_OTHERS
 from multidrop.tui.readout import Readout
 from multidrop.tui.screens.all_drives import AllDrives, Place, drive_row
 from multidrop.tui.widgets.lines import width_of
-from tests.support.fake_session import a_move, a_talk, demo_session, emit, make_app, on_screen, press, settle, toasts
+from tests.support.fake_session import (
+    FakeBus,
+    FakeDrive,
+    FakeSession,
+    a_move,
+    a_talk,
+    demo_session,
+    emit,
+    make_app,
+    on_screen,
+    press,
+    settle,
+    toasts,
+)
 
 pytestmark = pytest.mark.tui
 SPLIT = ("ctrl+p", *"split the", "enter")
@@ -49,6 +65,47 @@ async def test_the_chosen_drive_stays_chosen_when_another_gets_worse() -> None:
         assert rows(app)[3].startswith("▸press:a")
         await emit(pilot, OnBus("eth", Silent(session.time, "")))
         assert rows(app)[4].startswith("▸press:a")
+
+
+def with_error(session: FakeSession, address: str) -> OnBus:
+    found = Conditions(error=UNREAD, error_text="PR ER shows and clears it")
+    return OnBus("press", Conditioned(session.time, address, (found,)))
+
+
+async def test_enter_opens_the_worst_drive_while_no_other_one_was_chosen() -> None:
+    session = FakeSession(FakeBus("press", {each: FakeDrive(each) for each in "abc"}))
+    async with on_screen(session) as (pilot, app, _):
+        session.emit(*(OnBus("press", Sample(session.time, each, 500, 0)) for each in "abc"))
+        await press(pilot, "ctrl+a")
+        assert rows(app)[0].startswith("▸press:a")
+        await emit(pilot, with_error(session, "c"))
+        assert rows(app)[0].startswith("▸press:c")
+        await press(pilot, "enter")
+        assert session.selected is not None and session.selected.address == "c"
+
+
+async def test_a_drive_with_an_error_is_counted_as_that() -> None:
+    session = FakeSession(FakeBus("press", {each: FakeDrive(each) for each in "abc"}))
+    async with on_screen(session) as (pilot, app, _):
+        session.emit(*(OnBus("press", Sample(session.time, each, 500, 7 * (each == "b"))) for each in "abc"))
+        session.emit(with_error(session, "c"), with_error(session, "b"))
+        await press(pilot, "ctrl+a")
+        assert "2 error · 1 moving · 1 stopped" in app.screen.lines("heading").plain  # type: ignore[attr-defined]
+
+
+PAGES = ["", "plot", "drives", "controls", "program", "parameters", "why", "traffic", "macros"]
+
+
+@pytest.mark.parametrize("page", PAGES)
+async def test_conditions_of_the_selected_and_of_plotted_drives_are_read_every_second_on_every_page(page: str) -> None:
+    async with on_screen() as (pilot, app, session):
+        session.plotted = (Series("press", "b"),)
+        await press(pilot, *(f"/page {page}" if page else ""), "enter")
+        assert (app.screen is app.main) is not page or not page
+        await settle(pilot)
+        watched = session.buses["press"].telemetry.watched
+        assert session.selected is not None and session.selected.address == "a"
+        assert (watched["a"], watched["b"], watched["c"]) == (CONDITIONS, CONDITIONS, CONDITIONS_OF_OTHERS)
 
 
 async def test_a_page_stays_after_a_stop_and_shows_its_outcome() -> None:

@@ -43,6 +43,30 @@ def test_an_error_is_said_once_and_not_where_a_typed_line_has_failed() -> None:
     assert told(REST, "failed", REST, ERROR)[-1] == said, "that one came by itself"
 
 
+def test_an_error_whose_cause_is_known_is_named_by_it() -> None:
+    stalled = replace(ERROR, cause="stalled", error_text="stalled; PR ER shows and clears it")
+    assert told(REST, stalled) == [("!", "b", "stalled")]
+
+
+def test_a_change_that_is_read_late_has_two_times_and_no_place() -> None:
+    model = ScreenModel(lambda: "press", lambda: {"press"}, between=lambda one, other: f" ({one:g} to {other:g})")
+    for event in (
+        Sample(0.0, "b", 500, 0),
+        Conditioned(0.0, "b", (REST,)),
+        Sample(20.0, "b", 90_000, 0),
+        Conditioned(20.0, "b", (replace(LIMIT, error=UNREAD),)),
+        Conditioned(21.0, "b", (replace(LIMIT, error=UNREAD, program="running"),)),
+        Sample(30.0, "b", 90_000, 0, "", "limit+"),
+    ):
+        model.take(OnBus("press", event))
+    assert [record.text for record in model.page("press")] == [
+        "limit+ reached (0 to 20)",
+        "an error is set (0 to 20)",
+        "a program runs",
+        "limit+ (20 to 30)",
+    ]
+
+
 def test_an_error_with_a_number_has_its_text() -> None:
     stalled = replace(REST, axis="x", error=8, error_text="StepNLoop stall")
     assert told(replace(REST, axis="x"), stalled) == [("!", "b", "x: error 8: StepNLoop stall")]

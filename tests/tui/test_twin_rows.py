@@ -128,7 +128,7 @@ def test_trouble_and_a_difference_are_both_said(session: FakeSession) -> None:
     assert plain(drives_rows(shown, 39, 3)[0]).endswith(" ✗ error ≠")
     places = worst_first(shown, "press")
     assert plain(drive_row(places[0], shown.now, 120, False)).endswith(" ✗ error ≠ -8112")
-    assert summary(places).startswith("1 ≠ twin · ")
+    assert summary(places).startswith("1 error · 1 ≠ twin · ")
 
 
 def test_a_tab_counts_a_drive_that_differs_as_trouble(session: FakeSession) -> None:

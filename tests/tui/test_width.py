@@ -7,6 +7,7 @@ import contextlib
 import re
 import tempfile
 from collections.abc import AsyncIterator
+from dataclasses import replace
 from pathlib import Path
 from unittest import mock
 
@@ -15,7 +16,8 @@ from textual import _time
 from textual.geometry import Region
 from textual.pilot import Pilot
 
-from multidrop.drives.events import Sample
+from multidrop.dialects.values import Conditions
+from multidrop.drives.events import Conditioned, Sample
 from multidrop.shell.batch.replay import VirtualLoop
 from multidrop.shell.configuration import Settings
 from multidrop.shell.events import By, Entered, Failed, OnBus, ProgramRead
@@ -173,6 +175,19 @@ def test_what_to_press_begins_with_what_the_state_asks_for() -> None:
     session.latched, session.recording = True, "go"
     first = [row[0][0].strip() for row in next_rows(view(session), 40, 30)][:3]
     assert first == ["/resume", "/record stop", "/list a"]
+
+
+def test_what_to_press_clears_the_error_of_whichever_axis_has_one_or_explains_its_number() -> None:
+    session = demo_session()
+    x = Conditions("x")
+
+    def asked(wrong: Conditions) -> tuple[str, str]:
+        shown = view(session, OnBus("press", Conditioned(session.time, "a", (x, wrong))))
+        return next((row[0][0].strip(), row[1][0].strip()) for row in next_rows(shown, 90, 30))
+
+    limit = Conditions("y", error=128, error_text="plus limit error", clears="CLRY")
+    assert asked(limit) == ("CLRY", "clears it: plus limit error")
+    assert asked(replace(limit, clears=""))[0] == "/help 128"
 
 
 async def test_what_to_press_has_the_macros_and_the_keys_that_a_person_set() -> None:

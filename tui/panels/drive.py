@@ -70,8 +70,7 @@ def lamp_groups(conditions: Conditions, old: bool) -> tuple[list[list[Span]], li
 def error_span(conditions: Conditions, old: bool) -> Span:
     if not conditions.error:
         return "error none", "dim"
-    number = "" if conditions.error == UNREAD else f" {conditions.error}"
-    text = f"✗ error{number}: {conditions.error_text}"
+    text = f"✗ {conditions.error_name}: {conditions.error_text}"
     return (f"{text} (old)", "dim") if old else (text, "error")
 
 
@@ -81,7 +80,8 @@ def trouble_of(axis: Readout) -> str:
     if axis.trouble or conditions is None or not conditions.error:
         return axis.trouble
     limits = [lamp.function for lamp in conditions.lamps if lamp.on and lamp.function in LIMITS]
-    return limits[0] if limits else "error" if conditions.error == UNREAD else f"error {conditions.error}"
+    unnumbered = conditions.cause if conditions.error == UNREAD else ""
+    return limits[0] if limits else unnumbered or conditions.error_name
 
 
 def program_words(readout: Readout, now: float) -> str:

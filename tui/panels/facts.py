@@ -9,10 +9,12 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
+from multidrop.dialects.values import Conditions
 from multidrop.drives.bus import Bus
 from multidrop.shell.secrets import url_without_secrets
 from multidrop.tui.panels.drive import drive_rows, error_span, unit_of
 from multidrop.tui.panels.view import Glance, View, firmware_of, glances_of, name_of
+from multidrop.tui.readout import Readout
 from multidrop.tui.text import fit, visible
 from multidrop.tui.widgets.lines import Row, spread
 
@@ -40,8 +42,11 @@ def facts_of(view: View, bus: Bus, glance: Glance) -> Iterator[tuple[str, str]]:
         found = session.units.of(drive, axis.axis) if session.scaled else None
         scale = found.scale if found is not None else None
         unit = unit_of(axis, glance.unit)
+        fails = "does not hold now" if found is not None and not found.holds else ""
         text = (
-            (axis.figures.unit or unit) if scale is None else ", ".join(filter(None, (str(scale), scale.shown_travel)))
+            (axis.figures.unit or unit)
+            if scale is None
+            else ", ".join(filter(None, (str(scale), scale.shown_travel, fails)))
         )
         yield f"units {axis.axis}".rstrip(), text
     program, family = readout.program, drive.family
@@ -52,9 +57,7 @@ def facts_of(view: View, bus: Bus, glance: Glance) -> Iterator[tuple[str, str]]:
     else:
         held = f"{len(program.lines)} lines" if program.lines else "none"
         yield "program", f"{held}, read {session.wall(program.read_at):%H:%M:%S}"
-    now = next(
-        (axis.conditions for axis in readout.axes if axis.conditions is not None and axis.conditions.error), None
-    )
+    now = _failed(readout)
     failure, read = readout.failure, (f"error {drive.state.last_error}", drive.state.errors.at)
     if drive.state.last_error and (failure is None or failure[1] + 1.0 < read[1] < math.inf):
         failure = read
@@ -65,6 +68,11 @@ def facts_of(view: View, bus: Bus, glance: Glance) -> Iterator[tuple[str, str]]:
         yield word, f"{session.wall(last[1]):%H:%M:%S} {visible(last[0])}" if last else nothing
     can = {"programs": family.programs_at, "tracing": family.debugging_at, "registers": family.registers}
     yield "has", ", ".join(["settings", *(word for word, it in can.items() if it)])
+
+
+def _failed(readout: Readout) -> Conditions | None:
+    """The conditions of the first axis with an error."""
+    return next((axis.conditions for axis in readout.axes if axis.conditions and axis.conditions.error), None)
 
 
 def _to(verb: str, glance: Glance) -> str:
@@ -144,9 +152,11 @@ def _asked_for(view: View) -> Iterator[tuple[str, str]]:
         yield "/record stop", f"ends the recording of {session.recording}"
     if chosen is None:
         return
-    conditions, program = chosen.readout.conditions, chosen.readout.program
+    conditions, program = _failed(chosen.readout), chosen.readout.program
     drive = session.buses[session.selected_bus].drives[chosen.address]
-    if conditions is not None and conditions.error > 0:
+    if conditions is not None and conditions.clears:
+        yield conditions.clears, f"clears it: {conditions.error_text}"
+    elif conditions is not None and conditions.error > 0:
         yield f"/help {conditions.error}", "the meaning of its error, and what to do"
     elif conditions is not None and conditions.error:
         yield "an error is set", conditions.error_text

@@ -126,6 +126,11 @@ def name_at(session: Session, bus: str, address: str) -> str:
     return drive.label if drive is not None else ""
 
 
+def between_at(session: Session, before: float, after: float) -> str:
+    """Two times in words, to follow what happened between them."""
+    return f" (between {session.wall(before):%H:%M:%S} and {session.wall(after):%H:%M:%S})"
+
+
 @dataclass(frozen=True)
 class View:
     """The facts at one time."""

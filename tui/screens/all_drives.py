@@ -25,6 +25,7 @@ URGENCY = (
     *(State.NO_CURRENT, State.STOPPED, State.IDLE),
 )
 """The states, the worst first."""
+AT_REST = (State.NO_CURRENT, State.STOPPED, State.IDLE)
 NAME = 17
 POSITION = 13
 VELOCITY = 11
@@ -50,10 +51,14 @@ class Place(NamedTuple):
         where = ":".join(filter(None, (self.bus, self.glance.address)))
         return f"{where} {self.glance.label}".strip()
 
+    @property
+    def trouble(self) -> str:
+        """The errors and limits of its axes."""
+        return "; ".join(filter(None, map(trouble_of, self.glance.readout.axes)))
+
     def alarm(self, room: int = 200) -> str:
         """Its trouble, and the differences of its axes from their twins."""
-        axes = self.glance.readout.axes
-        return alarm_words("; ".join(filter(None, map(trouble_of, axes))), axes, room)
+        return alarm_words(self.trouble, self.glance.readout.axes, room)
 
     def besides(self, room: int, now: float) -> Span:
         """The fact that matters most besides its state: trouble and its twin, its program, else its product."""
@@ -128,10 +133,13 @@ def columns_row(width: int) -> Row:
 
 
 def summary(places: Sequence[Place]) -> str:
-    """`2 moving · 1 silent`, the worst first."""
-    counts = Counter(place.glance.state() for place in places)
+    """`1 error · 2 moving · 1 silent`, the worst first. A drive at rest with an error is counted as that alone."""
+    errors = sum(bool(place.trouble) for place in places)
+    states = [(place.glance.state(), bool(place.trouble)) for place in places]
+    counts = Counter(state for state, troubled in states if not (troubled and state in AT_REST))
     differ = sum(place.glance.readout.differs for place in places)
-    said = [f"{differ} {SIGN} twin"] if differ else []
+    said = [f"{errors} error"] if errors else []
+    said += [f"{differ} {SIGN} twin"] if differ else []
     return " · ".join([*said, *(f"{counts[state]} {state.word}" for state in URGENCY if counts[state])])
 
 
@@ -146,6 +154,7 @@ class AllDrives(ListPage):
     def __init__(self, host: Host) -> None:
         super().__init__(host)
         self._chosen: tuple[str, str] | None = None
+        """The drive that a person chose; None: the worst one is chosen."""
         # Known from the beginning: keys of the read that opened the page count, too.
         self._view = View(host.session, host.model, (), host.session.now(), True)
         self._places = worst_first(self._view, "")
@@ -153,9 +162,7 @@ class AllDrives(ListPage):
     def show(self, view: View) -> None:
         self._view = view
         self._places = worst_first(view, self.words)
-        at = self._at()
-        if self._chosen is None:
-            self.action_step(0)  # it stays the chosen one when another gets worse
+        at = self._at()  # what a person chose stays chosen when another gets worse
         now, width = view.now, self.size.width
         part = self.lines("chosen")
         drives = sum(len(bus.drives) for bus in view.session.tabs.shown)
@@ -200,7 +207,7 @@ class AllDrives(ListPage):
             place for place in self._places if text in (place.glance.address, f"{place.bus}:{place.glance.address}")
         ]
         chosen = (named or self._places)[:1]
-        self._chosen = (chosen[0].bus, chosen[0].glance.address) if chosen else None
+        self._chosen = (chosen[0].bus, chosen[0].glance.address) if chosen and text else None
 
     async def action_take(self) -> None:
         """Select the drive; one in trouble is shown with the reason, any other on the main screen."""

@@ -73,6 +73,8 @@ class Jog:
             return "it has not been read at rest since the last line"
         if axis.conditions is not None and axis.conditions.disabled:
             return f"no current in the motor ({axis.conditions.disabled})"
+        if axis.conditions is not None and axis.conditions.blocked:
+            return axis.conditions.blocked
         return "a program runs" if readout.program.name else ""
 
 

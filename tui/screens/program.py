@@ -35,6 +35,7 @@ from multidrop.tui.screens.program_rows import (
     UPLOAD,
     Finder,
     Findings,
+    Unit,
     download_choices,
     download_facts,
     examined,
@@ -43,10 +44,10 @@ from multidrop.tui.screens.program_rows import (
     marks_of,
     news_rows,
     problem_rows,
-    product_of,
     rule,
     run_choices,
     target_of,
+    unit_of,
     with_target,
 )
 from multidrop.tui.texts import OpenText
@@ -77,7 +78,7 @@ class ProgramPage(Page):
         self._edited_at: float | None = None
         """The time of the last edit that was not taken in; None: there is none."""
         self._taking_in = False
-        self._compared: tuple[object, str] = ((), "")
+        self._compared: tuple[object, Unit] = ((), ("", "", ""))
         """The lines of the drive to which the text was compared, and the product for which it was checked."""
         self._checked: str | None = None
         """The text of which the findings are."""
@@ -130,8 +131,8 @@ class ProgramPage(Page):
         title = self.grammar.title if self.grammar is not None else ""
         outside = self.file.outside
         self.lines("heading").put([heading_row(self.text, title, self.findings, view.chosen, width, outside)])
-        lines, product = self._compared
-        if (self.program.lines is not lines or product_of(self.host.session) != product) and self._edited_at is None:
+        lines, unit = self._compared
+        if (self.program.lines is not lines or unit_of(self.host.session) != unit) and self._edited_at is None:
             self._edited_at = 0.0
         rows = problem_rows(self.findings.problems, self.editor.cursor_location[0] + 1, width)
         rows = [rule(self.findings.words[0].strip(), width), *rows] if rows else []
@@ -202,9 +203,9 @@ class ProgramPage(Page):
         text, grammar, lines = self.text, self.grammar, self.program.lines
         if text is None or grammar is None:
             return None
-        product, shown = product_of(self.host.session), text.text
-        self._compared = lines, product
-        found = await asyncio.to_thread(examined, grammar, shown, product, lines)
+        unit, shown = unit_of(self.host.session), text.text
+        self._compared = lines, unit
+        found = await asyncio.to_thread(examined, grammar, shown, unit, lines)
         self.take_text()
         if self.text is text and text.text == shown:
             self.findings, self._checked = found, shown

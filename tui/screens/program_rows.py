@@ -12,10 +12,11 @@ from typing import NamedTuple
 from rich.text import Text
 
 from multidrop.dialects.families import program_languages
-from multidrop.dialects.program_files import Entry, Part, Problem, errors
+from multidrop.dialects.program_files import Entry, Part, Problem, errors, in_order
 from multidrop.dialects.text import counted
 from multidrop.shell.line_syntax import join_target
 from multidrop.shell.programs.edited_file import real_text
+from multidrop.shell.programs.program_text import ProgramGrammar
 from multidrop.shell.session import Session
 from multidrop.tui.editor import Grammar, MacroGrammar, Mark
 from multidrop.tui.panels.view import Glance, name_of
@@ -298,8 +299,14 @@ def _bare(line: str, parts: Parts) -> str:
     return "".join(line[:end].upper().replace("=", " ").split())
 
 
-def product_of(session: Session) -> str:
-    return session.selected.product if session.selected is not None else ""
+Unit = tuple[str, str, str]
+"""What a drive says of itself: product, version and part number."""
+
+
+def unit_of(session: Session) -> Unit:
+    """Return what the selected drive says of itself; nothing without one."""
+    state = session.selected.state if session.selected is not None else None
+    return (state.product, state.version, state.part) if state is not None else ("", "", "")
 
 
 def refusal(grammar: Grammar | None, text: OpenText) -> str:
@@ -309,8 +316,10 @@ def refusal(grammar: Grammar | None, text: OpenText) -> str:
     return f"{found[0].line_for(text.name)}; not saved: the macro is as it was, and this text stays"
 
 
-def examined(grammar: Grammar, text: str, product: str, lines: tuple[tuple[int, str], ...]) -> Findings:
-    """Check a text and compare it with the lines of a drive. For a thread."""
-    problems = tuple(grammar.check(real_text(text), product))
+def examined(grammar: Grammar, text: str, unit: Unit, lines: tuple[tuple[int, str], ...]) -> Findings:
+    """Check a text for a drive, and compare it with the lines that it holds. For a thread."""
+    problems = list(grammar.check(real_text(text), unit[0]))
+    if isinstance(grammar, ProgramGrammar):
+        problems = in_order([*problems, *grammar.files.unsupported(real_text(text), *unit)])
     addresses = tuple(aligned(text, lines, grammar.parts).items())
-    return Findings(problems, addresses, tuple(grammar.entries(text)))
+    return Findings(tuple(problems), addresses, tuple(grammar.entries(text)))

@@ -18,6 +18,7 @@ from multidrop.dialects.mcode.host.exchange import printed_value, question, read
 from multidrop.dialects.mcode.host.framing import NAK
 from multidrop.dialects.mcode.host.identity import activate_party, asked, find, find_in_text, look_in, pinged
 from multidrop.dialects.mcode.host.state import MCodeState, Place, earlier_error, who
+from multidrop.dialects.mcode.manual.mnemonic import ETHERNET
 
 
 def before_request(state: MCodeState, request: Request) -> Procedure[Request]:
@@ -33,7 +34,9 @@ def before_request(state: MCodeState, request: Request) -> Procedure[Request]:
         if not (yield from synchronise(state, request.priority)):
             yield from find_again(state, request)
         state.synchronised()
-    if request.kind is not Kind.PRINT and (state.error or state.running):
+    if _unseen(state, request):
+        state.came_unasked()
+    if request.kind is not Kind.PRINT and (state.error or state.running or state.others_heard):
         yield from _old_error(state, request)
     if request.codec == state.codec and request.address == state.address:
         return request
@@ -88,13 +91,23 @@ def _find_anywhere(state: MCodeState, place: Place) -> Procedure[bool]:
     return bool(name) and (yield from find(state, Place(True, name)))
 
 
+def _unseen(state: MCodeState, request: Request) -> bool:
+    """Whether another program's error would not show before a move: nothing of its replies comes here.
+
+    A drive with EM=2 replies to no command, and one on a network only to the client that asks.
+    """
+    silent = state.codec.em == 2 or ETHERNET.match(state.product) is not None
+    return silent and request.kind is Kind.COMMAND and classify.starts_motion(request.text)
+
+
 def _old_error(state: MCodeState, request: Request) -> Procedure[None]:
     """Read and report an earlier error. Raises NoAnswer where it cannot be read.
 
     With a checksum an ACK is enough (decision 0001), so the host reads nothing after a command. But a program may have
-    set the flag since, and then a NAK would not show its cause.
+    set the flag since, and then a NAK would not show its cause. So may another host, if bytes came without a request.
     """
-    if state.running and state.codec.checksum and not state.error and request.kind is Kind.COMMAND:
+    checked = state.running and state.codec.checksum and request.kind is Kind.COMMAND
+    if (checked or state.others_heard) and not state.error:
         reply = yield question(state, 'EF," ",BY', "[01] [01]")
         if reply.end is End.DONE:
             printed = value(state, reply)

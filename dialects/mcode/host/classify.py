@@ -8,6 +8,8 @@ from functools import lru_cache
 
 from multidrop.dialects.codec import Kind, Started
 from multidrop.dialects.family import Referencing
+from multidrop.dialects.mcode.manual import errors
+from multidrop.dialects.mcode.manual.errors import ErrorNumber as E
 from multidrop.dialects.mcode.manual.grammar import (
     Argument,
     LineError,
@@ -181,6 +183,44 @@ def refused_by_tables(text: str, product: str) -> bool:
         return True
     numbers = [each.value for each in statement.arguments[:1] if isinstance(each, Number)]
     return any(not (row.accepts(each) or row.accepts(each, encoder=True)) for each in numbers)
+
+
+OF_DEFINITIONS = frozenset({E.NAME_EXISTS, E.NAME_IS_COMMAND, E.NAME_TABLE_FULL})
+DEFINE = frozenset({"VA", "LB"})
+MOVES = MOTIONS - HOMINGS
+OF_MOVES = errors.BY_ITSELF | {
+    E.OUT_OF_RANGE,
+    E.ILLEGAL_DATA,
+    E.NOT_AVAILABLE,
+    E.NO_SEPARATOR,
+    E.MAKE_UP_FREQUENCY,
+    E.VELOCITY_TOO_HIGH,
+    E.HOMING_OR_MOVING,
+    E.MOVE_WHILE_CALIBRATING,
+    E.VELOCITY_TOO_LOW,
+    E.STILL_CORRECTING,
+    E.DRIVE_DISABLED,
+    E.DIRECTION_WHILE_MOVING,
+    E.FINAL_VELOCITY_BELOW_VI,
+    E.NO_ACCELERATION_FITS,
+    E.NO_DECELERATION_FITS,
+    E.NOT_TESTED,
+    E.MAKE_UP_OFF,
+}
+"""The errors of a move without a label or a user variable; every other one is another line's."""
+
+
+@lru_cache(maxsize=256)
+def may_cause(text: str, code: int, product: str) -> bool:
+    """Whether a line can be refused with this error; False: another line has caused it, another program's perhaps."""
+    statement = parsed(text)
+    if statement is None or statement.word == "EX" or refused_by_tables(text, product):
+        return True
+    if uses_own_name(text):
+        return True
+    if code in OF_DEFINITIONS:
+        return statement.word in DEFINE
+    return code != E.NO_SUCH_NAME and (statement.word not in MOVES or code in OF_MOVES)
 
 
 def may_displace(text: str) -> bool:

@@ -157,6 +157,9 @@ LIST_PROMPT = re.compile(rb"[\n\x06\x15][>?]|[>?]\Z")
 NOBODY = "~"
 """A character that no drive has as its name."""
 
+TO_PARTY = NOBODY.encode() + b"\n\n"
+"""Makes party mode effective (5.1.105), and executes half a line in no drive; sent where no drive can be outside of
+party mode."""
 ANSWER = re.compile(r'(?:[^\s"]"[!-~]"|~\w?\d{0,4}(?:"[!-~]")?|PR [^\r\n]*,(?:DN|"~\w*"))[\x80-\xff]?\Z')
 """The end of a signed print: a name after a value, or a mark (`exchange`); of its repetition."""
 STOP_BYTES = re.compile(rb"(?<![ -~])(?:[!-~][\x05\x1b])+\n?|[\x03\x05\x1b]|~{%d}[\r\n]" % (LONGEST + 1))
@@ -364,6 +367,16 @@ class MCode(Codec):
         if not self.party or not (len(address) == 1 and "!" <= address <= "~") or address in EVERY_DRIVE:
             return ()
         return tuple(StopPiece(self.encode(self.request(address, text)), APART) for text in ("E", "SL 0"))
+
+    def repeated(self, sent: bytes, rest: bytes, over: bool) -> bool:
+        """Tell an adapter's repetition from a drive's (5.1.39): a drive makes CR LF of a CR.
+
+        In party mode it makes CR LF of a LF, too. Outside of it a LF ends no line, so nothing follows a drive's
+        repetition, except that party mode is certain where these line feeds are sent.
+        """
+        if not sent.endswith(b"\r"):
+            return rest != b"" or (over and sent == TO_PARTY)
+        return not rest.startswith(b"\n") if rest else over
 
     def damaged(self, line: str) -> bool:
         return self.checksum > 0 and framing.UNPRINTED.search(line) is not None and not self.restarted(line)

@@ -188,7 +188,7 @@ def waits(state: MCodeState, place: str, last: Stored | None) -> Procedure[None]
     """Raise Refused unless it is known that the drive waits for a key now. `last`: an H may still hold for motion."""
     _check_keys(state)
     if state.stepping and not (yield from flag(state, "BY")):
-        state.may_not_step()
+        state.steps(False)
         raise Refused(f"{who(state)}: its program has ended; no key was sent; {BEGIN}")
     _check_steps(state)
     if last is not None and _holds_for_motion(last.text) and not (yield from _settled(state)):
@@ -205,7 +205,7 @@ def _check_steps(state: MCodeState) -> None:
 def step(state: MCodeState, program: Sequence[Stored]) -> Procedure[Stepped]:
     """Press the space bar once; return the line that it executed. Raises NoAnswer where that is not known."""
     _check_steps(state)
-    state.may_not_step()
+    state.steps(False)
     reply = yield key(state, SPACE)
     if reply.end is End.REFUSED:
         raise Refused(f"{who(state)} takes the space bar as text, so it does not step; nothing was executed")
@@ -231,7 +231,7 @@ def _hold(state: MCodeState, text: str) -> Procedure[float | None]:
 
 def go_on(state: MCodeState, place: str) -> Procedure[None]:
     _check_steps(state)
-    state.may_not_step()
+    state.steps(False)
     yield key(state, ENTER)
 
 
@@ -339,7 +339,7 @@ def look(state: MCodeState, place: str = "") -> Procedure[Look]:
     """Read whether a program runs; an MCode drive does not report where."""
     runs = yield from flag(state, "BY")
     if not runs:
-        state.may_not_step()
+        state.steps(False)
     return Look(runs, state.stepping)
 
 
@@ -375,7 +375,7 @@ DEBUGGING = Debugging(
     trace=trace,
     begin=begin,
     waits=waits,
-    forget=MCodeState.may_not_step,
+    forget=lambda state: state.steps(False),
     step=step,
     go_on=go_on,
     look=look,

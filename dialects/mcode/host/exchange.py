@@ -196,6 +196,7 @@ def _refused_unless_damaged(state: MCodeState, request: Request, stood: bool) ->
 
     `stood`: the flag was set, or not known to be clear, when the request was sent.
     """
+    heard = state.others_heard
     code, acknowledged = yield from _read_error(state)
     once = f"it is not known whether '{request.text}' was executed; it was sent once"
     if acknowledged:  # by the drive, late: the NAK was noise
@@ -204,6 +205,7 @@ def _refused_unless_damaged(state: MCodeState, request: Request, stood: bool) ->
         return
     if code is None:
         raise NoAnswer(f"{who(state)} replied NAK, and the reason could not be read: {once}")
+    _check_cause(state, request, code, heard)
     if request.kind not in (Kind.PRINT, Kind.LIST):
         if stood or _came_by_itself(request, code):
             raise NoAnswer(f"{who(state)} replied NAK, maybe for {described(code, state)}, now cleared: {once}")
@@ -220,6 +222,7 @@ def refused(state: MCodeState, request: Request, acknowledged: bool = False) -> 
     The error need not come from this line: a limit, a stall or the running program sets EF too. `acknowledged`: an ACK
     of the line came late.
     """
+    heard = state.others_heard
     code = yield from read_error(state)
     if not code:
         gone = "could not be read" if code is None else "is gone from ER; a subroutine of OE may have read it"
@@ -231,7 +234,8 @@ def refused(state: MCodeState, request: Request, acknowledged: bool = False) -> 
             f"{who(state)}: {described(code, state)}, now cleared; an ACK of '{request.text}' came, too: it is not "
             "known whether it was executed"
         )
-    # A port that is lent makes a half-sent line harmless at the stop of another program.
+    _check_cause(state, request, code, heard)
+    # A drive may lack a variable that the manual has.
     elsewhere = code == ErrorNumber.UNKNOWN_VARIABLE and not classify.uses_own_name(request.text)
     if elsewhere or _came_by_itself(request, code):
         other = "is of another line" if elsewhere else "came by itself"
@@ -245,10 +249,29 @@ def refused(state: MCodeState, request: Request, acknowledged: bool = False) -> 
     raise Refused(refusal, code, certain=not caveat or classify.refused_by_tables(request.text, state.product))
 
 
+def _check_cause(state: MCodeState, request: Request, code: int, heard: bool) -> None:
+    """Raise NoAnswer for an error that is another line's, or may be.
+
+    Another program has sent that line, on the same port or the same drives, or noise has made it of ours. A port that
+    is lent makes a half-sent line harmless. `heard`: bytes came without a request since the flag was known to be clear.
+    """
+    if classify.refused_by_tables(request.text, state.product):
+        return
+    if not classify.may_cause(request.text, code, state.product):
+        why = f"which '{request.text}' cannot cause: another program may use the line, or it was disturbed"
+    elif heard and not state.running:
+        why = "and bytes came without a question: another program may use the line"
+    else:
+        return
+    raise NoAnswer(
+        f"{who(state)}: {described(code, state)}, now cleared, {why}; it is not known whether '{request.text}' was "
+        "executed; it was sent once"
+    )
+
+
 def _came_by_itself(request: Request, code: int) -> bool:
-    """Whether an error may be none of a request: a fault of the machine, or a trip whose label was erased."""
-    lacks_name = code == ErrorNumber.NO_SUCH_NAME
-    return code in errors.BY_ITSELF or (lacks_name and not classify.uses_own_name(request.text))
+    """Whether an error may be none of a request: a fault of the machine."""
+    return code in errors.BY_ITSELF
 
 
 def _runs(state: MCodeState) -> Procedure[bool]:
@@ -281,7 +304,10 @@ def check_error_flag(state: MCodeState, request: Request, silent: bool = False) 
             "may be in program mode; open it again to find out"
         )
     printed = value(state, reply)
-    late = silent and not reply.doubtful and _came_late(state, reply)
+    surplus = not reply.doubtful and _came_late(state, reply)
+    if surplus and not silent:  # one of the two was the reply to another program
+        state.came_unasked()
+    late = silent and surplus
     if printed[:1] == "1":
         yield from refused(state, request, acknowledged=late and state.codec.checksum > 0)
     state.error_flag_read(False)

@@ -24,9 +24,10 @@ from dataclasses import replace
 from multidrop.dialects.codec import Kind, Procedure, Reply, Request
 from multidrop.dialects.errors import Inexpressible, NoAnswer
 from multidrop.dialects.family import Hints
-from multidrop.dialects.mcode.host.codec import NOBODY, MCode
+from multidrop.dialects.mcode.host.codec import NOBODY, TO_PARTY, MCode
 from multidrop.dialects.mcode.host.identity import (
     BRIEF,
+    END_OF_TEXT,
     SETTLE,
     TEXT,
     end_text,
@@ -40,6 +41,8 @@ from multidrop.dialects.mcode.host.state import MCodeState, Place, Unconfirmed, 
 from multidrop.dialects.mcode.manual.statements import UNNAMED
 from multidrop.dialects.state import Remembered
 
+IN_TEXT = TEXT + b"\n\n"
+"""The same for a line whose drives may be outside of party mode; it leaves them in the middle of a text."""
 SEARCH = "multidrop scan PORT tries every name and baud rate"
 
 
@@ -54,7 +57,7 @@ def identify(hints: Hints) -> Procedure[list[MCodeState]]:
             raise Inexpressible(f"no drive name '{name}'; valid: one letter or digit each, as in drives=a,b")
     if hints.lazy and not (hints.cut or hints.owed) and (expected := _expected(hints)):
         if expected[0].place.party:
-            yield from _wake(NOBODY.encode() if expected[0].stated else TEXT)
+            yield from _wake(TO_PARTY if expected[0].stated else IN_TEXT)
         return [_expected_state(each, hints) for each in expected]
     if not hints.cut:
         return (yield from _look_around(hints))
@@ -127,7 +130,7 @@ def _look_around(hints: Hints) -> Procedure[list[MCodeState]]:
                 "no drive replies (MCode outside of party mode was tried); check power, baud and wiring, or give "
                 f"party=1 and drives=NAMES; {SEARCH}"
             )
-    yield from _wake(NOBODY.encode())
+    yield from _wake(TO_PARTY)
     found = []
     for name in hints.drives or (UNNAMED,):
         found.append((yield from _named(name, hints)))
@@ -185,10 +188,11 @@ def _no_reply(hints: Hints, party: bool | None) -> str:
 
 def _by_name_first(hints: Hints) -> Procedure[MCodeState | None]:
     """Look for the one named drive on a party line; None where it is silent, or not in party mode."""
-    woken = yield from _wake(TEXT)
-    if TEXT in woken.raw:  # a drive that is not in party mode echoes it
-        yield from end_text()
-        return None
+    woken = yield from _wake(IN_TEXT)
+    if TEXT in woken.raw:  # by a drive that is not in party mode; an adapter's repetition is removed from here on
+        ended = yield from end_text()
+        if END_OF_TEXT in ended.raw or TEXT in (yield from _wake(IN_TEXT)).raw:
+            return None
     place = Place(True, hints.drives[0], _checks(hints))
     state = _new_state(place, hints)
     if not (yield from find_in_text(state, place)):
@@ -200,7 +204,7 @@ def _by_name_first(hints: Hints) -> Procedure[MCodeState | None]:
 def _wake(spoiler: bytes) -> Procedure[Reply]:
     """Make half a line harmless, and party mode effective (5.1.105: a line feed; facts of real units: two)."""
     form = MCode(party=True)
-    return (yield Request(NOBODY, "", Kind.QUIET, form, settle=SETTLE, timeout=BRIEF, body=spoiler + b"\n\n"))
+    return (yield Request(NOBODY, "", Kind.QUIET, form, settle=SETTLE, timeout=BRIEF, body=spoiler))
 
 
 def _named(name: str, hints: Hints) -> Procedure[MCodeState]:

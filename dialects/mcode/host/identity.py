@@ -231,7 +231,7 @@ AT_HEAD = rf"(?m:^){OLDER}"
 NAME, PART, SERIAL = r'(?P<name>"?[!-~]"?)', r'(?P<part>[^">\r\n]*)', r'(?P<serial>[^">\r\n]*)'
 """Part and serial number are for a person and for comparison: odd characters in them hide no drive."""
 SETTINGS, TWICE = r"(?P<settings>(?P<em>[0-3])[0-3][01])", r"(?P=settings)"
-MDRIVE = "MDI"
+MDRIVE, MODULE = "MDI", "LMM"
 THRICE = 3
 EXPANDED_PART = re.compile(r"<?MDI[34]")
 """The part number of an MDrivePlus with expanded I/O."""
@@ -239,6 +239,7 @@ ENCODER_PART = "-E"
 """Part of the part number of an MDrivePlus with an encoder (such as -EQ)."""
 TEXT = b'PR "~'
 """The first characters of a print: a drive refuses them after half a line, and executes nothing by themselves."""
+END_OF_TEXT = b'"'
 SETTLE = 0.03
 """Quiet time after the first line feeds, s: half a line in a drive's buffer is refused meanwhile."""
 NAMED = (2, 3)
@@ -260,7 +261,7 @@ def find(state: MCodeState, place: Place) -> Procedure[bool]:
     assert matched is not None
     values = matched.groupdict()
     version = values["version"]
-    state.identified(version.split(" ")[0] if version.startswith("LM") else MDRIVE, version, values["part"])
+    state.identified(product_of(version), version, values["part"])
     take_over(state, place.address, form, values["settings"], values.get("checksum"))
     if "name" in values:
         _record(state, values["name"], values["serial"])
@@ -273,6 +274,12 @@ def find(state: MCodeState, place: Place) -> Procedure[bool]:
     if state.codec.em == 2:
         state.note(f"{who(state)}: EM=2 cannot distinguish a lost command from an executed one; EM=1 can")
     return True
+
+
+def product_of(version: str) -> str:
+    """Return the product that a version begins with; a Motion Module adds letters to it (5.1.141: LMMCM)."""
+    head = version.split(" ")[0]
+    return MODULE if head.startswith(MODULE) else head if head.startswith("LM") else MDRIVE
 
 
 def find_in_text(state: MCodeState, place: Place) -> Procedure[bool]:
@@ -288,9 +295,10 @@ def find_in_text(state: MCodeState, place: Place) -> Procedure[bool]:
     return False
 
 
-def end_text() -> Procedure[None]:
-    """Complete the text in a drive that is not in party mode."""
-    yield Request(NOBODY, 'end of the text "', Kind.QUIET, MCode(), settle=SETTLE, timeout=BRIEF, body=b'"\r')
+def end_text() -> Procedure[Reply]:
+    """Complete the text in a drive that is not in party mode; such a drive prints it, or repeats its end (EM=0)."""
+    body = END_OF_TEXT + b"\r"
+    return (yield Request(NOBODY, 'end of the text "', Kind.QUIET, MCode(), settle=SETTLE, timeout=BRIEF, body=body))
 
 
 def _whispers(place: Place) -> Procedure[bool]:

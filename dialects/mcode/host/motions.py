@@ -24,9 +24,11 @@ from multidrop.dialects.mcode.manual import errors
 from multidrop.dialects.mcode.manual.errors import ErrorNumber as E
 from multidrop.dialects.mcode.manual.grammar import Number, Statement, parsed
 from multidrop.dialects.mcode.manual.mnemonic import EVERY
+from multidrop.dialects.mcode.manual.points import CAUSE
 from multidrop.dialects.mcode.manual.table import lookup
 from multidrop.dialects.motions import NOTHING, Effect, Ending, Evidence, Motions, Move, MoveKind, Outcome, Signs
 from multidrop.dialects.state import DriveState
+from multidrop.dialects.values import Value
 
 S = TypeVar("S", bound=DriveState)
 AXIS = ""
@@ -256,6 +258,21 @@ def _new_fault(found: Mapping[str, int], before: Signs) -> tuple[Outcome, str] |
         return Outcome.STALL, STALLED
     new = found.get("AF", 0) & ~before.get("AF", -1)
     return next(((outcome, FAULT_WORDS[bit]) for bit, outcome in FAULTS.items() if new & bit), None)
+
+
+def cause(found: Mapping[str, Value], before: Mapping[str, Value]) -> str:
+    """What caused the error that is set, as far as two readings of the conditions show it; empty: they do not.
+
+    Only a sign that came with the error is its cause: ST stays set from an earlier stall.
+    """
+    if not found.get("EF"):
+        return ""
+    fault = _new_fault(_whole_numbers(found), _whole_numbers(before)) if before else None
+    return fault[1] if fault is not None else str(before.get(CAUSE, "")) if before.get("EF") else ""
+
+
+def _whole_numbers(facts: Mapping[str, Value]) -> dict[str, int]:
+    return {name: value for name, value in facts.items() if isinstance(value, int)}
 
 
 def _tolerance(found: Mapping[str, int]) -> int:

@@ -324,7 +324,7 @@ def immediate(state: MCodeState, request: Request) -> Procedure[tuple[str, ...]]
         return (yield from _print(state, request))
     before = yield from unsent_if_stopped(who(state), request, rest_before(state, request))
     if classify.acts_on_program(request.text):
-        state.may_not_step()
+        state.steps(False)
     if classify.word_of(request.text)[0] == "EX":
         state.program_started()
     target = classify.target_of(request.text, state.rest)

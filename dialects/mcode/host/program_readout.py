@@ -16,8 +16,8 @@ from multidrop.dialects.mcode.host import classify
 from multidrop.dialects.mcode.host.codec import EVERY_DRIVE
 from multidrop.dialects.mcode.host.exchange import REPEATS
 from multidrop.dialects.mcode.host.operations import flag, immediate, listing, perform
+from multidrop.dialects.mcode.host.settings import listed
 from multidrop.dialects.mcode.host.state import MCodeState, who
-from multidrop.dialects.mcode.host.values import listed
 from multidrop.dialects.mcode.manual import editing, help, program_file
 from multidrop.dialects.mcode.manual.grammar import Compare, Name, parsed
 from multidrop.dialects.mcode.manual.statements import size_of

@@ -147,11 +147,11 @@ def search(reach: Reach, found: Found[MCodeState], step: Step) -> Procedure[Outc
     own = _Search(reach, found, step, list(reach.known))
     if reach.cut:
         yield from overflow(NAMES)
-    alone, echo = yield from _unnamed(own)
+    alone = yield from _unnamed(own)
     step()
-    if not (alone or echo or reach.alone):
+    if not (alone or reach.alone):
         yield from _named(own)
-    return Outcome(tuple(text for about, text in own.remarks.items() if about not in own.names), echo)
+    return Outcome(tuple(text for about, text in own.remarks.items() if about not in own.names))
 
 
 def _places(reach: Reach) -> int:
@@ -161,9 +161,9 @@ def _places(reach: Reach) -> int:
 # A drive outside of party mode
 
 
-def _unnamed(own: _Search) -> Procedure[tuple[bool, bool]]:
-    """Look for a drive outside of party mode; return whether one replies, and whether the adapter repeats our bytes."""
-    checksum, tried, repeated = 0, 0, 0
+def _unnamed(own: _Search) -> Procedure[bool]:
+    """Look for a drive outside of party mode; return whether one replies."""
+    checksum, tried = 0, 0
     for _ in range(ALONE_TRIES):
         # Make the question for the version in its parts; over UDP there is no party line, and it stays whole.
         frame = sealed(QUESTION) if checksum else QUESTION
@@ -172,18 +172,16 @@ def _unnamed(own: _Search) -> Procedure[tuple[bool, bool]]:
         if not VERSION.search(b"".join(heard)) and heard != question and any(map(_ambiguous, heard)):
             heard = yield from _parts_asked(own, question, CERTAIN * own.reach.window)
         if _is_unnamed(question, heard):
-            # Identify the drive; one that repeats nothing by itself shows that the adapter does.
             state = yield from _identified(own, Place(False, ""))
-            echo = state is not None and state.codec.em != 0 and heard[:-1] == question[:-1] != []
-            if state is not None and not echo:
+            if state is not None:
                 own.found(state)
-            return True, echo
-        tried, repeated = tried + 1, repeated + (heard == question)
+            return True
+        tried += 1
         if FOREIGN in heard[-1]:
             own.remarks["PMX"] = "something replies as a PMX does; --dialect pmx searches for one"
         if not any(heard) or NAK in heard[-1] or tried == ALONE_TRIES // 2:
             checksum, tried = 1 - checksum, 0
-    return False, repeated == ALONE_TRIES
+    return False
 
 
 def _parts_asked(own: _Search, question: list[bytes], quiet: float) -> Procedure[list[bytes]]:

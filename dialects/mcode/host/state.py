@@ -66,7 +66,7 @@ class MCodeState(DriveState):
         """Record the address at which the drive replied, and the settings and error flag that it printed."""
         self.address, self.codec = address, codec
         self.name = address or self.name
-        self.error, self.running = error, running
+        self.program_read(error=error, running=running)
         self.settings_unknown, self.candidates = False, ()
 
     def settings_lost(self, candidates: Sequence[Candidate]) -> None:
@@ -115,7 +115,8 @@ class MCodeState(DriveState):
         self.running, self.stepping = True, False
 
     def program_read(self, *, error: bool, running: bool) -> None:
-        self.error, self.running = error, running
+        self.error_flag_read(error)
+        self.running = running
 
     # Motion
 
@@ -129,13 +130,17 @@ class MCodeState(DriveState):
         """Record the end of the move that was sent; None: a line was sent after which it is not known."""
         self.rest, self.heading = None, target
 
+    def counts_may_have_changed(self, restarted: bool = False) -> None:
+        """Record it; a drive that was restarted neither moves to a target nor steps."""
+        super().counts_may_have_changed(restarted)
+        if restarted:
+            self.rest, self.heading, self.stepping = None, None, False
+
     # Single step
 
-    def steps(self) -> None:
-        self.running = self.stepping = True
-
-    def may_not_step(self) -> None:
-        self.stepping = False
+    def steps(self, on: bool = True) -> None:
+        """Record that it runs its program step by step, or that it may not do that any more."""
+        self.running, self.stepping = on or self.running, on
 
     # Program mode
 

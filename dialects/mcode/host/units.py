@@ -12,7 +12,7 @@ import re
 from collections.abc import Collection, Mapping, Sequence
 from fractions import Fraction
 
-from multidrop.dialects.codec import Procedure
+from multidrop.dialects.codec import Procedure, Request
 from multidrop.dialects.mcode.host import classify
 from multidrop.dialects.mcode.host.before_request import value_of
 from multidrop.dialects.mcode.host.state import MCodeState, refuse_in_program
@@ -60,6 +60,10 @@ def disturbs(state: DriveState, text: str) -> Collection[str]:
     return ("",) if counts or classify.word_of(text)[0] in classify.WHOLE else ()
 
 
+def recounts(request: Request) -> bool:
+    return classify.written_word(request.text) in RESTS or classify.word_of(request.text)[0] in classify.WHOLE
+
+
 def rests_on(product: str) -> list[str]:
     """The settings that a product has of those; of an unknown one the one that every product has."""
     return [word for word in RESTS if (row := lookup(word, product)) is not None and product in row.products] or ["MS"]
@@ -95,4 +99,4 @@ def counted(product: str, values: Mapping[str, str], full_steps: int | None) -> 
     return Basis(settings, int(values["MS"]) * steps)
 
 
-UNITS = Units(lambda state: ("",), fields, ", ".join(TAKES), basis, disturbs, reads)
+UNITS = Units(lambda state: ("",), fields, ", ".join(TAKES), basis, disturbs, recounts, reads)

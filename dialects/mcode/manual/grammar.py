@@ -253,7 +253,7 @@ def check_groups(line: str, names: Container[str] = ()) -> None:
 
 
 def _check_points(found: Sequence[Token]) -> None:
-    """Raise LineError for a number with a point or an exponent, where a word takes whole ones and it is alone."""
+    """Raise LineError for a point or an exponent of a word that takes whole numbers."""
     row = lookup(found[0].text.upper()) if found and found[0].kind == "word" else None
     if row is None or not row.whole:
         return

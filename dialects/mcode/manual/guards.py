@@ -15,17 +15,23 @@ from collections.abc import Callable, Mapping
 
 from multidrop.dialects.family import ADDRESSES, EVERYONE, Guard, Protection, to_all
 from multidrop.dialects.files import rows
-from multidrop.dialects.mcode.manual.grammar import LineError, Number, parse, parsed
+from multidrop.dialects.mcode.manual.grammar import LineError, Name, Number, Text, parse, parsed
 from multidrop.dialects.mcode.manual.mnemonic import ETHERNET
 from multidrop.dialects.mcode.manual.program_file import bare
-from multidrop.dialects.mcode.manual.table import lookup
+from multidrop.dialects.mcode.manual.table import MNEMONICS, lookup, words
 
 _ROWS = list(rows(__file__, "guards.csv"))
 AT_ONCE: Mapping[str, str] = {row["word"]: row["what"] for row in _ROWS if not row["value"]}
 """Instructions, with or without a value."""
 SETTINGS: Mapping[str, str] = {row["word"]: row["what"] for row in _ROWS if row["value"]}
 """Settings, where a value is written."""
-NAMES: Mapping[str, str] = {**AT_ONCE, **SETTINGS, EVERYONE: "can start every drive of the line"}
+RESETS = "prints Ctrl+C: every drive of the party line that hears it resets"
+NAMES: Mapping[str, str] = {
+    **AT_ONCE,
+    **SETTINGS,
+    "PR": rf"with \c {RESETS}",
+    EVERYONE: "can start every drive of the line",
+}
 """Every guard, and what its lines do."""
 HARMLESS: Mapping[str, frozenset[int]] = {
     row["word"]: frozenset(map(int, row["harmless"].split())) for row in _ROWS if row["harmless"]
@@ -36,7 +42,8 @@ STOPS_AT_0 = frozenset({"SL", "JE", "DE", "AS", "TQ"})
 VELOCITIES = frozenset({"SL", "JE"})
 """Those of them that leave the torque on."""
 _WORD = re.compile(r"\s*([A-Za-z]{2})(?![A-Za-z0-9])\s*=?\s*(.*)", re.DOTALL)
-_ANY = re.compile("|".join((*AT_ONCE, *SETTINGS)), re.IGNORECASE)
+_ANY = re.compile("|".join((*AT_ONCE, *SETTINGS, r"\\c")), re.IGNORECASE)
+_RESET = re.compile(r"(?<!\\)(?:\\\\)*\\c")
 _NAMED = re.compile(r"([!-~])(?=[A-Za-z])")
 
 
@@ -51,16 +58,58 @@ def find(text: str, *, address: str, party: bool, product: str, starts: Callable
     name, word, value = _head(line, product)
     if word == "PY" and not (party or name):
         return None
+    if word == "PR" and (party or name) and prints_reset(line):
+        return Guard(word, f"'{line}' {RESETS}")
     if word in AT_ONCE or (word in SETTINGS and value != "" and value not in HARMLESS.get(word, ())):
         meaning = AT_ONCE.get(word) or SETTINGS[word]
-        if word == "CP" and value == 1:
-            meaning = "erases the program and every user variable"
+        if word == "CP":
+            meaning = _erased(line.removeprefix(name), product) or meaning
         return Guard(word, f"'{line}' {meaning}")
     if name in ADDRESSES or address in ADDRESSES:
         stops = word in STOPS_AT_0 and value == 0
         sent = line.removeprefix(name) if name in ADDRESSES else line
         return to_all(line) if starts(sent) and not stops else None
     return None
+
+
+def prints_reset(line: str) -> bool:
+    """Whether a PR has Ctrl+C in a text (5.1.102): other drives of a party line may take it for theirs (5.1.19)."""
+    statement = parsed(line)
+    texts = [each.value for each in statement.arguments if isinstance(each, Text)] if statement is not None else [line]
+    return any(_RESET.search(each) for each in texts)
+
+
+def _erased(line: str, product: str) -> str:
+    """Say what CP with parameters erases; empty for CP alone, and where the drive would refuse it.
+
+    From a label on means to the end of memory, the programs behind it too. An MDrivePlus takes only a place.
+    """
+    statement = parsed(line)
+    arguments = statement.arguments if statement is not None else ()
+    option, places = None, arguments
+    if words(product) is MNEMONICS and (len(arguments) == 2 or arguments in ((Number(0),), (Number(1),), (Name("S"),))):
+        option, places = arguments[0], arguments[1:]
+    what = "the program"
+    match places:
+        case (Name(word),):
+            what = f"everything from {word} to the end of program memory"
+        case (Number(value),):
+            what = f"everything from address {value} to the end of program memory"
+        case (_, *_):
+            return ""
+    more = {Number(1): " and every user variable", Name("S"): ", and saves that"}
+    return f"erases {what}{more.get(option, '') if isinstance(option, (Name, Number)) else ''}" if arguments else ""
+
+
+def addressed(text: str, product: str) -> tuple[str, str] | None:
+    """Split a line into a drive's name and a command, where it is one only so (`bMR 5`, as manuals have it)."""
+    line = bare(text)
+    if (found := _NAMED.match(line)) is None or _read(line, product) is not None:
+        return None
+    rest = line[1:]
+    statement = parsed(rest)
+    known = statement is not None and lookup(statement.word, product) is not None
+    return (found[1], rest) if known else None
 
 
 def acts(text: str) -> bool:
@@ -88,7 +137,7 @@ def only_ends(text: str) -> bool:
 def only_reads(text: str) -> bool:
     """Whether a line only asks for values. Asking for ER clears it (section 5.1.41)."""
     word = _head(bare(text), "")[1]
-    return word == "PR" and not re.search(r"\bER\b", text.upper())
+    return word == "PR" and not re.search(r"\bER\b", text.upper()) and not prints_reset(bare(text))
 
 
 def _head(line: str, product: str) -> tuple[str, str, int | str]:
@@ -137,4 +186,6 @@ def _word(text: str) -> str:
     return row.name if row is not None and row.kind in ("variable", "flag") else ""
 
 
-CYBER_SECURITY = Protection(_text, _word)
+ANOTHER = "another program or a PLC may hold the only connection that the drive serves: close it there; or "
+"""Another cause of a silent drive: the network opens a connection that the drive does not serve."""
+CYBER_SECURITY = Protection(_text, _word, ANOTHER)

@@ -6,8 +6,11 @@ Each function takes the product; without one it describes a Lexium, and also fin
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
+from functools import cache
 
 from multidrop.dialects.errors import Diagnostic
+from multidrop.dialects.files import rows
 from multidrop.dialects.mcode.manual import errors
 from multidrop.dialects.mcode.manual.errors import ErrorNumber
 from multidrop.dialects.mcode.manual.grammar import LineError, Number, Statement, parse, parsed, tokens
@@ -22,20 +25,52 @@ _QUOTED = re.compile(r'"[^"]*"?')
 _SPLIT = re.compile(r"([A-Za-z]+)-?\d", re.ASCII)
 
 
+def _lines_of(name: str, key: str) -> Mapping[str, list[Mapping[str, str]]]:
+    found: dict[str, list[Mapping[str, str]]] = {}
+    for row in rows(__file__, name):
+        found.setdefault(row[key], []).append(row)
+    return found
+
+
+@cache
+def details() -> Mapping[str, list[Mapping[str, str]]]:
+    """Further lines on words of a Lexium: types, bits, escapes; each with its label."""
+    return _lines_of("details.csv", "word")
+
+
+@cache
+def topics() -> Mapping[str, list[Mapping[str, str]]]:
+    """What several words do together, by topic."""
+    return _lines_of("topics.csv", "topic")
+
+
+def _topic(word: str) -> str:
+    """The topic that a word names, in the plural too; empty: it names none."""
+    name = word.strip().lower()
+    return next((each for each in (name, name.removesuffix("s")) if each in topics()), "")
+
+
 def names() -> list[str]:
-    return sorted({*MNEMONICS, *MDRIVE})
+    return sorted({*MNEMONICS, *MDRIVE, *(each.upper() for each in topics())})
 
 
 def knows(word: str) -> bool:
-    return lookup(word) is not None
+    return lookup(word) is not None or bool(_topic(word))
 
 
 def describe(word: str, product: str = "") -> list[str]:
     """Describe a mnemonic or operator, line by line. Raises Diagnostic with similar words."""
     row = words(product).get(word.strip().upper()) or lookup(word)
+    if row is None and (topic := _topic(word)):
+        return [f"{topic} (topic)", *(f"  {each['text']}" for each in topics()[topic])]
     if row is None:
         near = _near(word.strip(), product)
         raise Diagnostic(f"no mnemonic {word.strip()!r}", "", f"perhaps {', '.join(near)}" if near else "")
+    return page(row, facts(row, product))
+
+
+def facts(row: Mnemonic, product: str = "") -> dict[str, str]:
+    """Return what the tables say of a word, by the label of its line in the help; empty where they say nothing."""
     older = row.reserved_on <= MDRIVE_PLUS
     default = "" if row.default is None else str(row.default)
     if row.default is not None and row.default_encoder is not None:
@@ -47,18 +82,27 @@ def describe(word: str, product: str = "") -> list[str]:
     if product in EVERY and product not in row.products:
         here = f"not in an {product}: error 37" if product in row.reserved_on else f"a free name in an {product}"
         here = f"not in an {product}: it prints 0; error 37 for any value" if product in row.zero_on else here
-    facts = (
-        ("syntax", row.syntax),
-        ("range", _range(row)),
-        ("default", default),
-        ("access", ACCESS[row.access] if row.kind in ("variable", "flag", "keyword") else ""),
-        ("use", use if row.kind not in ("math", "reserved") else ""),
-        ("products", _products(row.name)),
-        ("here", here),
-        ("note", row.note),
-        ("manual", (f"MCode reference of 2012, page {row.section}" if older else f"MCode reference {row.section}")),
-    )
-    lines = [f"  {label:<10} {fact}" for label, fact in facts if fact]
+    return {
+        "syntax": row.syntax,
+        "range": range_of(row),
+        "default": default,
+        "access": ACCESS[row.access] if row.kind in ("variable", "flag", "keyword") else "",
+        "use": use if row.kind not in ("math", "reserved") else "",
+        "products": _products(row.name),
+        "firmware": f"{row.firmware} or newer" if row.firmware else "",
+        "size": "not on NEMA 17" if row.large else "",
+        "here": here,
+        "note": row.note,
+        "manual": f"MCode reference of 2012, page {row.section}" if older else f"MCode reference {row.section}",
+    }
+
+
+def page(row: Mnemonic, said: Mapping[str, str]) -> list[str]:
+    """Lay out the help on a word, with a line for each fact, and for each detail before the last fact."""
+    older = row.reserved_on <= MDRIVE_PLUS
+    *facts, manual = said.items()
+    more = [] if older else [(each["label"], each["text"]) for each in details().get(row.name, ())]
+    lines = [f"  {label:<10} {fact}" for label, fact in (*facts, *more, manual) if fact]
     return [f"{row.name}: {row.title} ({row.kind})", f"  {row.meaning}", *lines]
 
 
@@ -67,19 +111,19 @@ def describe_error(code: int, product: str = "") -> list[str]:
 
     Raises Diagnostic for a number without a meaning.
     """
-    found: dict[str, list[str]] = {}
+    found: dict[tuple[str, str], list[str]] = {}
     for family in [product] if product else errors.TEXTS:
-        found.setdefault(errors.text(code, family), []).append(family)
+        found.setdefault((errors.text(code, family), errors.hint(code, family)), []).append(family)
     lines = []
-    for text, families in found.items():
+    for (text, advice), families in found.items():
         where = f" ({', '.join(families)})" if len(found) > 1 else ""
         if text != errors.UNKNOWN:
             lines.append(f"error {code}{where}: {text}")
+            lines += [f"  do         {advice}"] if advice else []
     if not lines:
         what = f"no error {code} on {product}" if product else f"no error {code}"
         raise Diagnostic(what, "", f"they are 0 to {max(map(max, errors.TEXTS.values()))}, with gaps")
-    advice = errors.hint(code, product)
-    return [*lines, f"  do         {advice}"] if advice else lines
+    return lines
 
 
 def complete(prefix: str, product: str = "") -> list[tuple[str, str]]:
@@ -145,7 +189,8 @@ def _near(word: str, product: str) -> list[str]:
     return list(dict.fromkeys(titled + alike))[:6]
 
 
-def _range(row: Mnemonic) -> str:
+def range_of(row: Mnemonic) -> str:
+    """Return the numbers that a word takes or shows, with their unit; empty where they are unstated."""
     if row.values:
         return f"{', '.join(map(str, row.values))} {row.unit}".strip()
     plain = _span(row, encoder=False)

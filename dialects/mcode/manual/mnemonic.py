@@ -80,6 +80,10 @@ class Mnemonic:
     zero_on: frozenset[str] = frozenset()
     """The products that lack it and print it as 0."""
     note: str = ""
+    firmware: int = 0
+    """The first firmware of a Lexium that has it; 0: any has."""
+    large: bool = False
+    """A Lexium of NEMA size 17 lacks it."""
 
     @property
     def whole(self) -> bool:

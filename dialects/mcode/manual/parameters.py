@@ -26,7 +26,8 @@ from multidrop.dialects.mcode.manual.mnemonic import (
     MDRIVE_ENCODER,
     Mnemonic,
 )
-from multidrop.dialects.mcode.manual.table import lookup, words
+from multidrop.dialects.mcode.manual.supported import lacks
+from multidrop.dialects.mcode.manual.table import MNEMONICS, lookup, words
 from multidrop.dialects.values import IO, PARAMETERS, VARIABLES, Reading, Scalar, Value, number
 
 WIRE = frozenset({"BD", "CE", "CK", "DG", "DN", "EM", "ES", "PY", "QD"})
@@ -40,15 +41,8 @@ COUNTED = frozenset({"A", "D", "VI", "VM", "MS"})
 TRIPS = frozenset({"TA", "TC", "TI", "TM", "TP", "TR", "TT"})
 UNIT = frozenset({"FS", "PW"})
 """Settings of the motor unit itself, which FD keeps (5.1.45)."""
-FIRMWARE_6 = frozenset(
-    {"AJ", "AT", "BE", "BL", "BM", "DJ", "DT", "FL", "FM", "FS", "LS", "PF", "RA", *(f"F{n}" for n in range(1, 9))}
-)
-SMALL = frozenset({"D4", "FC", "TC"})
-"""Words of inputs that a NEMA 17 lacks."""
 ANALOG_UNREAD = ("IS5", "PR IS does not print it")
 HANDLER_UNREAD = ("OE", "no drive prints it")
-_SMALL_PART = re.compile(r"<?LMD[A-Z]{2}42")
-_VERSION = re.compile(r"LM\w+ (\d+)")
 
 
 class Form(Enum):
@@ -135,10 +129,8 @@ def whole_setup(name: str, value: Value) -> Value:
 
 
 def _lacking(version: str, part: str) -> frozenset[str]:
-    """The words that a drive of this firmware and size lacks."""
-    found = _VERSION.match(version)
-    older = FIRMWARE_6 if found and int(found[1]) < 6 else frozenset()
-    return older | (SMALL if _SMALL_PART.match(part) else frozenset())
+    """The words that a Lexium of this firmware and size lacks."""
+    return frozenset(name for name, row in MNEMONICS.items() if lacks(row, version, part))
 
 
 def form_of(row: Mnemonic) -> Form:

@@ -56,6 +56,10 @@ HMT: tuple[tuple[int, str], ...] = (
 )
 """The bits of AF, the most important for a person first."""
 SET = "PR ER shows and clears it"
+CAUSE = "cause"
+"""Among the facts: what caused the error, as far as signs that came with it show that; empty: they do not."""
+LIMITS = ("lim+", "lim-")
+"""Functions of inputs that end a move, and set an error."""
 
 
 def conditions(product: str, facts: Facts, target: int | None) -> Conditions:
@@ -69,10 +73,16 @@ def conditions(product: str, facts: Facts, target: int | None) -> Conditions:
     if "AF" in facts and facts.get("AS"):
         words = [word for bit, word in HMT if int(number(facts["AF"])) & bit]
         more = (("hMT", ", ".join(words) or "ready"),)
+    inputs = tuple(_inputs(product, facts))
+    met = [
+        f"{lamp.function.replace('lim', 'limit')} is active" for lamp in inputs if lamp.on and lamp.function in LIMITS
+    ]
+    cause = str(facts.get(CAUSE, "")) or ", ".join(met) if facts.get("EF") else ""
     return Conditions(
-        lamps=(*_inputs(product, facts), *analog, *_outputs(facts)),
+        lamps=(*inputs, *analog, *_outputs(facts)),
         error=UNREAD if facts.get("EF") else 0,
-        error_text=SET if facts.get("EF") else "",
+        error_text="; ".join(filter(None, (cause, SET))) if facts.get("EF") else "",
+        cause=cause,
         program="running" if facts.get("BY") else "",
         runs=bool(facts["BY"]) if "BY" in facts else None,
         target=target if facts.get("MV") else None,

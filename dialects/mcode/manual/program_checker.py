@@ -67,6 +67,7 @@ def check_products(read: Read, names: frozenset[str], product: str) -> Iterator[
 
 BITS: Mapping[str, int] = {"TI": 1, "TP": 2, "TC": 4, "TT": 8, "TR": 16, "TA": 32, "TM": 64}
 """The trips, each with the number by which TE enables it."""
+EXCLUSIVE = BITS["TP"] | BITS["TR"]
 
 
 def check_trips(read: Read, mentioned: Container[str]) -> Iterator[Problem]:
@@ -87,6 +88,11 @@ def check_trips(read: Read, mentioned: Container[str]) -> Iterator[Problem]:
                 what = f"{word} is set up, but TE never enables it"
                 hint = f"TE={bit} enables it, after each trip again"
                 yield Problem(line.number, line.column + statement.column, what, hint, warning=True)
+    for line, statement, bits in enables:
+        if (bits or 0) & EXCLUSIVE == EXCLUSIVE:
+            what = "TE enables TP and TR together, which exclude each other: a drive refuses it (error 39)"
+            hint = "enable one of them: 2 is TP, 16 is TR"
+            yield Problem(line.number, line.column + statement.column, what, hint, warning=True)
     missing = {word: bit for word, bit in BITS.items() if word not in first and word not in mentioned}
     # Report the first TE for each set of trips that nothing sets up.
     reported = set[str]()
@@ -153,6 +159,8 @@ def _when_executed(read: Read, product: str) -> Iterator[Problem]:
     for line, statement in read:
         column = line.column + statement.column
         if line.section == "program":
+            if statement.word == "PR" and guards.prints_reset(line.text):
+                yield Problem(line.number, column, f"it {guards.RESETS}", "print another character", warning=True)
             if product in EVERY and (valid := out_of_range(statement, product)):
                 what = f"{line.text} is out of range: a drive refuses it when it executes it (error 21)"
                 yield Problem(line.number, line.column, what, valid, warning=True)

@@ -6,9 +6,9 @@ MCode reference of 2012 (R062812); words of the Hybrid's firmware are absent. Th
 I/O and refuses them (37). So does a unit without an encoder with the nine encoder words, of which it prints three as 0.
 
 A row has the fields of a `Mnemonic`. Marks: `starts` and `lines`; `stored` is a word of programs only, `typed` one of
-typed lines only. Empty: all products of the table, and for a step error 25; `-` is none. A row of an MDrivePlus gives
-what differs from the Lexium's row of that word, and always its own section, products and note; one that is marked `own`
-takes nothing from it.
+typed lines only; `six` needs firmware 6, `large` a unit larger than NEMA 17 (of a Lexium only). Empty: all products of
+the table, and for a step error 25; `-` is none. A row of an MDrivePlus gives what differs from the Lexium's row of that
+word, and always its own section, products and note; one that is marked `own` takes nothing from it.
 """
 
 from __future__ import annotations
@@ -59,6 +59,8 @@ def _mnemonic(row: Mapping[str, str], products: frozenset[str]) -> Mnemonic:
         reserved_on=_products(row["reserved_on"], products),
         zero_on=_products(row["zero_on"], frozenset()),
         note=row["note"],
+        firmware=6 if "six" in marks and products is LEXIUM else 0,
+        large="large" in marks and products is LEXIUM,
     )
 
 

@@ -76,18 +76,26 @@ class Modbus(Codec):
         return None
 
     def on_timeout(self, request: Request, buffer: bytes) -> Decoded:
-        """Return TIMEOUT, or DAMAGED where the rest of a reply is missing; that rest may still arrive."""
+        """Return TIMEOUT, or DAMAGED where the rest of a reply is missing; that rest may still arrive.
+
+        Whole messages in the buffer are no reply to it. TIMEOUT says in what: a gateway may number them wrongly.
+        """
         at, foreign = _whole(buffer)
         if foreign:
             return Decoded(Reply(end=End.DAMAGED, detail=_foreign(buffer[at:])), len(buffer))
         if at == len(buffer):
-            return Decoded(Reply(end=End.TIMEOUT), at)
+            wrong = _unlike(buffer, request.tag % NUMBERS, request.body[0])
+            return Decoded(Reply(end=End.TIMEOUT, detail=wrong), at)
         return Decoded(Reply(end=End.DAMAGED, detail=f"it ends after {len(buffer) - at} bytes"), at)
 
     def parse_unsolicited(self, buffer: bytes) -> tuple[tuple[str, ...], int]:
         """Drop whole messages, which are late or reply to a stop; return bytes that are not Modbus."""
         at, foreign = _whole(buffer)
         return ((_foreign(buffer),), len(buffer)) if foreign else ((), at)
+
+    def printed(self, line: str) -> bool:
+        """Never: a Modbus server only replies."""
+        return False
 
     def stop(self, addresses: Sequence[str], sure: bool = True, half_sent: bool = False) -> bytes:
         """Return the end of the program, then SL 0: the axis decelerates at D, the hardest stop over Modbus."""
@@ -100,6 +108,11 @@ class Modbus(Codec):
             StopPiece(pdu_codec().message(END_NUMBER, pdu_codec().read_specific("E"), self.unit)),
             StopPiece(pdu_codec().message(SLEW_NUMBER, slew, self.unit)),
         )
+
+    def repeated(self, sent: bytes, rest: bytes, over: bool) -> bool:
+        """Tell an adapter's repetition from the reply to a write of one register, which has the same bytes."""
+        found = framing.first(sent, 0)
+        return found is not None and found.pdu[0] not in WRITES
 
     def hears_stop(self, data: bytes, address: str, sure: bool = True) -> bool:
         return True
@@ -135,6 +148,18 @@ def _whole(buffer: bytes) -> tuple[int, bool]:
     except framing.NotModbus:
         return at, True
     return at, False
+
+
+def _unlike(buffer: bytes, number: int, function: int) -> str:
+    """Say what is wrong with whole messages that are no reply to a request; empty: none came, but to a stop."""
+    at, wrong = 0, ""
+    while (found := framing.first(buffer, at)) is not None:
+        at = found.end
+        if found.transaction == number:
+            wrong = f"a reply with function {found.pdu[0]} came, and the request has function {function}"
+        elif found.transaction < NUMBERS:
+            wrong = f"a reply with transaction number {found.transaction} came, and the request has {number}"
+    return wrong
 
 
 def _foreign(buffer: bytes) -> str:

@@ -31,6 +31,8 @@ EXCEPTIONS = {
     10: "gateway path unavailable",
     11: "gateway target does not respond",
 }
+NO_REFUSAL = frozenset({5, 11})
+"""Exceptions after which the request may have been executed: the server works on it, or its reply did not arrive."""
 
 _LEAST, _MOST = 2, 254
 """Limits of the header's length: a unit and at least a function code, at most 253 bytes of PDU."""

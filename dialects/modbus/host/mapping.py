@@ -6,7 +6,7 @@ no range: the drive does. (Modbus/TCP manual 4.2, 4.3, 5.)
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from multidrop.dialects.errors import Inexpressible, Refused
@@ -16,21 +16,25 @@ from multidrop.dialects.mcode.manual.grammar import Argument, Name, Number, Stat
 from multidrop.dialects.mcode.manual.table import lookup
 from multidrop.dialects.modbus.host import framing
 from multidrop.dialects.modbus.host.codec import pdu_codec
-from multidrop.dialects.modbus.manual.registers import AT, INT32, REGISTERS, Register
+from multidrop.dialects.modbus.manual.registers import (
+    ALTERNATIVE,
+    AT,
+    CONTROLS,
+    IDENTITY,
+    INPUTS,
+    INT32,
+    OUTPUTS,
+    REGISTERS,
+    SETUPS,
+    Register,
+)
 
-ALTERNATIVE = "MCode/TCP (tcp://HOST:503)"
 READ_ONLY, UNREADABLE = ErrorNumber.READ_ONLY, ErrorNumber.NOT_PRINTABLE
 """The drive's own errors for a word that can only be read, or not be printed."""
-OUTPUTS: Mapping[str, int] = {f"O{n}": n - 1 for n in (1, 2, 3)}
-INPUTS: Mapping[str, int] = {f"I{n}": n - 1 for n in (1, 2, 3, 4)}
 TRIGGERS = frozenset({"S", "IP", "CF", "SC"})
 """Commands without a value; their registers take a 1."""
 STEPS = frozenset({"IC", "DC"})
 """Commands that name a variable; their registers take its address."""
-SETUPS = frozenset({"IS", "OS", "TR", "MU"})
-CONTROLS = frozenset({"EX", "PS", "RS"})
-IDENTITY: Mapping[str, int] = {"PN": 1, "SN": 5, "VR": 6}
-"""Words that the device identification answers, by object."""
 OBJECTS = ("vendor", "part number", "revision", "web page", "product", "serial number", "version")
 """The objects of the device identification on these drives (4.1.1)."""
 EVERY_OBJECT, ONE_OBJECT = 3, 4
@@ -154,7 +158,10 @@ def reading(word: str) -> Reading:
     if register is None and word != "E" and word not in CONTROLS:
         raise unavailable(word)
     if register is None or not register.readable or (row is not None and row.access == "-"):
-        raise Refused(f"{word} cannot be printed: error {UNREADABLE}: {errors.text(UNREADABLE)}", UNREADABLE)
+        outputs = OUTPUTS if word == "OT" else [word] if word in OUTPUTS else []
+        coils = " and ".join(f"/coil {OUTPUTS[each] + 1}" for each in outputs)
+        reads = f"; {coils} {'reads' if len(outputs) == 1 else 'read'} it" if coils else ""
+        raise Refused(f"{word} cannot be printed: error {UNREADABLE}: {errors.text(UNREADABLE)}{reads}", UNREADABLE)
     return Reading(read(register), lambda answer: str(value_of(register, pdu_codec().registers(answer))))
 
 
@@ -179,6 +186,26 @@ def unavailable(word: str) -> Inexpressible:
     return Inexpressible(
         f"{word} has no Modbus register (of variables only R1 to R4 and V1 to V8 have one); {ALTERNATIVE} may know it"
     )
+
+
+def written(pdu: bytes) -> tuple[Register | None, int | None]:
+    """Return the name that a write of registers goes to, and the value; None for a part of a value or another request.
+
+    Of two names the second one is given if its value is out of its range.
+    """
+    if pdu[0] != framing.WRITE_REGISTERS:
+        return None, None
+    address, count = int.from_bytes(pdu[1:3]), int.from_bytes(pdu[3:5])
+    values = [int.from_bytes(pdu[6 + 2 * at : 8 + 2 * at]) for at in range(count)]
+    if (row := AT.get(address)) is None:
+        return None, None
+    if row.address == address and row.count == count:
+        return row, value_of(row, values)
+    each = [(AT.get(address + at), value) for at, value in enumerate(values)]
+    if parts := [found for found, _ in each if found is None or found.width == 4]:
+        return parts[0], None
+    outside = [(found, value) for found, value in each if found is not None and not found.allows(value)]
+    return (outside or each)[0]
 
 
 def place(pdu: bytes) -> str:

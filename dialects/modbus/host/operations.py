@@ -20,10 +20,11 @@ from multidrop.dialects.mcode.manual import grammar
 from multidrop.dialects.mcode.manual.errors import BY_ITSELF
 from multidrop.dialects.mcode.manual.points import STATUS, in_words
 from multidrop.dialects.mcode.manual.program_file import commented, spaced
-from multidrop.dialects.modbus.host import framing, mapping
+from multidrop.dialects.modbus.host import framing, limits, mapping
 from multidrop.dialects.modbus.host.codec import UNKNOWN, USER, Modbus, ModbusState, pdu_codec
 from multidrop.dialects.modbus.host.mapping import Reading
-from multidrop.dialects.modbus.manual.registers import AT, REGISTERS, ROWS, Register
+from multidrop.dialects.modbus.manual.help import shown as shown_limits
+from multidrop.dialects.modbus.manual.registers import ALTERNATIVE, AT, REGISTERS, ROWS, SETUPS, Register
 
 # One request to an Ethernet drive over Modbus, and proof of its outcome.
 #
@@ -34,6 +35,8 @@ from multidrop.dialects.modbus.manual.registers import AT, REGISTERS, ROWS, Regi
 
 
 ILLEGAL_VALUE, FAILURE = 3, 4
+NO_REGISTER = frozenset({1, 2, ILLEGAL_VALUE})
+"""Exceptions of a device that lacks a function or a register; others pass, as of a gateway that is busy."""
 READS = frozenset(
     {framing.READ_COILS, framing.READ_INPUTS, framing.READ_REGISTERS, framing.IDENTIFY, framing.READ_SPECIFIC}
 )
@@ -49,10 +52,11 @@ def answered(state: ModbusState, asked: Request) -> Procedure[bytes]:
     """Send a request once; return the reply. Raises Refused (exception and drive's own error) or NoAnswer."""
     reply = yield asked
     if reply.end is End.REFUSED:
-        code = None
+        code, valid = None, ""
         if reply.body[1] in (ILLEGAL_VALUE, FAILURE) and not state.stranger:
             code = yield from error_number(state)
-        raise refusal(state, asked, reply, code)
+            valid = yield from valid_values(state, asked, reply)
+        raise refusal(state, asked, reply, code, valid)
     return sure(state, asked, reply)
 
 
@@ -86,23 +90,49 @@ def shown(state: ModbusState, word: str, reading: mapping.Reading, answer: bytes
         raise NoAnswer(f"{who(state)}: the reply to 'PR {word}' is damaged") from None
 
 
-def refusal(state: ModbusState, asked: Request, reply: Reply, code: int | None) -> Refused:
-    """Describe an exception: its number and name, its place, and the drive's own error."""
+def refusal(state: ModbusState, asked: Request, reply: Reply, code: int | None, valid: str = "") -> Refused | NoAnswer:
+    """Describe an exception: its number and name, its place, the valid values there, and the drive's own error.
+
+    An exception that does not say that the request was not executed is no refusal.
+    """
     number = reply.body[1]
-    text = f"{who(state)} refused '{asked.text}': exception {number:02} {framing.EXCEPTIONS.get(number, 'unknown')}"
-    text += f" at {mapping.place(asked.body)}"
-    row = AT.get(int.from_bytes(asked.body[1:3])) if asked.body[0] == framing.WRITE_REGISTERS else None
-    if row is not None and row.limits and number == ILLEGAL_VALUE:
-        text += f", which takes {row.limits.replace('int32', '32 bits')}"
+    name, place = framing.EXCEPTIONS.get(number, "unknown"), mapping.place(asked.body)
+    if number in framing.NO_REFUSAL:
+        return NoAnswer(
+            f"{who(state)}: '{asked.text}' was not refused and has no result: exception {number:02} {name} at {place}; "
+            "it is not known whether it was executed; it was sent once"
+        )
+    text = f"{who(state)} refused '{asked.text}': exception {number:02} {name} at {place}{valid}"
     return Refused(f"{text}; {described(code, state)}" if code else text, code)
+
+
+def valid_values(state: ModbusState, asked: Request, reply: Reply) -> Procedure[str]:
+    """Say which values are valid where a value was refused: the register's range, or the unit's own limit in it."""
+    row, value = mapping.written(asked.body)
+    if row is None or reply.body[1] != ILLEGAL_VALUE:
+        return ""
+    if value is None:
+        return f", which is a part of {row.name}: write both registers, as in /register 0x{row.address:04X} =VALUE"
+    if not row.allows(value):
+        return f", which takes {shown_limits(row.limits)}"
+    now: dict[str, int] = {}
+    for word in limits.rests_on(row.name):
+        if REGISTERS[word].only and state.product.startswith(OPEN_LOOP):  # reading it is an error of the drive
+            now[word] = 0
+        elif (found := (yield from _quietly(state, word))) is not None:
+            now[word] = found
+    if taken := limits.own(row.name, value, now):
+        return f", which takes {taken}"
+    return f": {value} is in the range of the register, and this unit does not take it now"
 
 
 def error_number(state: ModbusState) -> Procedure[int | None]:
     """Read the drive's own error, which clears it; None for no error, or where it cannot be read."""
     state.error_flag_read(True)  # until it is read: its reply may be lost, and a stop may come in between
     reply = yield request(state, "PR EF", mapping.read(REGISTERS["EF"]))
-    if reply.end is End.REFUSED or (reply.end is End.DONE and not any(pdu_codec().registers(reply.body))):
-        state.error_flag_read(False)  # a device that refuses to read the flag has none
+    refused = reply.end is End.REFUSED and reply.body[1] in NO_REGISTER
+    if refused or (reply.end is End.DONE and not any(pdu_codec().registers(reply.body))):
+        state.error_flag_read(False)  # a device that has no register for the flag has none
     if reply.end is not End.DONE or not state.error:
         return None
     if (number := (yield from _quietly(state, "ER"))) is not None:
@@ -136,10 +166,10 @@ def carried_out(state: ModbusState, text: str, pdu: bytes) -> Procedure[bytes]:
         if code in BY_ITSELF and not starts_motion(text):  # the reply confirms the write
             state.note(f"{who(state)}: '{text}' was executed, and meanwhile: {described(code, state)}, now cleared")
             return answer
-        if code in BY_ITSELF:
-            either = f"it refused '{text}', or that came by itself and it was executed"
-            raise Refused(f"{who(state)}: {described(code, state)}; {either}", code)
-        raise Refused(f"{who(state)} refused '{text}': {described(code, state)}", code)
+        raise NoAnswer(
+            f"{who(state)} accepted '{text}' and then showed {described(code, state)}, now cleared: it is not known "
+            "whether it was executed, or the error is another program's; it was sent once"
+        )
     return answer
 
 
@@ -150,6 +180,8 @@ def flagged(state: ModbusState) -> Procedure[bool]:
 
 
 OUTPUTS = 3
+OPEN_LOOP = "LMDO"
+"""The beginning of the names of products without an encoder and hMT."""
 MOST = 2
 """Most registers in one request (4.2.4, 4.2.5)."""
 _ESCAPES = {"b": "\b", "c": "\x03", "e": "\x1b", "g": "\a", "n": "\n", "r": "\r", "t": "\t"}
@@ -162,7 +194,7 @@ def perform(state: ModbusState, text: str) -> Procedure[tuple[str, ...]]:
     if statement is None:
         return ()
     if not statement.word:
-        raise Inexpressible(f"'{text}' has no register; an answer to IV goes through {mapping.ALTERNATIVE}")
+        raise Inexpressible(f"'{text}' has no register; an answer to IV goes through {ALTERNATIVE}")
     if statement.word == "PR":
         return (yield from _printed(state, statement))
     yield from carried_out(state, text, mapping.command(statement))
@@ -213,9 +245,9 @@ def _items(statement: grammar.Statement) -> Iterator[str | tuple[str, Reading]]:
             yield item.word, mapping.reading(item.word)
             sensor = item.word == "IT" and rest and isinstance(rest[0], grammar.Number)
             if sensor and rest.pop(0) != grammar.Number(1):
-                raise Inexpressible(f"a register has one sensor of IT, the first; {mapping.ALTERNATIVE} has others")
+                raise Inexpressible(f"a register has one sensor of IT, the first; {ALTERNATIVE} has others")
         else:
-            raise Inexpressible(f"expressions are not evaluated over Modbus; {mapping.ALTERNATIVE} prints them")
+            raise Inexpressible(f"expressions are not evaluated over Modbus; {ALTERNATIVE} prints them")
 
 
 def every_register(state: ModbusState) -> Procedure[tuple[str, ...]]:
@@ -229,7 +261,7 @@ def every_register(state: ModbusState) -> Procedure[tuple[str, ...]]:
         raise Inexpressible(f"'PR AL' was not sent, as {state.stranger}. Read one register: PR P, or /register 0x57")
     if (yield from flagged(state)):
         state.note(f"{who(state)}: ER is left out, as reading it clears it; its error flag is set (EF=1)")
-    plain = state.product.startswith("LMDO")
+    plain = state.product.startswith(OPEN_LOOP)
     rows = [row for row in ROWS if row.readable and row.name not in USER and not (plain and row.only)]
     lines: list[str] = []
     for word in sorted({row.name for row in rows} | {"IS", "OS"}):
@@ -239,7 +271,7 @@ def every_register(state: ModbusState) -> Procedure[tuple[str, ...]]:
             text = yield from printed(state, word)
         except Refused:
             continue  # this drive lacks the register
-        if word in mapping.SETUPS - REGISTERS.keys():  # a set-up has lines of its own
+        if word in SETUPS - REGISTERS.keys():  # a set-up has lines of its own
             lines += [line for line in text.replace("\r", "").split("\n") if line]
         else:
             lines.append(f"{word} = {text}")

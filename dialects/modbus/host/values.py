@@ -11,11 +11,14 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 
-from multidrop.dialects.codec import Priority, Procedure
+from multidrop.dialects.codec import Priority, Procedure, Request
 from multidrop.dialects.errors import Diagnostic, Inexpressible, NoAnswer, Refused
 from multidrop.dialects.mcode.host import units
+from multidrop.dialects.mcode.host.classify import WHOLE
+from multidrop.dialects.mcode.host.motions import cause
+from multidrop.dialects.mcode.host.settings import rows_of_list
 from multidrop.dialects.mcode.host.state import who
-from multidrop.dialects.mcode.host.values import SNAPSHOT_WORDS, rows_of_list, snapshot_of
+from multidrop.dialects.mcode.host.values import SNAPSHOT_WORDS, snapshot_of
 from multidrop.dialects.mcode.manual import parameter_plan, points
 from multidrop.dialects.mcode.manual import parameters as manual
 from multidrop.dialects.mcode.manual.mnemonic import EVERY
@@ -33,7 +36,7 @@ from multidrop.dialects.modbus.host.operations import (
     sure,
     value,
 )
-from multidrop.dialects.modbus.manual.registers import REGISTERS
+from multidrop.dialects.modbus.manual.registers import AT, IDENTITY, REGISTERS, SETUPS
 from multidrop.dialects.units import Basis, Units
 from multidrop.dialects.values import (
     Conditions,
@@ -128,13 +131,16 @@ PARAMETERS = Parameters(
 
 
 FLAGS = ("EF", "BY", "MV", "DE")
+SIGNS = ("ST", "AF")
+"""What shows the cause of an error, on drives that have it."""
 SETTINGS = ("EE", "AS", "RC", "HC", "VI", "VM", "A", "D")
 INPUTS = 4
 
 
 def parts(state: ModbusState, facts: Facts) -> Sequence[Part[ModbusState]]:
-    found = [Part("flags", partial(_registers, names=FLAGS)), Part("points", _points)]
     table = words(state.product)
+    signs = [n for n in SIGNS if state.product in EVERY and state.product in table[n].products]
+    found = [Part("flags", partial(_flags, names=(*FLAGS, *signs), before=facts)), Part("points", _points)]
     has = [n for n in SETTINGS if state.product not in EVERY or state.product in table[n].products]
     found += [Part(name, partial(_registers, names=(name,)), slow=True) for name in has]
     lists = manual.lists(state.product, state.version)
@@ -148,6 +154,12 @@ def _registers(state: ModbusState, names: Sequence[str]) -> Procedure[Facts]:
         found[name] = yield from value(state, name, Priority.POLL)
     if "EF" in found:
         state.error_flag_read(bool(found["EF"]))
+    return found
+
+
+def _flags(state: ModbusState, names: Sequence[str], before: Facts) -> Procedure[Facts]:
+    found = dict((yield from _registers(state, names)))
+    found[points.CAUSE] = cause(found, before)
     return found
 
 
@@ -173,7 +185,7 @@ def fold(state: ModbusState, facts: Facts) -> tuple[Conditions, ...]:
     return (points.conditions(state.product, facts, None),)
 
 
-_NO_NUMBER = mapping.IDENTITY.keys() | mapping.SETUPS
+_NO_NUMBER = IDENTITY.keys() | SETUPS
 
 
 def check(state: ModbusState, word: str) -> str:
@@ -234,4 +246,15 @@ def basis(state: ModbusState, axis: str, full_steps: int | None) -> Procedure[Ba
     return units.counted(state.product, values, full_steps)
 
 
-UNITS = Units(units.UNITS.axes, units.fields, units.UNITS.words, basis, units.disturbs, units.reads)
+def recounts(request: Request) -> bool:
+    """Whether it writes such a register, or one that restores all of them, by a word or by its number."""
+    if units.recounts(request):
+        return True
+    if request.body[:1] != bytes([framing.WRITE_REGISTERS]):
+        return False
+    first, count = int.from_bytes(request.body[1:3]), int.from_bytes(request.body[3:5])
+    written = (AT.get(address) for address in range(first, first + count))
+    return any(row.name in (*units.RESTS, *WHOLE) for row in written if row is not None)
+
+
+UNITS = Units(units.UNITS.axes, units.fields, units.UNITS.words, basis, units.disturbs, recounts, units.reads)

@@ -34,6 +34,8 @@ class Register:
     default: int | None = None
     only: str = ""
     """`closed loop` or `hMT`, where other drives lack it."""
+    form: str = ""
+    """How its value differs from the one that MCode has for the name; empty: it is the same."""
 
     @property
     def readable(self) -> bool:
@@ -68,6 +70,7 @@ ROWS: tuple[Register, ...] = tuple(
         row["limits"],
         int(row["default"]) if row["default"] else None,
         row["only"],
+        row["form"],
     )
     for row in rows(__file__, "registers.csv")
 )
@@ -75,3 +78,17 @@ REGISTERS: Mapping[str, Register] = {row.name: row for row in ROWS}
 """Registers by name."""
 AT: Mapping[int, Register] = {address: row for row in ROWS for address in row.addresses}
 """Registers by address; both registers of a value lead to it. A missing address is reserved."""
+
+# What the drive has beside registers: functions by name (4.3) and the device identification (4.1).
+
+SETUPS = frozenset({"IS", "OS", "TR", "MU"})
+"""Set-ups, which function 65 reads and function 66 writes as text."""
+CONTROLS = frozenset({"EX", "PS", "RS"})
+"""Commands on programs, which function 66 carries. E goes through function 65."""
+IDENTITY: Mapping[str, int] = {"PN": 1, "SN": 5, "VR": 6}
+"""Words that the device identification answers, by object."""
+OUTPUTS: Mapping[str, int] = {f"O{n}": n - 1 for n in (1, 2, 3)}
+INPUTS: Mapping[str, int] = {f"I{n}": n - 1 for n in (1, 2, 3, 4)}
+"""Outputs and inputs by name, with their addresses in functions 1, 5 and 2."""
+ALTERNATIVE = "MCode/TCP (tcp://HOST:503)"
+"""The other way to the same drive, which has every word."""

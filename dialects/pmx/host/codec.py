@@ -114,6 +114,10 @@ class Pmx(Codec):
         lines = (_text(piece) for piece in whole.split(b"\r"))
         return tuple(line for line in lines if line not in ("", "OK")), used
 
+    def printed(self, line: str) -> bool:
+        """Never: no command of a program prints, and a controller reports nothing by itself (manual 7.19, 9)."""
+        return False
+
     def stop(self, addresses: Sequence[str], sure: bool = True, half_sent: bool = False) -> bytes:
         """Return ABORT for the first controller; `stop_again` has the others, whose replies would collide (7.7).
 

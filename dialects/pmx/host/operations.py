@@ -13,7 +13,7 @@ from multidrop.dialects.exchange import Exchange
 from multidrop.dialects.family import Hints, Motion, Referencing
 from multidrop.dialects.pmx.host.codec import FACTORY, Pmx, PmxState
 from multidrop.dialects.pmx.manual import table
-from multidrop.dialects.pmx.manual.help import suggestion
+from multidrop.dialects.pmx.manual.help import suggestion, syntax
 from multidrop.dialects.scanning import WINDOW, Found, Outcome, Reach, Scan, Step
 
 # One request to a controller, and proof of its outcome.
@@ -53,21 +53,41 @@ def number(
     return int(reply.text)
 
 
-def refusal(state: PmxState, request: Request, reply: Reply) -> Refused:
+def refusal(state: PmxState, request: Request, reply: Reply) -> Refused | NoAnswer:
     """Describe a refusal: the reply where it says more than the command, its meaning, the remedy."""
     received, text = reply.text, request.text
     head = f"{who(state)} refused '{text}'"
     if (found := table.meaning(received)) is not None:
-        return Refused(f"{head}: {received}: {found[0]} ({found[1]})")
+        return Refused(f"{head}: {received}: {found[0]} ({_valid(text, received) or found[1]})")
     if received != f"?{text}" and not text.startswith(received[1:]):
-        return Refused(f"{head}: it received {received[1:]!r}, or does not accept it so (was the line disturbed?)")
+        return NoAnswer(
+            f"{who(state)}: {received!r} came for '{text}': the line was disturbed, or another program uses it; it is "
+            f"not known whether '{text}' was executed; it was sent once"
+        )
     advice = _advice(text)
     row = table.lookup(text)
     moves = row is not None and text == text.upper() and {"place", "sign", "both"} & set(row.shapes)
     if moves:
         advice = "an axis with a limit error takes no move: /status shows it, CLRX and CLRY clear it"
+        if beyond := [each for each in re.findall(r"-?\d+", text) if not -INT32 <= int(each) < INT32]:
+            advice = f"{beyond[0]} is beyond the range, {-INT32} to {INT32 - 1}"
     what = "it does not take that now" if moves else "it does not know that command"
     return Refused(f"{head}: {received}: {what}" + (f" ({advice})" if advice else ""))
+
+
+INT32 = 2**31
+_SPOKEN_OF_VALUE = ("?Invalid Answer", "?Low speed out of range")
+
+
+def _valid(text: str, received: str) -> str:
+    """The values that a command takes, or the numbers that its name has; empty where the refusal is of neither."""
+    name, sets, _ = text.strip().partition("=")
+    row = table.lookup(name) or table.COMMANDS.get(table.head(name))
+    if row is None:
+        return ""
+    if received == "?Index out of Range":
+        return f"valid: {syntax(row).partition(';')[0]}"
+    return f"{name.strip()} takes {row.takes}" if sets and row.takes and received in _SPOKEN_OF_VALUE else ""
 
 
 def _advice(text: str) -> str:
@@ -231,7 +251,9 @@ def identify(hints: Hints) -> Procedure[list[PmxState]]:
 def find(state: PmxState) -> Procedure[PmxState | None]:
     """Identify one controller; None where it is silent."""
     text = ""
-    for _ in range(TRIES):
+    for tried in range(TRIES):
+        if tried and not text.startswith("?"):  # a gateway's greeting came in its place: the controller's reply is late
+            yield from _mark(state, state.codec.request(state.address, "ID"), False)
         text = yield from _ask(state, "ID")
         if not text or PRODUCT.search(text):
             break

@@ -10,7 +10,7 @@ from __future__ import annotations
 import re
 from collections.abc import Collection, Sequence
 
-from multidrop.dialects.codec import Procedure
+from multidrop.dialects.codec import Procedure, Request
 from multidrop.dialects.pmx.host.codec import PmxState
 from multidrop.dialects.pmx.host.operations import number
 from multidrop.dialects.pmx.manual.table import AXES
@@ -22,6 +22,7 @@ SPEEDS = ("HSPD", "LSPD", "SSPD")
 _MOVE = re.compile(rf"\s*(?:X{VALUE})?(?:Y{VALUE})?\s*|\s*I{VALUE}:{VALUE}\s*")
 _SET = re.compile(rf"\s*(P|{'|'.join(SPEEDS)})([XY])={VALUE}\s*")
 _READ = re.compile(rf"\s*(P|PS|{'|'.join(SPEEDS[:2])})([XY])\s*")
+_RECOUNTS = re.compile(rf"\s*(?:{'|'.join(RESTS)})[XY]=")
 _DISTURBS = re.compile(r"\s*(?:P|SL|SLR|POL)([XY])=")
 
 
@@ -44,6 +45,10 @@ def disturbs(state: PmxState, text: str) -> Collection[str]:
     return (found[1].lower(),) if found is not None else ()
 
 
+def recounts(request: Request) -> bool:
+    return _RECOUNTS.match(request.text) is not None
+
+
 def target(state: PmxState) -> Procedure[Takes]:
     return Takes.DISTANCE if (yield from number(state, "MM")) else Takes.PLACE
 
@@ -62,6 +67,7 @@ UNITS = Units(
     f"X, Y, I, PX, PY, {', '.join(f'{word}X, {word}Y' for word in SPEEDS)}",
     basis,
     disturbs,
+    recounts,
     reads,
     target=target,
 )

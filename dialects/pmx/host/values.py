@@ -290,6 +290,11 @@ def fold(state: PmxState, facts: Facts) -> tuple[Conditions, ...]:
     return one, other
 
 
+def clearing(axis: str) -> str:
+    """The command that clears the errors of an axis, which takes no move before (7.11, 7.17)."""
+    return f"CLR{axis.upper()}"
+
+
 def _of_axis(axis: str, facts: Mapping[str, int]) -> Conditions:
     status, loop, on = facts.get(f"MST{axis}"), facts.get(f"SLS{axis}"), facts.get("EO")
     more = []
@@ -308,6 +313,7 @@ def _of_axis(axis: str, facts: Mapping[str, int]) -> Conditions:
         lamps=tuple(Lamp("", each, None if status is None else bool(status & bit)) for bit, each in ON_AXIS),
         error=code,
         error_text=text,
+        clears=clearing(axis) if code else "",
         disabled=f"EO{DRIVERS[axis]}=0" if on is not None and not on & DRIVERS[axis] else "",
         more=tuple(more),
         unit="counts" if facts.get(f"SL{axis}") else "pulses",
@@ -393,9 +399,7 @@ def run(axis: str, velocity: int | str) -> tuple[str, ...]:
     return (f"HSPD{name}={abs(velocity)}", f"J{name}{'-' if velocity < 0 else '+'}") if velocity else (f"STOP{name}",)
 
 
-ACTIONS = Actions(
-    homings=homings, run=run, output=lambda number, on: f"DO{number}={on:d}", clear=lambda axis: f"CLR{axis.upper()}"
-)
+ACTIONS = Actions(homings=homings, run=run, output=lambda number, on: f"DO{number}={on:d}", clear=clearing)
 VALUES = Values(
     parameters=PARAMETERS,
     snapshot=take,

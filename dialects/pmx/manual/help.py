@@ -6,7 +6,18 @@ import difflib
 from dataclasses import replace
 
 from multidrop.dialects.errors import Diagnostic
-from multidrop.dialects.pmx.manual.table import COMMANDS, ELSEWHERE, ROWS, WORDS, Command, head, lookup, meaning
+from multidrop.dialects.pmx.manual import script_parser
+from multidrop.dialects.pmx.manual.table import (
+    COMMANDS,
+    ELSEWHERE,
+    ROWS,
+    WORDS,
+    Command,
+    head,
+    lookup,
+    meaning,
+    parts_of,
+)
 
 ACCESS = {"R": "read only", "W": "write only", "RW": "read and write"}
 EXAMPLES = {"X": ["X1000", "X1000Y2000"], "Y": ["Y1000"], "I": ["I1000:-1000"], "T": ["TX1000", "TY1000"]}
@@ -19,8 +30,8 @@ def names() -> list[str]:
 
 
 def knows(word: str) -> bool:
-    """Whether a word, or a refusal (`?Moving`), has help."""
-    return lookup(word) is not None or meaning(word) is not None
+    """Whether a command, a word of programs, or a refusal (`?Moving`) has help."""
+    return lookup(word) is not None or meaning(word) is not None or script_parser.find(word) != ""
 
 
 def describe_error(code: int, product: str = "") -> list[str]:
@@ -29,21 +40,30 @@ def describe_error(code: int, product: str = "") -> list[str]:
 
 
 def describe(word: str, product: str = "") -> list[str]:
-    """Describe a command or a refusal, line by line; there is one product. Raises Diagnostic with similar words."""
+    """Describe a command, a word of programs or a refusal, line by line; there is one product.
+
+    Raises Diagnostic with similar words.
+    """
     refusal = meaning(word)
     if refusal is not None:
         return [f"{word}: {refusal[0]}", f"  do         {refusal[1]}"]
     row = lookup(word)
+    stored = script_parser.find(word)
+    if row is None and stored:
+        only = [f"  {'use':<10} in programs only"] * (stored in script_parser.KEYWORDS)
+        return [*script_parser.describe(stored), *only]
     if row is None:
         raise Diagnostic(f"no command {word.strip()!r}", "", suggestion(word))
     facts = (
         ("syntax", syntax(row)),
         ("value", row.takes),
         ("access", ACCESS.get(row.access, "")),
+        ("in program", script_parser.use(stored)),
         ("note", row.note),
         ("manual", f"PMX-2ED-SA {row.section}"),
     )
-    return [f"{row.name}: {row.meaning}", *(f"  {label:<10} {fact}" for label, fact in facts if fact)]
+    lines = [f"{row.name}: {row.meaning}", *(f"  {label:<10} {fact}" for label, fact in facts if fact)]
+    return [*lines, *(f"  {label:<10} {text}" for label, text in parts_of(row.name))]
 
 
 def syntax(row: Command) -> str:

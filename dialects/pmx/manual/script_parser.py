@@ -14,7 +14,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from multidrop.dialects.files import rows, split_lines
-from multidrop.dialects.pmx.manual.table import grouped, lookup
+from multidrop.dialects.pmx.manual.table import ELSEWHERE, Command, grouped, lookup
 from multidrop.dialects.program_files import BLANKS, Entry, Part, Problem, Word
 
 # The words (manual 10.1; the joystick's are in 7.15): access, ASCII command, help, their places in a line.
@@ -78,13 +78,17 @@ KEYWORDS: Mapping[str, tuple[str, str]] = {
 """The words of programs alone: syntax and meaning."""
 
 
+def _command_of(word: str) -> Command | None:
+    """The row of the ASCII command that does what a word of a script does."""
+    return lookup(ELSEWHERE.get(word, WORDS[word].ascii)) if word in WORDS else None
+
+
 def meaning(word: str) -> str:
     """Return the meaning of a word in one line; empty for an unknown one."""
     if word in KEYWORDS:
         return KEYWORDS[word][1]
-    found = WORDS.get(word)
-    row = lookup(found.ascii) if found is not None else None
-    return row.meaning if row is not None else ""
+    found, row = WORDS.get(word), _command_of(word)
+    return row.meaning if found is not None and row is not None else ""
 
 
 def describe(word: str) -> list[str]:
@@ -92,20 +96,37 @@ def describe(word: str) -> list[str]:
     if word in KEYWORDS:
         syntax, what = KEYWORDS[word]
         return [f"{word}: {what}", f"  {'syntax':<10} {syntax}"]
-    found = WORDS.get(word)
-    row = lookup(found.ascii) if found is not None else None
+    found, row = WORDS.get(word), _command_of(word)
     if found is None or row is None:
         return []
-    use = " and ".join(use for use, can in (("read", found.readable), ("set", found.settable)) if can) or "executed"
     facts = (
         ("value", row.takes),
         ("constants", f"{found.low} to {found.high}" if found.settable and found.high < INT32[1] else ""),
-        ("in programs", use),
-        ("as command", found.ascii if found.ascii != word else ""),
+        ("in programs", use(word)),
+        ("as command", command if (command := ELSEWHERE.get(word, found.ascii)) != word else ""),
         ("note", row.note),
         ("manual", f"PMX-2ED-SA {row.section}"),
     )
     return [f"{word}: {row.meaning}", *(f"  {label:<11} {fact}" for label, fact in facts if fact)]
+
+
+def find(word: str) -> str:
+    """Return the word of a program that a person means: `HOME` is `HOMEX+`, `sub 31` is `SUB`; empty for none."""
+    text = word.strip().upper()
+    if text in KEYWORDS or text in WORDS:
+        return text
+    if numbered := _NUMBERED.fullmatch(text):
+        return numbered[1]
+    fitting = (name for name in (*KEYWORDS, *WORDS) if text and name.startswith(text))
+    return next((name for name in fitting if _ENDING.fullmatch(name[len(text) :])), "")
+
+
+def use(word: str) -> str:
+    """Say how programs use a register or a command; empty for any other word."""
+    found = WORDS.get(word)
+    if found is None:
+        return ""
+    return " and ".join(use for use, can in (("read", found.readable), ("set", found.settable)) if can) or "executed"
 
 
 def offered() -> list[tuple[str, Register | None]]:
@@ -167,6 +188,8 @@ def entries(text: str) -> list[Entry]:
 _VALUE = r"-?\d+|[A-Za-z]\w*"
 _BLOCK = re.compile(r"(IF|ELSEIF|WHILE)(?![A-Za-z0-9])(.*)")
 _NUMBERED = re.compile(r"(PRG|GOSUB|SUB)\s*(-?\d+)?\s*")
+_ENDING = re.compile(r"[XY]?[+-]?|\d+", re.ASCII)
+"""What may follow the stem of a word: an axis and a direction, or a number."""
 _PLAIN = re.compile(r"(ELSEIF|ELSE|ENDIF|ENDWHILE|ENDSUB|END)\s*")
 MOVE = re.compile(r"([XYZU])\s*(-?\d+|V\d+)(?:\s*([XYZU])\s*(-?\d+|V\d+))*\s*")
 TARGET = re.compile(r"([XYZU])\s*(-?\d+|V\d+)")

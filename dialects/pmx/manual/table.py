@@ -144,12 +144,30 @@ def _states(word: str) -> dict[int, str]:
 BITS = tuple(_states("MST").items())
 """The bits of MSTX and MSTY, the most important for a person first."""
 
+POLARITIES = _states("POL")
+"""The bits of POLX and POLY; the two of the decoding are one value."""
+
 LOOP = _states("SLS")
 """The values of SLSX and SLSY."""
 LOOP_ERRORS = frozenset({8, 9, 10, 11})
 
 PROGRAM = _states("SASTAT")
 """The values of SASTAT0 and SASTAT1."""
+
+
+def parts_of(name: str) -> list[tuple[str, str]]:
+    """The parts of a command's value, each with its meaning: the bits of a sum, or its numbers; empty for any other."""
+    if name in ("MST", "POL"):
+        bits = dict(sorted((BITS if name == "MST" else POLARITIES.items()), key=lambda each: each[0]))
+        return [
+            (_bit_name(bit), f"{bit}: {meaning}" if bit.bit_count() == 1 else meaning) for bit, meaning in bits.items()
+        ]
+    return [(str(number), meaning) for number, meaning in {"SLS": LOOP, "SASTAT": PROGRAM}.get(name, {}).items()]
+
+
+def _bit_name(mask: int) -> str:
+    low, high = (mask & -mask).bit_length() - 1, mask.bit_length() - 1
+    return f"bit {low}" if low == high else f"bits {low}, {high}"
 
 
 def status_words(status: int) -> tuple[str, ...]:

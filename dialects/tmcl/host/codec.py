@@ -96,6 +96,7 @@ STOP_BYTES = re.compile(rb"[\x01-\xff](?:\x03\x00[\x00-\x05]|\x0d\x01[\x00-\x05]
 """Each frame of a stop for any module, with any checksum: a module refuses a wrong one."""
 STOPS = frozenset({Command.MST, Command.STOP_PROGRAM, Command.END_DOWNLOAD, Command.RFS})
 """The commands of a stop."""
+REPORTED = re.compile(r"module \d+: target reached")
 STORED_STOP = re.compile(r"module (\d+): in download mode: the stop was stored as a line of its program")
 
 
@@ -181,6 +182,10 @@ class Tmcl(Codec):
             elif fields.status == Status.STORED:
                 lines.append(f"module {fields.module}: in download mode: the stop was stored as a line of its program")
         return tuple(lines), used
+
+    def printed(self, line: str) -> bool:
+        """Whether it is a reached target, which a module reports by itself (command 138)."""
+        return REPORTED.match(line) is not None
 
     def stop(self, addresses: Sequence[str], sure: bool = True, half_sent: bool = False) -> bytes:
         """The first frame: MST for the first motor of the first module, or the end of its download."""

@@ -37,7 +37,7 @@ HAZARD = (
 
 @dataclass
 class _Search:
-    """One search of a line. Its steps return whether the adapter repeats what it sends."""
+    """One search of a line."""
 
     reach: Reach
     found: Found[TmclState]
@@ -52,7 +52,7 @@ class _Search:
     def window(self) -> float:
         return self.reach.window + GAP
 
-    def ask(self, address: str) -> Procedure[bool]:
+    def ask(self, address: str) -> Procedure[None]:
         """Ask one address, and identify what replies."""
         first = address == FACTORY and address not in self.asked
         self.reach.asks(address)
@@ -60,8 +60,6 @@ class _Search:
         heard = yield from _heard(address, RESYNC if first else SLOWEST if address == ALL[-1] else self.window)
         if first and not replies_in(heard):
             heard += yield from _heard(address, RESYNC)
-        if frame_of(int(address), IDENTITY) in heard:
-            return True
         if heard and not replies_in(heard):
             for each in [*self.asked][-LATE:]:
                 if each not in self.again and each not in self.states:
@@ -72,7 +70,6 @@ class _Search:
         for name in replies_in(heard):
             if name not in self.states and name not in self.reach.known:
                 yield from self._identify(name, address)
-        return False
 
     def _identify(self, name: str, address: str) -> Procedure[None]:
         """Identify a module that replied, as this address was asked."""
@@ -100,8 +97,7 @@ def search(reach: Reach, found: Found[TmclState], step: Step) -> Procedure[Outco
     for begin in range(0, len(addresses), BLOCK):
         block = addresses[begin : begin + BLOCK]
         for address in block:
-            if (yield from own.ask(address)):
-                return Outcome(echo=True)
+            yield from own.ask(address)
             step()
         if len(addresses) == 1 or (yield from own.counted()):
             continue

@@ -11,9 +11,9 @@ import re
 from collections.abc import Collection, Sequence
 from fractions import Fraction
 
-from multidrop.dialects.codec import Procedure
+from multidrop.dialects.codec import Procedure, Request
 from multidrop.dialects.errors import Refused
-from multidrop.dialects.tmcl.host.codec import TmclState
+from multidrop.dialects.tmcl.host.codec import TmclState, call_of
 from multidrop.dialects.tmcl.host.operations import read
 from multidrop.dialects.tmcl.manual import commands
 from multidrop.dialects.tmcl.manual.commands import Axis, Call, Command
@@ -73,6 +73,13 @@ def disturbs(state: TmclState, text: str) -> Collection[str]:
     return (_axis(state, call.motor),) if sets else ()
 
 
+def recounts(request: Request) -> bool:
+    _, call = call_of(request.body)
+    if call.command == Command.FACTORY:
+        return True
+    return call.command in (Command.SAP, Command.RSAP) and call.type in RESTS
+
+
 def basis(state: TmclState, axis: str, full_steps: int | None) -> Procedure[Basis]:
     motor, settings = int(axis or 0), {}
     for parameter in RESTS:
@@ -109,6 +116,7 @@ UNITS = Units(
     "MVP ABS, MVP REL, ROR, and SAP of 0, 1, 2, 4, 5, 194, 195",
     basis,
     disturbs,
+    recounts,
     reads,
     setting,
 )

@@ -14,6 +14,7 @@ from multidrop.dialects.codec import Priority, Procedure
 from multidrop.dialects.errors import Diagnostic, Refused
 from multidrop.dialects.program_files import Held
 from multidrop.dialects.tmcl.host.codec import TmclState
+from multidrop.dialects.tmcl.host.motions import DRIVER_FAULTS
 from multidrop.dialects.tmcl.host.operations import busy, motors, moving, perform, read, who
 from multidrop.dialects.tmcl.host.programs import read_held
 from multidrop.dialects.tmcl.manual.commands import (
@@ -29,6 +30,7 @@ from multidrop.dialects.tmcl.manual.modules import BAUDS, MODULES, RELATIVE_FROM
 from multidrop.dialects.values import (
     BY,
     COMMUNICATION,
+    UNREAD,
     Actions,
     Change,
     Conditions,
@@ -183,10 +185,11 @@ PARAMETERS = Parameters(
 
 
 STATE = (Axis.TARGET_POSITION, Axis.POSITION_REACHED)
+FLAGS = Axis.DRIVER_FLAGS
 SWITCHES = ((Axis.HOME_SWITCH, "home"), (Axis.RIGHT_SWITCH, "lim+"), (Axis.LEFT_SWITCH, "lim-"))
 RAMP = (Axis.MAXIMUM_VELOCITY, Axis.MAXIMUM_ACCELERATION)
 SETTINGS = (Axis.RUN_CURRENT, Axis.STANDBY_CURRENT, Axis.FREEWHEELING, *RAMP)
-KNOWN = (*STATE, *(axis for axis, _ in SWITCHES), *SETTINGS)
+KNOWN = (*STATE, FLAGS, *(axis for axis, _ in SWITCHES), *SETTINGS)
 RUNS = "RUNS"
 """Whether the module's program runs."""
 ABSENT = "absent"
@@ -200,7 +203,8 @@ def parts(state: TmclState, facts: Facts) -> Sequence[Part[TmclState]]:
         return (Part("motors", _count),)
     found: list[Part[TmclState]] = [Part("program", _program)]
     for motor in range(state.motors):
-        asked = [*STATE, *(axis for axis, _ in SWITCHES if facts.get(_key(axis, motor)) != ABSENT)]
+        some = (FLAGS, *(axis for axis, _ in SWITCHES))
+        asked = [*STATE, *(axis for axis in some if facts.get(_key(axis, motor)) != ABSENT)]
         found.append(Part(f"motor {motor}", partial(_parameters, motor=motor, wanted=asked)))
         for axis in SETTINGS:
             found.append(Part(_key(axis, motor), partial(_parameters, motor=motor, wanted=(axis,)), slow=True))
@@ -241,9 +245,13 @@ def _conditions(state: TmclState, facts: Facts, motor: int) -> Conditions:
     speed, ramp = (values.get(axis) for axis in RAMP)
     chip = module_of(state.product).chip_units
     freewheels = "freewheels: parameter 204" if values.get(Axis.FREEWHEELING) else ""
+    faults = ", ".join(words for bit, words in DRIVER_FAULTS.items() if values.get(FLAGS, 0) & bit)
     return Conditions(
         axis=str(motor) if state.motors > 1 else "",
         lamps=tuple(Lamp("", function, bool(values[axis])) for axis, function in SWITCHES if axis in values),
+        error=UNREAD if faults else 0,
+        error_text=faults,
+        cause=faults,
         program="running" if facts.get(RUNS) else "",
         runs=bool(facts[RUNS]) if RUNS in facts else None,
         target=None if values.get(Axis.POSITION_REACHED) else values.get(Axis.TARGET_POSITION),

@@ -114,7 +114,7 @@ class Prints:
         return lambda: str(read())
 
     def _floating(self, value: Value) -> str:
-        """An F register as PF says; unpadded with six decimals until PF has been set."""
+        """An F register as PF says; unpadded with six decimals while PF has its default."""
         setting = self._memory.texts["PF"]
         if not setting:
             return f"{value:.6f}"

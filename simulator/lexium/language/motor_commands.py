@@ -204,11 +204,11 @@ class Setups:
     # Texts.
 
     def _print_format(self, values: list[int]) -> None:
-        """PF (manual 5.1.97)."""
+        """PF (manual 5.1.97). Its default is the format of a new drive, which pads nothing."""
         values = [*values, *PRINT_FORMAT[len(values) :]]
         if not all(0 <= value <= most for value, most in zip(values, (16, 16, 1, 1), strict=True)):
             raise Fault(E.OUT_OF_RANGE)
-        self._keep("PF", values)
+        self._keep("PF", [] if values == [*PRINT_FORMAT] else values)
 
     def _keep(self, word: str, values: list[int]) -> None:
         self._memory.texts[word] = ",".join(map(str, values))

@@ -266,10 +266,9 @@ class Hmt:
         self._timeline.replan()
 
     def set_mode(self, mode: int, t: float) -> None:
-        """Set AS. Raises Fault (87, 109)."""
-        axis, was = self._axis, self.mode
-        turning = was == TORQUE_MODE and axis.kind == TORQUE
-        if self._axis.status.moving(t) and not turning:
+        """Set AS. Raises Fault (87, 109): torque mode turns until SL 0 or another stop."""
+        was = self.mode
+        if self._axis.status.moving(t):
             raise Fault(E.AS_WHILE_MOVING)
         if mode and not self._bridges.enabled:
             self._failed = True
@@ -277,8 +276,6 @@ class Hmt:
         self._axis.switch_unit("AS", mode, t)
         self._torque.halted = self._failed = False
         self._timeline.replan()
-        if was == TORQUE_MODE and mode != was:
-            axis.slow_to(0, t)
         self.changed(was, t)
 
     def changed(self, was: int, t: float) -> None:
@@ -290,6 +287,11 @@ class Hmt:
         self._held_since = inf
         if not (self.calibrating and mode in (FIXED, VARIABLE)):
             self._ready_at = t + CALIBRATION if mode in (FIXED, VARIABLE) and not was else inf
+
+    def settle(self, t: float) -> None:
+        """Let a calibration that has begun be over."""
+        if self.calibrating:
+            self._calibrated(t)
 
     def clear(self) -> None:
         """Carry out CF: the bridges are on again, and what the rotor has lost is forgotten."""

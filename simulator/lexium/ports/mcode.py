@@ -15,6 +15,8 @@ carried out.
 
 Decisions where the manual is silent (facts that a unit may correct):
 
+- Backspace and Delete take back the character before them in the line of this drive, and nothing where there is none;
+  the name of a line in party mode stays. EM=0 gives back the key as it came.
 - A line of only CR is an empty command: it gets a reply and executes nothing. With checksum it lacks one: NAK.
 - The reply to a line that changes CK follows the new CK: ACK to `CK=1`, CR LF to `CK=0`.
 - A check byte after a key, and a CR after that, belong to the key and are no line.
@@ -30,207 +32,27 @@ Decisions where the manual is silent (facts that a unit may correct):
 
 There is no clock: bytes and times come in, bytes with times go out. Times are seconds, and never go back.
 
-Replies have echo mode, ACK and NAK, checksums, prompts, prints. Tables 7.1 to 7.4 of the MCode manual follow one rule.
-A reply consists of a *head*, the printed lines, and in EM=0 a prompt. The head acknowledges the line: CR LF without
-checksum, and ACK or NAK in its place with checksum. EM=3 puts the received command before the head; EM=2 has no head.
-Without checksum one byte from 0x80 on before the terminator is taken for the check byte of a client that always sends
-one.
-
 This is the drive's side. It shares nothing with the host's parser of these tables, so that each tests the other.
 """
 
 from __future__ import annotations
 
 import re
-from typing import NamedTuple
 
-from multidrop.dialects.mcode.manual.errors import ErrorNumber
 from multidrop.simulator.lexium.device import MCodeDevice
-from multidrop.simulator.lexium.state.errors import TRANSMIT_BUFFER
-from multidrop.simulator.wire import BITS_A_BYTE, Transmission
-
-CRLF = b"\r\n"
-ACK, NAK = b"\x06", b"\x15"
-LINE_BUFFER = 64
-
-
-class Mode(NamedTuple):
-    """The communication settings of one line and of the reply to it."""
-
-    echo: int
-    party: bool
-    checksum: int
-    name: str
-
-
-class Line:
-    """A line that is being received: its settings, its addressee, and its text.
-
-    `mine`: it is for this drive. `replies`: this drive replies to it.
-    """
-
-    def __init__(self, mode: Mode, name: bytes = b"", mine: bool = True, replies: bool = True) -> None:
-        self.mode, self.name, self.mine, self.replies = mode, name, mine, replies
-        self.text = bytearray()
-
-
-class Outcome(NamedTuple):
-    """The outcome of a line. `busy`: a program ran when it came; `flagged`: an old error causes NAK."""
-
-    lines: tuple[str, ...] = ()
-    tail: str = ""
-    good: bool = True
-    damaged: bool = False
-    busy: bool = False
-    flagged: bool = False
-
-
-def checksum(text: bytes) -> int:
-    """Compute the byte that makes the low seven bits of the sum zero; bit 7 is set, so it ends no line (7.1.2)."""
-    return (128 - sum(text) % 128) % 128 | 0x80
-
-
-def split(line: Line) -> tuple[bytes, bool]:
-    """Split off the checksum; return the command, and whether the checksum is right (with CK=0 it may be absent)."""
-    text = bytes(line.text)
-    if not line.mode.checksum:
-        return text[: len(text) - (text[-1:] >= b"\x80")], True
-    if not text or text[-1] < 0x80:
-        return text, False
-    return text[:-1], (sum(line.name) + sum(text)) % 128 == 0
-
-
-def compose(mode: Mode, text: bytes, outcome: Outcome, prompt: str) -> bytes:
-    """Compose the whole reply to one line of this text, without the characters that EM=0 has echoed before."""
-    out = bytearray()
-    for line in outcome.lines:
-        raw = line.encode("latin-1", "replace")
-        out += raw
-        if mode.checksum:
-            out.append(checksum(raw))
-        out += CRLF
-    data = bytes(out) + outcome.tail.encode("latin-1", "replace")
-    if mode.echo == 2:
-        return data
-    if not mode.checksum:
-        # With a program running a print is not preceded by CR LF; a command keeps its only sign of acceptance.
-        absent = mode.echo == 1 and outcome.busy and bool(outcome.lines or outcome.tail)
-        answer = data if absent else CRLF + data
-    elif outcome.damaged or outcome.flagged or not outcome.good:
-        answer = NAK + data
-    else:
-        answer = data if mode.checksum == 2 and outcome.busy else ACK + data
-    if mode.echo == 3:
-        return text + answer
-    return answer + prompt.encode() if mode.echo == 0 else answer
-
-
-class Replier:
-    """Carries lines out, and holds what is to be sent, with the times at which it begins.
-
-    `serial=False`: the Ethernet kind, without party mode and checksum. `baud` 0: bytes take no time, no print is lost.
-    `queue` is what has not been taken yet.
-    """
-
-    def __init__(self, device: MCodeDevice, serial: bool, baud: int) -> None:
-        self._device, self._memory, self._serial, self._printer = device, device.memory, serial, device.core.printer
-        self._byte_time = BITS_A_BYTE / baud if baud else 0.0
-        self._busy_until = 0.0
-        self.queue: list[Transmission] = []
-        self._begun = b""
-
-    def mode(self) -> Mode:
-        values, name = self._memory.values, self._memory.texts["DN"]
-        if not self._serial:
-            return Mode(int(values["EM"]), False, 0, name)
-        return Mode(int(values["EM"]), bool(values.get("PY")), int(values.get("CK", 0)), name)
-
-    def echo(self, mode: Mode, text: bytes, now: float) -> None:
-        """Send received characters back, in EM=0."""
-        if mode.echo == 0:
-            self.send(now, text)
-
-    def overflow(self, line: Line, now: float) -> None:
-        """Refuse a line that is too long; the rest of it is dropped."""
-        self._device.fail(ErrorNumber.UNKNOWN_VARIABLE, now)
-        if line.replies:
-            self.send(now, compose(line.mode, bytes(line.text), Outcome(good=False), "?"))
-        line.mine = False
-
-    def carry_out(self, line: Line, now: float) -> None:
-        device, memory, mode = self._device, self._memory, line.mode
-        command, sound = split(line)
-        before, busy = memory.checksum, device.thread.running
-        flagged = memory.model.flags_by_nak and memory.error_flag
-        if sound and command.strip():
-            answer = device.execute(command.decode("latin-1"), now)
-            outcome = Outcome(answer.lines, answer.tail, not answer.refused, busy=busy, flagged=flagged)
-        else:
-            outcome = Outcome(damaged=not sound, busy=busy, flagged=flagged)
-        if self._serial and memory.checksum != before:
-            mode = mode._replace(checksum=memory.checksum)
-        if line.replies:
-            prompt = self.prompt(outcome) if mode.echo == 0 else ""
-            self.send(now, compose(mode, bytes(line.text), outcome, prompt))
-
-    def collect(self, now: float) -> None:
-        """Send what the device has printed by itself; a print is lost, and an error, where the buffer is full."""
-        if not self._printer.printed:
-            return
-        mode, lost = self.mode(), False
-        for at, text in self._printer.take():
-            if self._busy_until - at > TRANSMIT_BUFFER * self._byte_time > 0:
-                lost = True
-            else:
-                self.send(at, self._sealed(text, mode.checksum), overheard=mode.party)
-        if lost:
-            self._device.fail(ErrorNumber.TRANSMIT_BUFFER_FULL, now)
-
-    def escaped(self, now: float) -> None:
-        echo = self._memory.echo_mode
-        if echo == 0:
-            self.send(now, b"#" + CRLF + self.prompt().encode())
-        elif echo != 2:
-            self.send(now, CRLF)
-
-    def send(self, at: float, data: bytes, *, overheard: bool = False) -> None:
-        if data:
-            self.queue.append(Transmission(at, data, overheard))
-            self._busy_until = max(self._busy_until, at) + len(data) * self._byte_time
-
-    def take(self) -> list[Transmission]:
-        queue, self.queue = self.queue, []
-        return queue
-
-    def _sealed(self, text: str, checksummed: int) -> bytes:
-        """Encode an unsolicited print, with a checksum before each CR LF; one may begin a line and another end it."""
-        raw = text.encode("latin-1", "replace")
-        if not checksummed:
-            self._begun = b""
-            return raw
-        *ended, rest = raw.split(CRLF)
-        out = bytearray()
-        for line in ended:
-            out += line
-            out.append(checksum(self._begun + line))
-            out += CRLF
-            self._begun = b""
-        self._begun += rest
-        return bytes(out + rest)
-
-    def prompt(self, outcome: Outcome | None = None) -> str:
-        """EM=0's prompt; in program mode the address that the next stored line gets, and two spaces."""
-        at = self._device.programming
-        if at is not None:
-            return "?" if outcome and not outcome.good else f"{at}  "
-        return "?" if self._memory.error_flag else ">"
-
+from multidrop.simulator.lexium.ports.replies import CRLF, LINE_BUFFER, Line, Mode, Replier
+from multidrop.simulator.wire import Transmission
 
 CR, LF, ESC, CTRL_C, CTRL_E = 0x0D, 0x0A, 0x1B, 0x03, 0x05
 KEYS = frozenset({CR, LF, ESC, CTRL_C, CTRL_E})
 """Bytes that have a meaning within a line for another drive."""
+TYPED = re.compile(rb"([^\x08\x7f]*)([\x08\x7f]?)", re.DOTALL)
+"""The characters of a line up to a key that takes back one, and the key."""
 PLAIN = re.compile(b"[^\r\n\x1b\x03\x05]+")
 """Text of a line: bytes that are no keys."""
+BACKSPACE, DELETE = 0x08, 0x7F
+ERASERS = frozenset({BACKSPACE, DELETE})
+"""Keys of a terminal that take back the character before."""
 ENDS, STOPS = re.compile(rb"[\r\n]"), re.compile(rb"[\x03\x05\x1b]")
 ADDRESSES = frozenset({CR, LF, *b"*^"})
 """Bytes that begin a line in party mode, except for names."""
@@ -264,10 +86,13 @@ class MCodePort:
 
     @property
     def deadline(self) -> float | None:
-        return self._device.deadline
+        device, held = self._device.deadline, self._replier.deadline
+        return device if held is None or (device is not None and device < held) else held
 
     def quiet(self, now: float) -> bool:
-        device = self._device
+        device, held = self._device, self._replier.deadline
+        if held is not None and held <= now:
+            return False
         same = self._powered and self._boots == self._power.boots
         return same and not self._replier.queue and device.quiet(now, self._running)
 
@@ -298,6 +123,7 @@ class MCodePort:
                 at += 1
         self._running = self._thread.running
         self._replier.collect(self._last)
+        self._replier.release(self._last)
 
     def advance(self, now: float) -> bytes:
         """Return what the drive has sent up to `now`, since it was last asked."""
@@ -306,7 +132,7 @@ class MCodePort:
     def sent(self, now: float) -> list[Transmission]:
         """Return the same as transmissions; other drives overhear prints in party mode."""
         self._settle(now)
-        return self._replier.take()
+        return self._replier.take(now)
 
     def overhear(self, data: bytes, now: float) -> None:
         """Take what another drive has printed: in party mode, whole lines, while the host sends no line."""
@@ -377,6 +203,10 @@ class MCodePort:
         device = self._device
         memory = self._memory
         in_party = self._serial and self._active and memory.party
+        if byte in ERASERS:  # there is nothing to take back
+            if not (mode := self._replier.mode()).party:
+                self._replier.echo(mode, bytes([byte]), now)
+            return
         if in_party and byte not in ADDRESSES and chr(byte) != memory.name:  # found without the settings of a line
             self._line = DEAF
             return
@@ -388,7 +218,7 @@ class MCodePort:
         if byte in STEP_KEYS and self._thread.stepping:
             device.step(STEP_KEYS[byte], now)
         elif byte == LF:
-            self._replier.echo(mode, b"\n", now)
+            self._replier.line_feed(mode, now)
         else:
             self._line = Line(mode)
             if byte == CR:
@@ -417,6 +247,16 @@ class MCodePort:
     def _on_text(self, line: Line, text: bytes, now: float) -> None:
         if not line.mine:
             return
+        for plain, key in TYPED.findall(text) if not ERASERS.isdisjoint(text) else ((text, b""),):
+            self._on_characters(line, plain, now)
+            if key and line.mine:
+                del line.text[-1:]
+                if line.replies:
+                    self._replier.echo(line.mode, key, now)
+
+    def _on_characters(self, line: Line, text: bytes, now: float) -> None:
+        if not line.mine:
+            return
         fits = text[: LINE_BUFFER - len(line.name) - len(line.text)]
         line.text += fits
         if line.replies:
@@ -427,7 +267,7 @@ class MCodePort:
     def _on_end_of(self, line: Line, byte: int, now: float) -> None:
         """Take CR or LF within a line."""
         if line.mode.party or byte == CR:
-            self._line = None
+            self._line, line.entered = None, byte == CR
             if line.mine and len(self._waiting) < MOST_WAITING:
                 self._waiting.append(line)
             elif line.mine:

@@ -91,6 +91,7 @@ class Model(NamedTuple):
     `prompts_at_start`: a prompt follows the sign-on. `captures_relative`: TR sets PC too, TP does not.
     `flags_by_nak`: with a checksum the drive carries a line out and replies NAK while an error is set.
     `wakes_by_line`: in party mode the first line is carried out, too; its LF is the one that party mode waits for.
+    `echoes_before_value`: a LF right behind the CR of a line is given back before what the line prints, not after it.
     """
 
     version: str
@@ -122,10 +123,15 @@ class Model(NamedTuple):
     captures_relative: bool = False
     flags_by_nak: bool = False
     wakes_by_line: bool = False
+    echoes_before_value: bool = False
 
 
 def _lexium(name: str, *, ethernet: bool = False) -> Model:
     return Model(version=f"{name} 6.002, Hw: 3.2", part=f"{name}571", ethernet=ethernet)
+
+
+MODULE = _lexium("LMMCM")._replace(part="LMMCM15", points=MODULE_POINTS, auxiliary=False, free_ms=True)
+"""The Motion Module prints LMMCM as its product (5.1.141). No manual shows its part number."""
 
 
 MDRIVE = Model(
@@ -156,6 +162,7 @@ MDRIVE = Model(
     captures_relative=True,
     flags_by_nak=True,
     wakes_by_line=True,
+    echoes_before_value=True,
 )
 
 MODELS: Mapping[str, Model] = {
@@ -163,7 +170,7 @@ MODELS: Mapping[str, Model] = {
     "LMDCM": _lexium("LMDCM"),
     "LMDOE": _lexium("LMDOE", ethernet=True),
     "LMDCE": _lexium("LMDCE", ethernet=True),
-    "LMM": _lexium("LMM")._replace(part="LMM15", points=MODULE_POINTS, auxiliary=False, free_ms=True),
+    "LMM": MODULE,
     "MDI": MDRIVE,
     "MDIE": MDRIVE._replace(part="MDI1FRD23A7-EQ"),
     "MDIX": MDRIVE._replace(part="MDI3CRL23C7-EQ", points=EXPANDED_POINTS),

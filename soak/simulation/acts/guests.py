@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from multidrop.dialects.tmcl.host import codec
 from multidrop.dialects.tmcl.manual import commands
 from multidrop.shell.sharing.writer_turns import SILENT
-from multidrop.simulator.lexium.ports.mcode import checksum
+from multidrop.simulator.lexium.ports.replies import checksum
 
 if TYPE_CHECKING:
     from multidrop.shell.sharing.server import SharedPort

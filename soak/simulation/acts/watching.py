@@ -103,6 +103,7 @@ async def watched(world: World, run: Run, work: Awaitable[Any]) -> None:
     run.executed = len(world.history.executed)
     if run.download is not None:
         run.download.old = held(world, run.download.line, run.download.drive)
+        run.download.restarts = world.restarts(run.download.line, run.download.drive)
     try:
         await work
     except BaseException as failure:
@@ -116,6 +117,7 @@ async def watched(world: World, run: Run, work: Awaitable[Any]) -> None:
         world.history.note(run.ended, "run", f"{run.typed}: {run.failure or 'done'}")
         if run.download is not None:
             run.download.new = held(world, run.download.line, run.download.drive)
+            run.download.restarted = world.restarts(run.download.line, run.download.drive) != run.download.restarts
 
 
 def held(world: World, line: str, drive: str) -> tuple[str, ...]:

@@ -142,13 +142,22 @@ def test_an_error_that_came_by_itself_is_not_told_as_a_refusal(bench, em, party)
     assert len(desk.witness.executed("R1=5")) == 1
 
 
+def _moves_without_a_refusal(desk, em, number):
+    """MA 100 is not blamed for an error that it cannot cause; a drive that replies to no command is asked before it."""
+    if em == 2:
+        desk.type("MA 100")
+        return
+    why = "which 'MA 100' cannot cause.*not known whether 'MA 100' was executed"
+    with pytest.raises(NoAnswer, match=f"error {number}: .*{why}"):
+        desk.type("MA 100")
+
+
 @pytest.mark.parametrize("em", range(4))
 def test_an_error_of_a_name_is_no_refusal_of_a_line_that_uses_none(bench, em):
     """An input calls a label that CP has erased."""
     desk = Desk(bench, (em, 0))
     desk.device.execute("EX G1", desk.bench.now)
-    with pytest.raises(Refused, match="error 30: .* or that came by itself and it was executed"):
-        desk.type("MA 100")
+    _moves_without_a_refusal(desk, em, 30)
     assert len(desk.witness.executed("MA 100")) == 1
     with pytest.raises(Refused, match="refused 'EX G1': error 30"):
         desk.type("EX G1")
@@ -159,8 +168,7 @@ def test_an_unknown_word_is_no_refusal_of_a_line_whose_words_are_all_known(bench
     """A port that is lent makes a half-sent line harmless at the stop of another program, which gives this error."""
     desk = Desk(bench, (em, 0))
     desk.device.fail(20, desk.bench.now)
-    with pytest.raises(Refused, match="error 20: .* or that is of another line and it was executed"):
-        desk.type("MA 100")
+    _moves_without_a_refusal(desk, em, 20)
     assert len(desk.witness.executed("MA 100")) == 1
     with pytest.raises(Refused, match="refused 'NOSUCH=1': error 20"):
         desk.type("NOSUCH=1")

@@ -1,5 +1,6 @@
 """Which lines of MCode need a person's yes, in every form in which a drive executes them."""
 
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -22,6 +23,7 @@ GUARDED = {
     "BD": ["BD=19", "bd 96", "BD19"],
     "DN": ['DN="a"', "dn=a", 'DN "b"', "DN=65", 'DN="', "DN b"],
     "LK": ["LK=1", "lk 1", "LK1", "LK=R1"],
+    "PR": [r'PR "\c"', r'pr P,"a\c"', r'PR "\\\c";', r'PR "a\c'],
     "PY": ["PY=0", "py 0", "PY0", "PY=R1", "PY=!1"],
 }
 FREE = [
@@ -29,6 +31,9 @@ FREE = [
         "PR FD",
         "PR CP",
         'PR "CP"',
+        r'PR "\\c"',
+        r'PR "\r\n\t"',
+        r"PR P ' \c",
         "PR DN",
         "DN",
         "BD",
@@ -53,7 +58,7 @@ def named(state, text):
 
 
 def test_every_form_of_a_guarded_line_is_guarded():
-    assert set(GUARDED) == {*AT_ONCE, *SETTINGS} == set(NAMES) - {"*"}
+    assert set(GUARDED) == {*AT_ONCE, *SETTINGS, "PR"} == set(NAMES) - {"*"}
     for name, texts in GUARDED.items():
         for text in texts:
             assert named(PARTY, text) == name, text
@@ -63,6 +68,27 @@ def test_what_a_line_does_is_said_with_the_line():
     assert FAMILY.guards.find(ALONE, "cp 1 'all").what == "'cp 1' erases the program and every user variable"
 
 
+@pytest.mark.parametrize(
+    ("product", "line", "erased"),
+    [
+        ("", "CP", "the program"),
+        ("LMDCM", "CP 0", "the program"),
+        ("LMDCM", "CP S", "the program, and saves that"),
+        ("LMDCM", "CP P1", "everything from P1 to the end of program memory"),
+        ("LMDCM", "CP 0, P1", "everything from P1 to the end of program memory"),
+        ("LMDCM", "aCP 1,P1", "everything from P1 to the end of program memory and every user variable"),
+        ("LMDCM", "CP 0,100", "everything from address 100 to the end of program memory"),
+        ("MDI", "CP 1", "everything from address 1 to the end of program memory"),
+        ("MDI", "CP S", "everything from S to the end of program memory"),
+        ("LMDCM", "CP P1,P2,P3", "the program"),
+    ],
+)
+def test_the_question_says_all_that_cp_erases(product, line, erased):
+    state = MCodeState(MCode(party=True), "a")
+    state.identified(product, "")
+    assert FAMILY.guards.find(state, line).what == f"'{line}' erases {erased}"
+
+
 def test_other_lines_are_free():
     for text in FREE:
         assert named(PARTY, text) == named(ALONE, text) == "", text
@@ -70,6 +96,12 @@ def test_other_lines_are_free():
 
 def test_leaving_party_mode_is_guarded_on_a_party_line_only():
     assert (named(PARTY, "PY=0"), named(ALONE, "PY=0")) == ("PY", "")
+
+
+def test_ctrl_c_in_a_print_is_guarded_on_a_party_line_only_and_is_never_a_mere_question():
+    line = r'PR "\c"'
+    assert (named(PARTY, line), named(ALONE, line), named(ALONE, "a" + line)) == ("PR", "", "PR")
+    assert not FAMILY.guards.only_reads(line) and FAMILY.guards.only_reads("PR P")
 
 
 def test_a_line_to_all_that_can_start_a_drive_is_guarded():

@@ -131,3 +131,51 @@ def test_without_a_product_each_family_is_told_that_has_the_number() -> None:
 def test_a_number_that_a_product_does_not_have_is_told(code: int, product: str) -> None:
     with pytest.raises(Diagnostic, match=f"no error {code}"):
         mcode_help.describe_error(code, product)
+
+
+@pytest.mark.parametrize(
+    ("word", "parts"),
+    [
+        ("PR", (r"\b", r"\c", r"\e", r"\g", r"\n", r"\r", r"\t", "asks before")),
+        ("AO", ("1 error", "4 lead", "8 lag", "512", "16384", "32768", "2 locked", "256 no +V", "8192")),
+        ("IS", ("4 go", "11 reset", "12 capture", "13 step", "14 encoder", "15 up", "9 voltage", "10 current", "IS=6")),
+        ("OS", ("16 user", "21 locked", "25 make-up", "27 encoder", "28 trip (output 3", "29 attention", "NEMA 17")),
+        ("TR", ("OS=3,28,0", "RT", "error 39", "20000")),
+        ("TP", ("RT", "error 43", "error 39")),
+        ("SF", ("EE=1", "SM=0", "86")),
+        ("CK", ("0x90", "0xC9", "two's complement", "ACK", "NAK")),
+    ],
+)
+def test_help_says_what_the_numbers_and_codes_of_a_word_mean(word: str, parts: tuple[str, ...]) -> None:
+    told = "\n".join(mcode_help.describe(word, "LMDCM"))
+    assert [part for part in parts if part not in told] == []
+
+
+@for_each("word", sorted(mcode_help.details()))
+def test_further_lines_are_of_a_lexiums_words_and_begin_with_a_label(word: str) -> None:
+    assert word in MNEMONICS and mcode_help.details()[word][0]["label"]
+    assert all(each["text"] and set(each) == {"word", "label", "text"} for each in mcode_help.details()[word])
+    if (own := mcode_help.MDRIVE.get(word)) is not None and own.products:
+        texts = " ".join(each["text"] for each in mcode_help.details()[word])
+        assert texts.split(";")[0] not in "\n".join(mcode_help.describe(word, "MDIX"))
+
+
+@pytest.mark.parametrize("topic", ["homing", "trip", "Trips", "PARTY", "checksum"])
+def test_a_topic_says_what_several_words_do_together(topic: str) -> None:
+    first, *lines = mcode_help.describe(topic)
+    assert first == f"{topic.lower().removesuffix('s')} (topic)" and len(lines) >= 4 and mcode_help.knows(topic)
+    more = lines[-1].split("help ")[1].split(" says")[0].split(", ")
+    assert all(word in MNEMONICS for word in more)
+
+
+def test_an_error_with_a_meaning_of_its_own_in_a_family_has_its_own_remedy() -> None:
+    assert mcode_help.describe_error(94) == [
+        "error 94 (LMD, LMM): the drive is disabled",
+        "  do         DE=1 enables it; with hMT, CF after a locked rotor (104)",
+        "error 94 (MDI): CF not while moving",
+        "  do         stop first (SL 0), then try again",
+    ]
+    assert mcode_help.describe_error(94, "MDIE") == [
+        "error 94: CF not while moving",
+        "  do         stop first (SL 0), then try again",
+    ]

@@ -285,3 +285,10 @@ def test_a_drive_alone_is_found_though_the_line_was_a_party_line_last_time(bench
     alone, device, [found] = opened(bench, {"set": {"EM": 1}}, hints=Hints(remembered=(identify.remember(state),)))
     assert (found.address, found.product, device.memory.error_flag) == ("", "LMDCM", False)
     assert alone.devices
+
+
+def test_a_motion_module_is_known_as_one_whatever_its_version_adds_to_the_name(bench):
+    """The manual prints LMMCM (5.1.141); its own words are those of the Motion Module."""
+    for version in ("LMMCM 6.002, Hw: 3.2", "LMMOM 5.009, Hw: 3.1", "LMM 6.002"):
+        _, _, [state] = opened(bench, {"personality": "LMM", "identity": {"version": version}})
+        assert (state.product, state.version) == ("LMM", version)

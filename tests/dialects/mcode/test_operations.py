@@ -7,8 +7,8 @@ from multidrop.dialects.mcode.family import MCODE
 from multidrop.dialects.mcode.host import identify
 from multidrop.dialects.mcode.host.codec import MCode
 from multidrop.dialects.mcode.host.exchange import answered, take_out
+from multidrop.dialects.mcode.host.settings import listed
 from multidrop.dialects.mcode.host.state import MCodeState
-from multidrop.dialects.mcode.host.values import listed
 from tests.support.mcode_drives import one_drive
 from tests.support.procedure import ProcedureRunner
 

@@ -189,3 +189,8 @@ def test_what_a_line_with_an_error_may_have_is_not_missed(program: str) -> None:
 def test_errors_and_warnings_are_reported_in_one_round_by_place() -> None:
     found = check("PG 1\nLB G1\nMR 5\nMR 6\nQ9=1\nBR G1\nPR 1\nPG\n")
     assert [(each.line, each.warning) for each in found] == [(3, True), (5, False), (7, True)]
+
+
+def test_ctrl_c_in_a_print_of_a_program_is_named() -> None:
+    told = [(2, "it prints Ctrl+C: every drive of the party line that hears it resets")]
+    assert warned('LB G1\nPR "a\\c"\nE\n') == told and warned('LB G1\nPR "a\\\\c"\nE\n') == []

@@ -272,3 +272,18 @@ def test_numbers_wrap_below_those_of_the_stop():
     state = ModbusState(DRIVE)
     assert state.codec.encode(request(b"\x01", 0xFFF0))[:2] == b"\x00\x00"
     assert state.codec.encode(request(b"\x01", 0xFFEF))[:2] == b"\xff\xef"
+
+
+@for_each(
+    ("came", "named"),
+    [
+        ("0000 0000 0007 01 03 04 0005 0000", "a reply with transaction number 0 came, and the request has 4660"),
+        ("3412 0000 0003 01 83 02", "a reply with transaction number 13330 came, and the request has 4660"),
+        ("1234 0000 0007 01 04 04 0005 0000", "a reply with function 4 came, and the request has function 3"),
+        ("FFFE 0000 0003 01 41 00 FFFF 0000 0006 01 10 0078 0002", ""),  # replies to a stop
+        ("", ""),
+    ],
+)
+def test_silence_names_the_wrong_number_of_what_came(came, named):
+    found = DRIVE.on_timeout(request(mapping.read(REGISTERS["P"])), h(came))
+    assert (found.reply.end, found.reply.detail, found.used) == (End.TIMEOUT, named, len(h(came)))

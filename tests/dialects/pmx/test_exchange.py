@@ -150,16 +150,31 @@ def test_a_value_is_printed_and_ok_prints_nothing():
         ("HSPD = 5", "?HSPD = 5", "no spaces: HSPD=5"),
         ("X1000", "?X1000", "it does not take that now (an axis with a limit error takes no move"),
         ("JX+", "?JX+", "CLRX and CLRY clear it"),
+        ("LSPD=7000000", "?Low speed out of range", "LSPD takes 1 to 6000000 pulses/s"),
+        ("LSPDY=7000000", "?Low speed out of range", "LSPDY takes 1 to 6000000 pulses/s"),
+        ("X1000", "?Low speed out of range", "LSPD, or LSPDX and LSPDY, may not be above HSPD"),
+        ("ACC=0", "?Invalid Answer", "ACC takes 1 ms or more"),
+        ("DO=256", "?Invalid Answer", "DO takes 0 to 255"),
+        ("POLX=99999", "?Invalid Answer", "POLX takes the sum of its bits, 0 to 16383"),
+        ("V64=1", "?Index out of Range", "valid: V0 to V63"),
+        ("DI9", "?Index out of Range", "valid: DI, DI1 to DI8"),
+        ("X3000000000", "?X3000000000", "3000000000 is beyond the range, -2147483648 to 2147483647"),
         ("x1000", "?x1000", "it reads capitals only: X1000"),
         ("MSTZ", "?MSTZ", "perhaps"),
         ("QQQ", "?QQQ", "?QQQ: it does not know that command"),
-        ("HSPD=5000", "?HSQD=5000", "it received 'HSQD=5000'"),
     ],
 )
 def test_a_refusal_says_what_it_means_and_what_to_do(text, answer, told):
     with pytest.raises(Refused) as caught:
         type_(text, Far(**{text: answer}))
     assert told in str(caught.value) and str(caught.value).startswith(f"00 refused '{text}'")
+
+
+@pytest.mark.parametrize("reply", ["?HSQD=5000", "?AT", "?X200"])
+def test_a_refusal_of_another_line_is_none_of_ours(reply):
+    why = "came for 'X100': .*another program.*not known whether 'X100' was executed; it was sent once"
+    with pytest.raises(NoAnswer, match=why):
+        type_("X100", Far(X100=reply))
 
 
 def test_what_acts_after_a_power_cycle_is_said():

@@ -9,6 +9,7 @@ import pytest
 
 from multidrop.dialects import Diagnostic
 from multidrop.dialects.families import FAMILIES
+from multidrop.shell.events import ProgramRead, ProgramSeen, SettingsRead
 from tests.support.cell_session import CellSession, bus, party, pmx
 
 pytestmark = pytest.mark.virtual
@@ -189,3 +190,71 @@ async def test_a_drive_that_the_line_lacks_is_not_referenced(tmp_path: Path) -> 
     async with Polled(tmp_path, party("a"), party("b")) as cell:
         with pytest.raises(Diagnostic, match="no drive zz"):
             await cell.session.run("/referenced zz")
+
+
+# What rests on a drive that was restarted
+
+
+PROGRAM = '\nprogram_text = """PG 1\\nLB G1\\nH 500\\nE\\nPG\\n"""'
+
+
+def forgotten(cell: Polled, address: str) -> list[bool]:
+    """For each reading of the program of a drive that was published: whether it is what the drive holds."""
+    return [each.known for each in cell.events if isinstance(each, ProgramRead) and each.address == address]
+
+
+async def test_the_program_the_labels_and_the_settings_of_a_restarted_drive_are_not_known(tmp_path: Path) -> None:
+    async with Polled(tmp_path, party("b") + PROGRAM) as cell:
+        drive = cell.session.buses[LINE].drives["b"]
+        await cell.session.run("/list b")
+        await cell.session.run("@b MA 51200")
+        await asyncio.sleep(8)
+        assert forgotten(cell, "b") == [True] and cell.session.names.offered(drive, "EX ")
+        await cell.cycle("b")
+        assert forgotten(cell, "b") == [True, False]
+        assert not cell.session.names.offered(drive, "EX ")
+        assert [each.known for each in cell.events if isinstance(each, SettingsRead)] == [False]
+        assert [each.break_point for each in cell.events if isinstance(each, ProgramSeen)] == [""]
+
+
+async def test_a_listing_of_a_drive_without_a_program_says_so(tmp_path: Path) -> None:
+    async with Polled(tmp_path, party("b")) as cell:
+        await cell.session.run("/list b")
+        assert cell.told()[-1] == "b: no program"
+
+
+async def test_drives_that_nothing_shows_to_have_run_on_may_have_been_restarted_too(tmp_path: Path) -> None:
+    async with Polled(tmp_path, party("a"), party("b"), party("c") + PROGRAM, party("d")) as cell:
+        await cell.session.run("/list c")
+        for line in ("@a MA 5000", "@b MA 51200", "@d MA 400"):
+            await cell.session.run(line)
+        await asyncio.sleep(8)
+        await cell.cycle("b")
+        assert len(cell.restarts()) == 1 and cell.restarts()[0].startswith("line: b was restarted")
+        doubts = [each for each in cell.told() if "may have been restarted, too" in each]
+        assert len(doubts) == 1 and doubts[0].startswith("line: c may have been restarted, too"), cell.told()
+        assert forgotten(cell, "c") == [True, False] and not cell.unreferenced("c")
+        assert forgotten(cell, "a") == []
+
+
+async def test_drives_of_a_line_that_are_all_restarted_are_each_named_once(tmp_path: Path) -> None:
+    async with Polled(tmp_path, party("a"), party("b"), party("c")) as cell:
+        await cell.session.run("@a MA 5000")
+        await cell.session.run("@b MA 51200")
+        await asyncio.sleep(8)
+        for name in "abc":
+            cell.world(f"power {name} off")
+        await asyncio.sleep(8)
+        for name in "abc":
+            cell.world(f"power {name} on")
+        await asyncio.sleep(60)
+        assert sorted(each[:21] for each in cell.restarts()) == ["line: a was restarted", "line: b was restarted"]
+        doubts = [each for each in cell.told() if "may have been restarted, too" in each]
+        assert len(doubts) == 1 and doubts[0].startswith("line: c may have been restarted, too"), cell.told()
+
+
+async def test_a_drive_that_was_silent_beside_no_restart_is_not_doubted(tmp_path: Path) -> None:
+    async with Polled(tmp_path, party("a"), party("b")) as cell:
+        await asyncio.sleep(8)
+        await cell.cycle("b")
+        assert not cell.restarts() and not [each for each in cell.told() if "may have been" in each]

@@ -121,6 +121,21 @@ async def test_an_adapter_that_repeats_is_noticed_by_a_drive_that_does_not(tmp_p
     assert [(each["address"], each["em"]) for each in found] == [("", 1)] and found[0]["url"].endswith("echo=local")
 
 
+async def test_a_search_for_controllers_takes_no_longer_behind_an_adapter_that_repeats(tmp_path):
+    times, told = [], []
+    for repeats in (False, True):
+        port = Port(tmp_path, bus("b", pmx("07"), pmx("31")), repeats=repeats)
+        found, search = scanning(port, "/dev/ttyUSB9?dialect=pmx")
+        begun = asyncio.get_running_loop().time()
+        await search.run([9600], False)
+        times.append(asyncio.get_running_loop().time() - begun)
+        told.append([text for text in port.told() if "repeats" in text or "no controller's reply" in text])
+        assert [each["address"] for each in found] == ["07", "31"]
+        assert found[0]["url"].endswith("echo=local") is repeats
+    assert times[1] < 1.1 * times[0]
+    assert told == [[], ["/dev/ttyUSB9: the adapter repeats what it sends; the URLs that are found have echo=local"]]
+
+
 async def test_a_stop_ends_the_search_and_keeps_what_was_found(tmp_path):
     port = Port(tmp_path, bus("b", party("a"), party("z")))
     found, search = scanning(port)

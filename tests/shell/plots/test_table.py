@@ -164,3 +164,21 @@ async def test_samples_are_written_into_a_new_file_at_once(ending: str, tmp_path
     with pytest.raises(Diagnostic, match="is there already; use another name"):
         await write(PlotTarget(file=path), batch)
     assert path.read_bytes() == before and list(tmp_path.iterdir()) == [path]
+
+
+@pytest.mark.parametrize("ending", ENDINGS)
+async def test_what_a_drive_prints_is_no_formula_in_a_csv_file(ending: str, tmp_path: Path) -> None:
+    path = tmp_path / f"run.{ending}"
+    texts = ["=1+1", "+1", "-5", "@SUM(A1)", "'=1", "-2+3+cmd", "plain", ""]
+    clock, wall = (lambda: 0.0), (lambda at: datetime.fromtimestamp(1.8e9 + at, UTC))
+    plot = await Plot.open(PlotTarget(file=path), clock=clock, wall=wall)
+    for number, text in enumerate(texts):
+        plot.state("=bus", "-a", "", "program", float(number), text)
+    await plot.close()
+    found = rows(path)
+    shown = [row["text"] for row in found]
+    if ending == "parquet":
+        assert shown == texts and found[0]["bus"] == "=bus"
+    else:
+        assert shown == ["'=1+1", "+1", "-5", "'@SUM(A1)", "''=1", "'-2+3+cmd", "plain", ""]
+        assert (found[0]["bus"], found[0]["drive"]) == ("'=bus", "'-a")

@@ -13,7 +13,8 @@ from hypothesis import strategies as st
 from multidrop.dialects.tmcl.host import codec
 from multidrop.dialects.tmcl.manual import commands
 from multidrop.shell.sharing.writer_turns import SILENT
-from multidrop.simulator.lexium.ports.mcode import MCodePort, checksum
+from multidrop.simulator.lexium.ports.mcode import MCodePort
+from multidrop.simulator.lexium.ports.replies import checksum
 from multidrop.simulator.pmx.device import PmxPort
 from tests.support.examples import examples
 from tests.support.lexium import drive

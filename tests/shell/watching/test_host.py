@@ -187,13 +187,28 @@ async def test_a_watcher_that_reads_nothing_costs_bounded_memory_and_is_told_wha
 async def test_more_watchers_than_there_may_be_are_refused(shared: Shared) -> None:
     peers = [plain(shared, greeting()) for _ in range(MOST)]
     await until(lambda: len(shared.gate.watchers) == MOST)
-    late = plain(shared, b"")
-    assert await asyncio.to_thread(to_end, late) == b""
+    late = plain(shared, greeting())
+    assert (await asyncio.to_thread(to_end, late)) == greeting()
     await until(lambda: shared.refused)
     assert shared.refused == [f"a watcher was refused: more than {MOST} watchers at a time"]
     for each in peers:
         each.close()
-    await until(lambda: len(shared.left) == MOST)
+    await until(lambda: len(shared.left) == MOST + 1)
+
+
+async def test_connections_that_never_greet_keep_no_watcher_out(shared: Shared) -> None:
+    silent = [plain(shared, b"" if number % 2 else b"multidrop-scr") for number in range(3 * MOST)]
+    true = plain(shared, greeting())
+    await until(lambda: shared.gate.watchers)
+    more = [plain(shared, b"") for _ in range(2 * MOST)]
+    second = plain(shared, greeting())
+    await until(lambda: len(shared.gate.watchers) == 2)
+    true.sendall(b"\x18")
+    await until(lambda: shared.stops)
+    assert shared.ahead == 1 and shared.refused == []
+    await until(lambda: len(shared.left) >= 4 * MOST)  # the oldest were closed
+    for each in (*silent, *more, true, second):
+        each.close()
 
 
 async def test_a_watcher_finds_the_only_screen_or_is_told_of_each(shared: Shared) -> None:
@@ -237,6 +252,9 @@ def test_what_is_no_screen_is_refused_in_one_line(folder: Path) -> None:
         "ssh://pc:x",
         "ssh://[",
         "ssh://pc?a=1",
+        "ssh://-oProxyCommand=x",
+        "ssh://-l@pc",
+        "ssh://=cmd@pc",
     ):
         with pytest.raises(Diagnostic, match="is no screen to join; as in --join ssh://HOST") as caught:
             joined(where, folder)

@@ -96,7 +96,7 @@ def test_a_pause_may_end_before_the_motor_stands():
 
 
 def test_a_pause_stops_torque_mode_and_resuming_goes_on_with_it():
-    device = drive("EX G1", program="PG 1\nLB G1\nTS=51200\nTQ=50\nAS=3\nH 5000\nAS=0\nE\nPG")
+    device = drive("EX G1", program="PG 1\nLB G1\nTS=51200\nTQ=50\nAS=3\nH 5000\nSL 0\nH\nAS=0\nE\nPG")
     device.advance(1)
     say(device, "PS")
     assert at(device, 3, "AV", "MV", "BY") == ["0", "0", "1"]

@@ -115,15 +115,17 @@ def test_make_up_with_a_one_behind_it_clears_lead_and_lag():
     assert rotor(device) == here and say(device, "PR P") == ["50000"]
 
 
-def test_torque_mode_turns_at_once_and_leaves_at_once():
+def test_torque_mode_turns_at_once_and_is_left_at_rest_only():
     device = drive("TS=100000", "AS=3")
     assert at(device, 1, "AV", "V", "MV") == ["100000", "0", "1"]
     say(device, "TD=0")
     assert at(device, 2, "AV") == ["-100000"]
     say(device, "TS=50000")
     assert at(device, 3, "AV") == ["-50000"]
-    say(device, "AS=0")
-    assert at(device, 4, "AV", "MV", "AS") == ["0", "0", "0"]
+    assert say(device, "AS=0", "AS=1", "AS=3", "PR AS") == ["?87", "?87", "?87", "3"]
+    assert at(device, 4, "AV", "MV") == ["-50000", "1"]
+    assert say(device, "SL 0", 1.0, "AS=0") == []
+    assert at(device, 6, "AV", "MV", "AS") == ["0", "0", "0"]
 
 
 def test_torque_mode_refuses_moves_and_make_up():
@@ -259,7 +261,8 @@ def test_a_locked_rotor_has_no_holding_current_and_is_not_brought_back_until_cf(
 def test_a_rotor_that_was_locked_in_torque_mode_can_be_moved_afterwards():
     device = drive("LT=100", "TS=51200", "AS=3", locked=((0.3, 1.0),))
     device.advance(2.0)
-    assert say(device, "PR LR", "PR ER", "AS=0", 1.0, "MR 500", 1.0, "PR MV", "PR LR") == ["1", "104", "0", "1"]
+    assert say(device, "PR LR", "PR ER", "SL 0", 1.0, "AS=0") == ["1", "104"]
+    assert say(device, 1.0, "MR 500", 1.0, "PR MV", "PR LR") == ["0", "1"]
     assert say(device, "CF", "PR LR") == ["0"]
 
 

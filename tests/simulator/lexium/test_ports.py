@@ -8,7 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from multidrop.simulator.lexium.ports.mcode import MCodePort, checksum
+from multidrop.simulator.lexium.ports.mcode import MCodePort
+from multidrop.simulator.lexium.ports.replies import checksum
 from multidrop.simulator.wire import Transmission
 from tests.support.cases import for_each
 
@@ -29,7 +30,8 @@ class Drive:
         self.thread = self.bridges = self.power_unit = self.memory = self.model = self.core = self.printer = self
         self.name, self.party, self.checksum, self.echo_mode = "a", False, 0, 0
         self.escape_mode, self.reset_mode, self.quiet_global, self.queued = 1, 1, True, False
-        self.error_flag = self.running = self.stepping = self.flags_by_nak = self.wakes_by_line = False
+        self.error_flag = self.running = self.stepping = self.flags_by_nak = False
+        self.wakes_by_line = self.echoes_before_value = False
         self.programming: int | None = None
         self.did: list[str] = []
         self.said: list[tuple[float, str]] = []
@@ -37,6 +39,9 @@ class Drive:
         for name, value in settings.items():
             assert hasattr(self, name)
             setattr(self, name, value)
+
+    def enter(self, now: float) -> None:
+        pass
 
     @property
     def values(self) -> dict[str, int]:
@@ -498,3 +503,110 @@ def test_garbage_in_pieces_is_heard_like_garbage_at_once(data: bytes, em: int, p
     one_by_one = b"".join(ask(other, bytes([byte])) for byte in data)
     assert at_once == one_by_one
     assert whole.did == pieces.did
+
+
+# Keys of a terminal within a line
+
+
+@for_each("em,py,ck", COMBINATIONS)
+@pytest.mark.parametrize("key", [b"\x08", b"\x7f"])
+def test_backspace_and_delete_take_back_the_character_before_them(em: int, py: int, ck: int, key: bytes) -> None:
+    """`PX`, the key, `R 9`, the key, `0`: the line is `PR 0`, and the echo has every byte as it came."""
+    drive = Drive(echo_mode=em, party=bool(py), checksum=ck)
+    port = active(drive)
+    whole = line(drive, b"PR 0")
+    name, end = (b"a" if py else b""), whole[-2:] if ck else whole[-1:]
+    heard = ask(port, name + b"PX" + key + b"R 9" + key + b"0" + end)
+    typed = name + b"PX" + key + b"R 9" + key + b"0" + (end[:1] if ck else b"")
+    plain = expected(em, py, ck, b"PR 0", b"0")
+    seal = end[:1] if ck else b""
+    assert heard == (plain.replace(name + b"PR 0" + seal, typed, 1) if em == 0 else plain)
+    assert drive.did == ["PR 0"]
+
+
+def test_a_client_may_begin_every_line_with_a_backspace() -> None:
+    drive = Drive(echo_mode=0)
+    port = MCodePort(drive)
+    for _ in range(2):
+        assert ask(port, b"\x08PR 0\r\n") == b"\x08PR 0\r\n0\r\n>\n"
+    party = Drive(party=True)
+    assert ask(active(party), b"\x08aPR 0\n") == b"aPR 0\r\n0\r\n>"
+    assert drive.did == ["PR 0"] * 2 and party.did == ["PR 0"]
+
+
+def test_keys_take_back_no_more_than_the_command_and_never_the_name() -> None:
+    drive = Drive(echo_mode=1, party=True)
+    port = active(drive)
+    assert ask(port, b"aMR 5\x08\x08\x08\x08\x08\x08\x08PR 0\n") == b"\r\n0\r\n"
+    assert ask(port, b"b\x08aPR 0\n") == b""  # the line of b has begun, and stays its line
+    assert drive.did == ["PR 0"]
+
+
+def test_what_was_taken_back_needs_no_room_in_the_line() -> None:
+    drive = Drive(echo_mode=1)
+    port = MCodePort(drive)
+    assert ask(port, b"x" * 64 + b"\x08" * 64 + b"PR 0\r") == b"\r\n0\r\n"
+    assert ask(port, b"x" * 65 + b"\x08" * 65 + b"PR 0\r")[:2] == b"\r\n" and drive.did[1:] == ["error 20"]
+
+
+@given(st.lists(st.sampled_from([b"PR ", b"0", b"9", b"\x08", b"\x7f"]), max_size=30), st.integers(1, 7))
+def test_keys_act_alike_however_the_bytes_are_grouped(typed: list[bytes], size: int) -> None:
+    data = b"".join(typed) + b"\r"
+    kept = bytearray()
+    for byte in data[:-1]:
+        if byte in b"\x08\x7f":
+            del kept[-1:]
+        elif len(kept) < 64:
+            kept.append(byte)
+    one, other = Drive(echo_mode=0), Drive(echo_mode=0)
+    port = MCodePort(other)
+    heard = b"".join(ask(port, data[n : n + size]) for n in range(0, len(data), size))
+    assert heard == ask(MCodePort(one), data)
+    assert one.did == other.did
+    if len(data) <= 64:
+        assert one.did == ([kept.decode()] if kept.strip() else [])
+
+
+# A LF behind the CR, on an MDrivePlus
+
+
+def test_an_mdrive_gives_the_line_feed_back_before_the_value_and_a_lexium_after_the_prompt() -> None:
+    for before, text, heard in (
+        (True, b"PR 0", b"PR 0\r\n\n0\r\n>"),
+        (True, b"MR 1", b"MR 1\r\n\n>"),
+        (True, b"BAD", b"BAD\r\n\n?"),
+        (False, b"PR 0", b"PR 0\r\n0\r\n>\n"),
+        (False, b"MR 1", b"MR 1\r\n>\n"),
+    ):
+        port = MCodePort(Drive(echo_mode=0, echoes_before_value=before))
+        assert ask(port, text + b"\r\n") == heard
+        assert ask(port, text + b"\r") == heard.replace(b"\n\n", b"\n").removesuffix(b"\n")
+
+
+@for_each("em,py,ck", [each for each in COMBINATIONS if each != (0, 0, 0)])
+def test_no_other_mode_of_an_mdrive_knows_that(em: int, py: int, ck: int) -> None:
+    one, other = (
+        Drive(echo_mode=em, party=bool(py), checksum=ck, echoes_before_value=before) for before in (True, False)
+    )
+    for drive in (one, other):
+        assert ask(active(drive), line(drive, b"PR 0")) == expected(em, py, ck, b"PR 0", b"0")
+
+
+def test_on_a_paced_wire_the_line_feed_comes_a_byte_later_and_a_late_one_after_the_prompt() -> None:
+    byte = 10 / 9600
+    for gap, heard in ((1.0, b"\r\n\n0\r\n>"), (2.5, b"\r\n0\r\n>\n")):
+        port = MCodePort(Drive(echo_mode=0, echoes_before_value=True), baud=9600)
+        out = b""
+        for n, each in enumerate(b"PR 0\r"):
+            out += ask(port, bytes([each]), 1.0 + n * byte)
+        at = 1.0 + 4 * byte
+        assert out == b"PR 0\r\n" and port.deadline == pytest.approx(at + 2 * byte)
+        out = port.advance(at + 2 * byte) if gap > 2 else b""
+        out += ask(port, b"\n", at + gap * byte) + port.advance(at + 9.0)
+        assert b"\r\n" + out == heard
+        assert port.deadline is None
+
+
+def test_what_comes_behind_the_line_is_echoed_after_its_reply() -> None:
+    port = MCodePort(Drive(echo_mode=0, echoes_before_value=True), baud=9600)
+    assert ask(port, b"PR 0\rPR 0\r\n") + port.advance(2.0) == b"PR 0\r\n0\r\n>PR 0\r\n\n0\r\n>"

@@ -35,6 +35,11 @@ def test_the_configuration_test_turns_half_a_turn_and_is_no_variable():
     assert say(drive("DE=0"), "SC 1") == ["?103"]
 
 
+def test_every_product_prints_its_version_as_the_manuals_do():
+    assert say(drive(personality="LMM"), "PR VR", "PR PN") == ["LMMCM 6.002, Hw: 3.2", "LMMCM15"]
+    assert say(drive(), "PR VR", "PR PN") == ["LMDCM 6.002, Hw: 3.2", "LMDCM571"]
+
+
 def test_voltages_are_printed_behind_their_status():
     assert say(drive(), "PR VT", "PR VT,1", "PR VT 2", "PR VT,3") == ["0, 12, 24", "0, 12", "0, 24", "?21"]
     assert say(drive(personality="LMM"), "PR VT", "PR VT,2", "PR VT,1") == ["1, 24", "1, 24", "?37"]

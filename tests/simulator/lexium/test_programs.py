@@ -7,6 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from multidrop.simulator.cell.spec import WorldSpec
+from multidrop.simulator.lexium.ports.mcode import MCodePort
 from tests.support.examples import examples
 from tests.support.lexium import drive, output, printed_lines, say, switched_on
 
@@ -208,6 +209,29 @@ def test_a_number_from_outside_goes_to_the_waiting_variable():
     assert output(device, 1.0) == "how many?"
     assert say(device, "PR IF", "-12", "PR IF") == ["1", "0"]
     assert output(device, 2.0) == "-12|"
+
+
+@pytest.mark.parametrize(
+    ("party", "keys", "waits"),
+    [
+        (False, b"\r", False),
+        (False, b"\n", True),
+        (True, b"a\r\n", False),
+        (True, b"a\n", True),
+        (True, b"b\r\n", True),
+        (True, b"\r\n", True),
+    ],
+)
+def test_enter_alone_ends_the_wait_for_a_number(party, keys, waits):
+    device = switched_on("PG 1\nIV R1\nLB G1\nBR G1,IF=1\nPR R1\nE\nPG", name="a", party=party)
+    port = MCodePort(device)
+    port.receive(b"\n", 0.0)
+    device.execute("R1=7", 0.0)
+    device.execute("EX 1", 0.0)
+    device.advance(0.5)
+    port.receive(keys, 0.5)
+    assert (device.running, say(device, "PR IF")) == (True, [str(int(waits))])
+    assert output(device, 1.0) == ("" if waits else "7|") and device.running == waits
 
 
 # Errors.

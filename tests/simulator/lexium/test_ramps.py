@@ -176,9 +176,9 @@ def test_homing_finds_its_switch_whatever_the_s_curve():
     assert say(device, "PR MV", "PR P", "PR EF") == ["0", "-49999", "0"]
 
 
-@pytest.mark.parametrize("line", ["SL 0", "PS", "AS=0"])
-def test_stops_have_straight_ramps_where_the_s_curve_would_be_too_steep(line):
-    begins = ("AS=3", "TS=100000") if line == "AS=0" else ("EX G1",)
+@pytest.mark.parametrize(("line", "mode"), [("SL 0", 0), ("PS", 0), ("SL 0", 3)])
+def test_stops_have_straight_ramps_where_the_s_curve_would_be_too_steep(line, mode):
+    begins = ("AS=3", "TS=100000") if mode == 3 else ("EX G1",)
     device = drive(*STEEP, *begins, program="PG 1\nLB G1\nSL 100000\nH\nE\nPG")
     device.advance(0.5)
     assert say(device, "PR MV", "DT=2", line) == ["1"]

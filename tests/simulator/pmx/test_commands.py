@@ -9,6 +9,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from multidrop.simulator.cell.spec import DriveSpec
+from multidrop.simulator.pmx.device import PmxDevice, PmxPort
 from multidrop.simulator.pmx.settings import REGISTERS
 from tests.support.paths import FACTS
 from tests.support.pmx_controller import Bench
@@ -314,3 +316,26 @@ def test_a_ratio_of_more_decimals_is_rounded_to_those_that_are_kept(sent: str, k
 @pytest.mark.parametrize("sent", ["0.000499", "999.9995", "1.", ".5", "1.2.3", "1e0", "-1.000000", "1000.000000"])
 def test_a_ratio_that_is_none_or_out_of_range_once_rounded_is_invalid(sent: str) -> None:
     assert Bench()(f"SLRX={sent}") == "?Invalid Answer"
+
+
+@given(st.lists(st.sampled_from([b"HSPD", b"=", b"5", b"0", b"\x08", b"\x7f", b"@00"]), max_size=30), st.integers(1, 5))
+def test_backspace_and_delete_take_back_the_character_before_them(typed: list[bytes], size: int) -> None:
+    kept = bytearray()
+    for byte in b"".join(typed):
+        if byte in b"\x08\x7f":
+            del kept[-1:]
+        elif byte == ord("@"):
+            kept[:] = b"@"
+        elif len(kept) < 64:
+            kept.append(byte)
+    data, port, other = b"".join(typed) + b"\r", *(PmxPort(PmxDevice(DriveSpec("PMX", name="00"))) for _ in range(2))
+    for n in range(0, len(data), size):
+        port.receive(data[n : n + size], 0.0)
+    other.receive(bytes(kept) + b"\r", 0.0)
+    assert port.sent(0.0) == other.sent(0.0)
+
+
+def test_a_typing_error_is_mended_before_the_line_is_sent() -> None:
+    port = PmxPort(PmxDevice(DriveSpec("PMX", name="00")))
+    port.receive(b"\x08@01\x080PY\x7fX\r", 0.0)
+    assert [each.data for each in port.sent(0.0)] == [b"0\r"]
