@@ -101,7 +101,7 @@ def effect(state: DriveState, text: str) -> Effect:
         absolute, relative = (value, None) if word == "MA" else (None, value)
         return Effect(begins=(Move(MoveKind.POSITION, AXIS, absolute, relative),))
     if word == "SL":
-        return Effect(ends=ONLY) if value == 0 else Effect(begins=(Move(MoveKind.VELOCITY, AXIS),))
+        return Effect(ends=ONLY) if value == 0 else Effect(begins=(Move(MoveKind.VELOCITY, AXIS, endless=True),))
     if word in HOMINGS and statement.arguments:
         return Effect(begins=(Move(MoveKind.HOMING, AXIS),))
     if word in PROGRAMS:
