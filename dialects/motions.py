@@ -62,6 +62,8 @@ class Move:
     """Where it ends, in the units of `Motion.position`; None: it has no target, or none that is known."""
     relative: int | None = None
     """The distance, where the target counts from where the axis is when the line is executed."""
+    endless: bool = False
+    """Only a command or a fault ends it."""
 
 
 @dataclass(frozen=True)

@@ -60,6 +60,8 @@ class Course:
 
     def _decided(self, found: Ending) -> Ending:
         short = found.outcome is Outcome.STOPPED
+        if found.outcome is Outcome.REACHED and self.move.endless and not self.program:
+            found, short = replace(found, outcome=Outcome.STOPPED), True
         if not short and found.outcome is not Outcome.REACHED:
             return replace(found, failed=True)
         if self.stopped:

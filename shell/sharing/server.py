@@ -23,6 +23,7 @@ from multidrop.shell.connect.reconnect import FIRST, LONGEST, limit_of
 from multidrop.shell.connect.urls import listening, parse
 from multidrop.shell.events import FAILURES
 from multidrop.shell.prompt.keyboard import on_signals, on_stop_key
+from multidrop.shell.sharing.key_stop import KeyStop, pause
 from multidrop.shell.sharing.stop_bytes import StopBytes, stop_bytes
 from multidrop.shell.sharing.writer_turns import (
     NEVER,
@@ -70,6 +71,12 @@ class SharedPort:
         control = self._transport.control
         self._own = stops.own
         self._exchange = Exchange(stops, control.baud if control else port.baud)
+        self._key = KeyStop(stops, lambda: bool(self._purged) or self._exchange.line_begun, lambda: self._only_stop)
+        self._key.transport, self._key.baud = self._transport, control.baud if control else 0
+        self._taken: int | None = None
+        """The bytes that made room for a stop which the key's thread has written already."""
+        self._refused = 0
+        """Bytes of clients that came while only that thread could write."""
         self._connections: dict[int, Connection] = {}
         self._left = asyncio.Event()
         """No client is connected."""
@@ -113,9 +120,24 @@ class SharedPort:
             self._timer.cancel()
         await self._transport.close()
 
+    def stop_ahead(self) -> None:
+        """Write a stop of this side from any thread, whatever the loop is doing; `stop` must follow in the loop."""
+        if self._loss is None:
+            self._key.press()
+
     def stop(self) -> None:
-        """Write a stop of this side at once, and its repetition in pieces; while the port is lost it is owed."""
-        self._write_pieces(self._own, owed=False)
+        """Write a stop of this side at once, and its repetition in pieces; while the port is lost it is owed.
+
+        What `stop_ahead` has written of it is not written again.
+        """
+        taken = self._key.take()
+        if taken is None:
+            return self._write_pieces(self._own, owed=False)
+        self._taken, self._refused = taken.dropped + self._refused, 0
+        self._do(self._exchange.stop(self._own[0].data, self._loop.time()))
+        self._taken = None
+        if taken.left:
+            self._begin(self._repeat(taken.written[-1], taken.left, owed=False))
 
     def _write_pieces(self, pieces: Sequence[StopPiece], owed: bool) -> None:
         first, *others = pieces
@@ -126,8 +148,7 @@ class SharedPort:
         """Write pieces of a stop behind the last one; those of an owed one end where a client starts something."""
         starts, baud = self._exchange.owed.starts, self._transport.control.baud if self._transport.control else 0
         for piece in pieces:
-            leaving = 10.0 * len(last.data) / baud if baud else 0.0
-            await asyncio.sleep(piece.quiet + 2 * leaving)  # and its reply
+            await asyncio.sleep(pause(last, piece, baud))
             last = piece
             if self._loss is not None or (owed and self._exchange.owed.starts != starts):
                 return
@@ -191,10 +212,12 @@ class SharedPort:
                     self._do(self._exchange.close(action.client, "dropped", ahead))
                     continue
                 self._purged, self._only_stop = 0, False
-                self._transport.write(action.data)
+                if not self._transport.write(action.data):
+                    self._refused += len(action.data)
             elif isinstance(action, Stop):
-                dropped = self._take_back()
-                self._transport.write(action.mended if dropped or self._purged else action.data)
+                if (dropped := self._taken) is None:
+                    dropped = self._take_back()
+                    self._transport.write(action.mended if dropped or self._purged else action.data)
                 self._purged, self._only_stop = 0, True
                 self._do(self._exchange.dropped(dropped))
             elif isinstance(action, Purge):
@@ -242,7 +265,9 @@ class SharedPort:
             except TransportLost as failure:
                 pauses.lengthen(limit_of(failure))
             else:
-                self._loss, self._purged, self._only_stop = None, 0, False
+                self._loss, self._purged, self._only_stop, self._refused = None, 0, False, 0
+                self._key.forget()
+                self._key.transport = self._transport
         self._transport.start(self._received, self._broke)
         self._exchange.back()
         if owed := self._exchange.owed.pieces:
@@ -369,8 +394,7 @@ async def _share(url: str, address: str, as_json: bool, over: asyncio.Event) -> 
             narrator.note(f"{opened.transport.name}: {opened.transport.limits}")
         if exposed(host):
             narrator.note(EXPOSED.format(endpoint))
-        # The thread that reads the keys writes nothing: the event loop, which never blocks here, writes the stop.
-        with on_stop_key(lambda: None, shared.stop, over.set):
+        with on_stop_key(shared.stop_ahead, shared.stop, over.set):
             signalled = asyncio.create_task(over.wait())
             ends: list[asyncio.Future[Any]] = [signalled, shared.lost_for_good]
             await asyncio.wait(ends, return_when=asyncio.FIRST_COMPLETED)

@@ -124,6 +124,11 @@ class Exchange:
         self._actions: list[Action] = []
 
     @property
+    def line_begun(self) -> bool:
+        """Whether the drives hold the beginning of a client's line. From any thread."""
+        return bool(self._line.text)
+
+    @property
     def deadline(self) -> float | None:
         """The time of the next `advance`: 0.0 while clients wait for a turn, else when the writer has been silent."""
         if any(each.waiting and not each.setting for each in self.clients.values()):

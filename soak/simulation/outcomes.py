@@ -39,6 +39,8 @@ BARE_REFUSAL = Grant("a refusal of noise, without a checksum", "A refusal withou
 BARE_COMMAND = Grant("a damaged command without a checksum", "Noise on the line")
 FLAG_CLEARED = Grant("a flag that a program clears", "A flag that a program clears")
 NO_SIGN = Grant("a mode without a sign of execution", "0010")
+ITS_OWN = "or that came by itself and it was executed"
+BY_ITSELF = Grant("an error that a motion may have had, too", "What a report means")
 RUNS = Grant("a program that runs in the drive", "What a report means")
 STOP_PIECE = re.compile(rb"ABORT|SR[01]=0")
 """A piece of a stop of PMX."""
@@ -225,6 +227,7 @@ def _unknown(world: World) -> Iterator[str | Granted]:
             continue
         runs = command.ended >= history.told.programs.get(command.line, inf)
         grant = NO_SIGN if world.place(command.line).em == 2 else RUNS if runs else None
+        grant = BY_ITSELF if ITS_OWN in command.said else grant
         yield Granted(grant, words) if grant else words
 
 
@@ -399,7 +402,7 @@ OUTCOMES = (
         "Without faults a command is not known only where a stop, a kill or a power-off cut it.",
         "What a report means",
         _unknown,
-        (NO_SIGN, RUNS),
+        (NO_SIGN, RUNS, BY_ITSELF),
     ),
     Rule("half", "No part of a line is executed.", "What a stop promises", _half, (SEVEN_BITS, BARE_COMMAND)),
     Rule(

@@ -9,7 +9,7 @@ from math import inf
 from soak.simulation.history import Executed
 from soak.simulation.outcomes import ASTRAY, BARE_COMMAND, astray, became
 from soak.simulation.rule import Granted, Rule
-from soak.simulation.told import Put, Run
+from soak.simulation.told import Guarded, Put, Run
 from soak.simulation.world import NUMBER, World
 
 PLACE = re.compile(r"(?:backup: |before is in )(\S+)")
@@ -53,12 +53,26 @@ def _asked(world: World) -> Iterator[str | Granted]:
         for each in world.history.executed:
             if (each.line, each.drive, each.text) not in guarded.texts or each.at < guarded.typed:
                 continue
-            if guarded.asks and any(guarded.typed <= yes <= each.at for yes in told.yes):
+            if guarded.asks and _agreed(world, guarded, each):
                 continue
             if each.text == CLEARS and any(_downloads(world, run, each) for run in told.runs.values()):
                 continue  # what is in the place of the file's program, as the download says
             words = f"{each.line}:{each.drive} {each.text!r}, typed at {guarded.typed:.3f}, executed without a yes"
             yield Granted(BARE_COMMAND, words) if became(world, each.line, each.at) else words
+
+
+def _agreed(world: World, guarded: Guarded, each: Executed) -> bool:
+    """Whether a yes belongs to a line that was executed, or to the same line that was typed before it."""
+    told, key = world.history.told, (each.line, each.drive, each.text)
+    for other in told.guarded:
+        if other is guarded or (other.asks and key in other.texts and other.typed < guarded.typed):
+            first = not any(
+                (one.line, one.drive, one.text) == key and other.typed <= one.at < each.at
+                for one in world.history.executed
+            )
+            if (other is guarded or first) and any(other.typed <= yes <= each.at for yes in told.yes):
+                return True
+    return False
 
 
 def _downloads(world: World, run: Run, each: Executed) -> bool:

@@ -136,6 +136,8 @@ FIXED = {
     300197: "the stop of an early end that was owed after a loss, which failed for a controller and a module",
     300003: "a stop of a half-sent line, which another key met on its way (of the simulation itself)",
     300935: "a slow disk that kept the thread from writing the rest of a stop (of the simulation itself)",
+    301438: "a move into a limit that is active, whose error may be another motion's (of the simulation itself)",
+    301731: "two lines that ask, the same, of which the first was agreed to (of the simulation itself)",
     300170: "a stop on a line that was lost again as it came back (of the simulation itself)",
     8002337: "a stop of which a loop that was held up sent the other controllers nothing for four seconds",
 }

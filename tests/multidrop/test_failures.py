@@ -220,7 +220,7 @@ def test_a_script_that_is_stopped_in_a_download_leaves_a_drive_that_listens(shop
 
 
 def test_a_line_that_is_half_sent_when_the_stop_comes_moves_nothing(shop):
-    script = shop.file("half.txt", "@a MR 512000." + "0" * 45 + "\n")
+    script = shop.file("half.txt", "@a MR 512000" + " " * 45 + ",0\n")
     # the wire hears the drive echo what has arrived
     with socket.create_connection(("127.0.0.1", shop.port("echo")), PATIENCE) as wire:
         child = shop.terminal(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 from pathlib import Path
 
 import pytest
@@ -11,7 +12,7 @@ from multidrop.dialects.tmcl.host.codec import Tmcl, TmclState
 from multidrop.dialects.tmcl.host.motions import effect
 from multidrop.shell.session import Session
 from tests.shell.test_outcomes import at_limit, noted, on, ran, value
-from tests.shell.test_outcomes_pmx_tmcl import SWITCHES, controller
+from tests.shell.test_outcomes_pmx_tmcl import SWITCHES, controller, module
 from tests.shell.test_outcomes_pmx_tmcl import value as asked
 from tests.support.cell_session import bus, drive, session_on
 from tests.support.outcomes import failed, sent
@@ -207,3 +208,69 @@ async def test_an_error_of_a_controller_is_not_cleared_after_a_failed_motion(tmp
         assert failure.outcome == "limit" and str(failure).endswith("'CLRX' was not sent")
         await sent(session, "CLRX", "ABS", "X0", "/wait stopped", "V1=778")
         assert await asked(session, "V1") == 778
+
+
+# What is said of an end
+
+
+async def test_bridges_that_are_switched_off_on_the_way_are_the_reason(tmp_path: Path) -> None:
+    async with on(tmp_path, **SLOW) as session:
+        failure = await failed(session, "MA 25000", "/sleep 0.2", "DE=0", "/wait stopped", "R1=777")
+        assert (failure.outcome, failure.reason) == ("power", "its output bridges are off (DE=0)")
+        await typed(session, "DE=1")
+        await sent(session, "MA 0", "/wait stopped", "DE=0", "/wait stopped", "R1=778")
+        assert await value(session, "R1") == 778
+
+
+async def test_an_error_of_the_program_that_was_started_is_not_called_old(tmp_path: Path) -> None:
+    async with on(tmp_path, **SLOW) as session:
+        await typed(session, "PG 1", "LB G1", "MR 500", "H", "VM=1", "E", "PG")
+        failure = await failed(session, "EX G1", "/wait idle", "R1=777")
+        assert failure.reason.startswith("error 21")
+        assert not any("old error" in each for each in noted(session))
+
+
+# Motion that only a command or a fault ends
+
+
+async def other(session: Session, line: str) -> None:
+    """Send a line past everything that the session records, as another host does."""
+    await asyncio.sleep(0.3)
+    each = session.drive()
+    await each.run(each.family.perform(each.state, line))
+
+
+@pytest.mark.parametrize(("line", "stop"), [("SL 5000", "SL 0"), ("SL -5000", "MA 0")])
+async def test_a_slew_that_someone_else_ended_is_a_failure(tmp_path: Path, line: str, stop: str) -> None:
+    async with on(tmp_path, **SLOW) as session:
+        task = asyncio.get_running_loop().create_task(other(session, stop))
+        failure = await failed(session, line, "/wait stopped", "R1=777")
+        await task
+        assert (failure.outcome, failure.reason) == ("stopped", "not by this script")
+        await sent(session, line, "/sleep 0.2", "MA 100", "/wait stopped", line, "/sleep 0.2", "SL 0", "/wait stopped")
+
+
+async def test_a_jog_of_a_controller_that_someone_else_ended_is_a_failure(tmp_path: Path) -> None:
+    async with controller(tmp_path) as session:
+        task = asyncio.get_running_loop().create_task(other(session, "STOPX"))
+        assert (await failed(session, "JX+", "/wait stopped", "V1=777")).outcome == "stopped"
+        await task
+        await sent(session, "JX+", "/sleep 0.2", "STOPX", "/wait stopped", "J-", "/sleep 0.2", "STOP", "/wait stopped")
+
+
+async def test_a_rotation_that_stalled_or_that_someone_else_ended_is_a_failure(tmp_path: Path) -> None:
+    async with module(tmp_path, "TMCM-1241", "[bus.drive.world]\nstall_at = 10000") as session:
+        lines = ("SAP 181, 0, 100", "ROR 0, 500", "/wait stopped", "SGP 0, 2, 777")
+        assert (await failed(session, *lines)).outcome in ("stall", "stopped")
+        assert await asked(session, "GGP 0, 2") == 0
+        task = asyncio.get_running_loop().create_task(other(session, "MST 0"))
+        assert (await failed(session, "ROL 0, 500", "/wait stopped")).outcome == "stopped"
+        await task
+        await sent(session, "SAP 2, 0, -500", "/sleep 0.2", "SAP 2, 0, 0", "/wait stopped")
+
+
+async def test_a_slew_that_a_trip_ended_is_no_failure(tmp_path: Path) -> None:
+    async with on(tmp_path, **SLOW) as session:
+        await typed(session, *TRIP)
+        await sent(session, "TE=2", "SL 10000", "/wait stopped", "R1=777")
+        assert await value(session, "R1") == 777

@@ -37,7 +37,7 @@ SIGNS = ("EF", "MV", "BY", "ST", "P", "AF", "TE")
 """What is read before a motion."""
 END = ("EF", "BY", "MP", "ST", "EE", "P", "DB", "AF", "AS")
 """What is read at its end."""
-FLAGS = frozenset({"EF", "MV", "BY", "MP", "ST", "EE", "JE", "FL", "LK"})
+FLAGS = frozenset({"EF", "MV", "BY", "MP", "ST", "EE", "JE", "FL", "LK", "DE"})
 """Those of one digit: no separator follows them, as a line has at most 64 characters."""
 FREE = ("TE", "JE", "FL")
 """What lets a drive move without a line of ours: armed trips, jog inputs, a clock that it follows."""
@@ -101,7 +101,7 @@ def effect(state: DriveState, text: str) -> Effect:
         absolute, relative = (value, None) if word == "MA" else (None, value)
         return Effect(begins=(Move(MoveKind.POSITION, AXIS, absolute, relative),))
     if word == "SL":
-        return Effect(ends=ONLY) if value == 0 else Effect(begins=(Move(MoveKind.VELOCITY, AXIS),))
+        return Effect(ends=ONLY) if value == 0 else Effect(begins=(Move(MoveKind.VELOCITY, AXIS, endless=True),))
     if word in HOMINGS and statement.arguments:
         return Effect(begins=(Move(MoveKind.HOMING, AXIS),))
     if word in PROGRAMS:
@@ -224,8 +224,10 @@ def _judge(access: Access[S], state: S, evidence: Evidence) -> Procedure[Ending 
         return ending
     if found.get("EE") and found.get("MP"):
         return None  # position maintenance may still correct it
-    free = yield from access.values(state, FREE)
-    return ending if any(free.values()) else replace(ending, outcome=Outcome.STOPPED)
+    free = yield from access.values(state, (*FREE, "DE"))
+    if not free.get("DE", 1):
+        return replace(ending, outcome=Outcome.POWER, reason="its output bridges are off (DE=0)")
+    return ending if any(free.get(each) for each in FREE) else replace(ending, outcome=Outcome.STOPPED)
 
 
 def _makes_up(access: Access[S], state: S, found: Mapping[str, int]) -> Procedure[bool]:

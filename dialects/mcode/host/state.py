@@ -181,7 +181,7 @@ def report_error(state: DriveState, code: int) -> None:
 
 def earlier_error(code: int, state: DriveState) -> str:
     """Say what an error was that was read before a line, which is not to blame for it."""
-    if state.errors.moving and code in errors.BY_ITSELF:
+    if state.errors.moving:  # an older one was read, and cleared, as the motion began
         return f"an error since the last motion began, now cleared: {described(code, state)}"
     return f"an old error, now cleared: {described(code, state)}"
 

@@ -64,7 +64,7 @@ def _effect(line: str) -> Effect:
     if (found := FLYING.fullmatch(line)) is not None:
         return Effect(begins=(Move(MoveKind.POSITION, found[1].lower(), target=int(found[2])),))
     if (found := JOG.fullmatch(line)) is not None:
-        return Effect(begins=_without_target(_axes(found[1])))
+        return Effect(begins=_without_target(_axes(found[1]), endless=True))
     if (found := HOMING.fullmatch(line)) is not None:
         target = None if found[1] == OVERSHOOTS else 0
         return Effect(begins=(Move(MoveKind.HOMING, found[2].lower(), target),))
@@ -81,8 +81,8 @@ def _effect(line: str) -> Effect:
     return NOTHING
 
 
-def _without_target(axes: frozenset[str]) -> tuple[Move, ...]:
-    return tuple(Move(MoveKind.VELOCITY, axis) for axis in sorted(axes))
+def _without_target(axes: frozenset[str], endless: bool = False) -> tuple[Move, ...]:
+    return tuple(Move(MoveKind.VELOCITY, axis, endless=endless) for axis in sorted(axes))
 
 
 def _axes(named: str) -> frozenset[str]:

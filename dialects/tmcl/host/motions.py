@@ -54,7 +54,7 @@ def effect(state: TmclState, text: str) -> Effect:
     only = frozenset({axis})
     match call.command, call.type:
         case Command.ROR | Command.ROL, _:
-            return _begins(Move(MoveKind.VELOCITY, axis)) if call.value else Effect(ends=only)
+            return _begins(Move(MoveKind.VELOCITY, axis, endless=True)) if call.value else Effect(ends=only)
         case Command.MST, _:
             return Effect(ends=only)
         case Command.MVP, kind if kind == ABSOLUTE:
@@ -68,7 +68,7 @@ def effect(state: TmclState, text: str) -> Effect:
         case Command.SAP, Axis.TARGET_POSITION:
             return _begins(Move(MoveKind.POSITION, axis, target=call.value))
         case Command.SAP, Axis.TARGET_VELOCITY:
-            return _begins(Move(MoveKind.VELOCITY, axis)) if call.value else Effect(ends=only)
+            return _begins(Move(MoveKind.VELOCITY, axis, endless=True)) if call.value else Effect(ends=only)
         case Command.SAP | Command.RSAP, Axis.ACTUAL_POSITION | Axis.MICROSTEPS:
             return Effect(unknown=only)
         case Command.RFS, Search.START:
@@ -132,6 +132,8 @@ def judge(state: TmclState, axis: str, evidence: Evidence) -> Procedure[Ending |
     if target is None and move.relative is not None:  # parameter 127 says from where MVP REL counts
         target = yield from _value(state, Axis.TARGET_POSITION, motor)
     if target is None:
+        if move.endless and not evidence.stopped:
+            return (yield from _short(state, ending, motor, 0, evidence))
         met = None if evidence.stopped else (yield from _switch(state, motor, 0))
         return ending if met is None else replace(ending, outcome=Outcome.LIMIT, reason=met)
     ending = replace(ending, target=target)

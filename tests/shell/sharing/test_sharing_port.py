@@ -6,7 +6,8 @@ import asyncio
 import contextlib
 import os
 import socket
-from collections.abc import AsyncIterator
+import threading
+from collections.abc import AsyncIterator, Callable
 from functools import partial
 from pathlib import Path
 from unittest.mock import Mock
@@ -14,13 +15,14 @@ from unittest.mock import Mock
 import pytest
 import serial
 
+from multidrop.drives import pacing
 from multidrop.shell.connect.opening import open_port
 from multidrop.shell.connect.urls import parse
-from multidrop.shell.sharing import server
+from multidrop.shell.sharing import key_stop, server
 from multidrop.shell.sharing.client import Client, Input, Request
 from multidrop.shell.sharing.server import SharedPort
 from multidrop.shell.sharing.stop_bytes import stop_bytes
-from multidrop.shell.sharing.writer_turns import NOT_REACHED, TURN, Say
+from multidrop.shell.sharing.writer_turns import NOT_REACHED, TURN, Say, Write
 from multidrop.transports import TransportLost, Unreachable, telnet
 from multidrop.transports.rfc2217 import open_rfc2217
 from multidrop.transports.telnet import OPTION, Setting, message
@@ -273,6 +275,64 @@ async def test_ctrl_x_at_the_shared_port_stops_the_drives_and_sharing_goes_on(sh
     await shared.line.got(stop * 2)
     ada.write(b"PR V\r")
     await shared.line.got(b"PR V\r")
+
+
+def pressed(shared: Shared) -> bytes:
+    """Press the stop key in its thread while the loop does nothing; return what that wrote."""
+    thread = threading.Thread(target=shared.port.stop_ahead)
+    thread.start()
+    thread.join()
+    return os.read(shared.line.far, 4096)
+
+
+async def test_the_key_s_thread_writes_the_stop_while_the_loop_is_held_up_and_the_loop_does_not_again(
+    shared: Shared, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(pacing.PACER, "after", lambda owner, seconds, work: None)
+    first, *others = stop_bytes("").own
+    assert pressed(shared) == first.data
+    shared.port.stop()
+    assert await shared.line.got(others[-1].data) == b"".join(each.data for each in others)
+    assert shared.events() == ["stop"] * (1 + len(others))
+
+
+async def test_its_thread_makes_a_line_that_a_client_has_begun_harmless(
+    shared: Shared, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(pacing.PACER, "after", lambda owner, seconds, work: None)
+    _, ada = await shared.client()
+    ada.write(b"MR 5")
+    await shared.line.got(b"MR 5")
+    assert pressed(shared) == stop_bytes("").mended(stop_bytes("").own[0].data)
+    shared.port._do([Write(1, b"PR P\r")])  # the loop has not heard of the key yet
+    shared.port.stop()
+    assert shared.events()[-2:] == ["unsent", "stop"] and shared.said[-2].detail.startswith("5 bytes")
+
+
+async def test_the_whole_stop_of_several_modules_is_written_by_the_thread(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    now, due = [100.0], list[tuple[float, Callable[[], None]]]()
+    monkeypatch.setattr(key_stop.time, "monotonic", lambda: now[0])
+    monkeypatch.setattr(pacing.PACER, "after", lambda owner, seconds, work: due.append((now[0] + seconds, work)))
+    line, stops = Line(tmp_path / "tty"), stop_bytes("tmcl", ("1", "2"))
+    port = SharedPort(await open_port(parse(f"{line.link}?dialect=tmcl")), stops, lambda said: None)
+    shared = Shared(port, line, [], 0)
+    await port.open("127.0.0.1", 0)
+    came = [pressed(shared)]
+    while due:
+        at, work = due.pop()
+        assert at > now[0], "the pieces have gaps"
+        now[0] = at + 0.001
+        work()
+        with contextlib.suppress(BlockingIOError):
+            came.append(os.read(line.far, 4096))
+    assert came == [each.data for each in stops.own]
+    port.stop()
+    await asyncio.sleep(0)
+    with pytest.raises(BlockingIOError):
+        os.read(line.far, 4096)
+    await shared.close()
 
 
 async def test_a_stop_while_the_port_is_lost_is_its_first_bytes_after_the_return(shared: Shared) -> None:
