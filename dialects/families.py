@@ -131,7 +131,13 @@ SHOWN = 40
 
 
 def seen(data: bytes, besides: str) -> str:
-    """What came in place of a reply of the family `besides`, for a message; empty: nothing came."""
+    """What came in place of a reply of the family `besides`, for a message; empty: nothing came.
+
+    Whole messages with a number and a length are the family's own, and it says by itself what was wrong with them.
+    """
+    codec = FAMILIES[besides].codec
+    if codec.numbered and codec.parse_unsolicited(data) == ((), len(data)):
+        return ""
     readable = sum(0x20 <= byte < 0x7F or byte in b"\t\r\n\x06\x15" for byte in data)
     if not data or (frames := spoken(data, besides)):
         return frames if data else ""

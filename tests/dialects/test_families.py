@@ -6,7 +6,7 @@ import ast
 
 import pytest
 
-from multidrop.dialects.families import DEFAULT, FAMILIES, TABLE, family_of, languages, program_languages
+from multidrop.dialects.families import DEFAULT, FAMILIES, TABLE, family_of, languages, program_languages, seen
 from multidrop.dialects.family import Hints
 from multidrop.shell.connect import urls
 from multidrop.shell.connect.url_forms import URL_FORMS
@@ -60,3 +60,8 @@ def test_each_language_is_listed_once_and_each_ending_means_one_family() -> None
     assert len(known) == len({id(each) for each in known})
     endings = [ending for programs in program_languages().values() for ending in programs.endings]
     assert len(endings) == len(set(endings))
+
+
+def test_whole_messages_of_the_family_are_not_called_another_language_or_baud_rate() -> None:
+    assert seen(bytes.fromhex("00000000000301ab05"), "modbus") == ""
+    assert all("another language" in seen(b"SSH-2.0-OpenSSH\r\n", name) for name in ("modbus", "mcode"))

@@ -382,7 +382,7 @@ def device(state: ModbusState) -> Procedure[tuple[str, ...]]:
 
 BASIC = 1
 """The first three objects of the identification, which are mandatory."""
-PRODUCT = re.compile(r"LMD[A-Z]E")
+PRODUCT = re.compile(r"\bLMD[A-Z]E")
 PART, VERSION = 1, 6
 WARNING = (
     f"{UNKNOWN}, so its registers may mean other things. Only what you type is sent to it. Ctrl+X sends it the stop of "
