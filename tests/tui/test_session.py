@@ -75,7 +75,7 @@ async def test_clear_empties_the_transcript_and_help_is_shown_to_its_end(tmp_pat
         typed(pilot, "/clear", "enter")
         await until(pilot, lambda: "424242" not in transcript(pilot))
         typed(pilot, "/help", "enter")
-        await until(pilot, lambda: "Simulated drives:" in transcript(pilot))
+        await until(pilot, lambda: "In scripts only:" in transcript(pilot))
 
 
 async def test_ctrl_x_stops_a_drive_that_nobody_selected(tmp_path: Path) -> None:
