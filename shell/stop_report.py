@@ -180,7 +180,7 @@ def last_seen(drive: Drive, now: float) -> str:
     seen = drive.seen
     since = max(drive.started_at, seen.at if seen else float("-inf"))
     if since == float("-inf"):
-        return "was not read yet"
+        return "not read yet"
     ago = f"{max(0.0, now - since):.0f} s ago"
     if seen is None or drive.started_at > seen.at:
         return f"started {ago} and not read since"

@@ -389,5 +389,4 @@ def _described(drive: Drive, begun: float, now: float) -> str:
         return "runs a program, which may move it" if running is not None and running.runs else ""
     named = drive.product and not drive.state.stranger
     known = named or drive.seen is not None or drive.commands
-    read = drive.seen is not None or drive.started_at > float("-inf")
-    return (f"is not known: {last_seen(drive, now)}" if read else last_seen(drive, now)) if known else ""
+    return f"is not known: {last_seen(drive, now)}" if known else ""

@@ -323,7 +323,6 @@ def test_a_rogue_in_place_of_a_drive_is_one_line_and_is_sent_no_command(shop):
             assert all(character >= " " for character in out.replace("\n", "")), out
 
 
-@pytest.mark.skip(reason="open: the quit question does not come since the merge of issue 44")
 def test_a_late_answer_is_not_the_next_ones(shop, tapped):
     tap, url = tapped("press")
     tap.hold(b"aPR P")

@@ -68,7 +68,6 @@ async def test_a_typed_move_is_seen_and_its_end_is_read(tmp_path: Path) -> None:
         await until(pilot, lambda: "  102400" in transcript(pilot))
 
 
-@pytest.mark.skip(reason="open: the end of the help is not shown since the merge of issue 44")
 async def test_clear_empties_the_transcript_and_help_is_shown_to_its_end(tmp_path: Path) -> None:
     async with press(tmp_path) as pilot:
         typed(pilot, "PR 424242", "enter")
@@ -76,7 +75,7 @@ async def test_clear_empties_the_transcript_and_help_is_shown_to_its_end(tmp_pat
         typed(pilot, "/clear", "enter")
         await until(pilot, lambda: "424242" not in transcript(pilot))
         typed(pilot, "/help", "enter")
-        await until(pilot, lambda: "In scripts only:" in transcript(pilot))
+        await until(pilot, lambda: "[screen]: only on the screen" in transcript(pilot))
 
 
 async def test_ctrl_x_stops_a_drive_that_nobody_selected(tmp_path: Path) -> None:
