@@ -31,8 +31,13 @@ class Pacer:
             self._changed.notify()
 
     def _run(self) -> None:
-        while True:
-            self._next()()
+        try:
+            while True:
+                self._next()()
+        finally:  # by a defect of one owner's work, which is reported: that of the others is still due
+            with self._changed:
+                self._thread = None
+            self.begin()
 
     def _next(self) -> Callable[[], None]:
         """Wait for the next work that is due."""
