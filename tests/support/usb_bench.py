@@ -141,8 +141,8 @@ class Device:
     def ask(self, setup: bytes) -> bytes:
         """A control transfer of the kernel's own, before any other."""
         self.last += 1
-        self.messages.wanted.add(self.last)
         length = int.from_bytes(setup[6:8], "little")
+        self.messages.asked[self.last] = length
         self.wire.sendall(Transfer(SUBMIT, self.last, 0x80, length=length, setup=setup).pack())
         while True:
             for each in self.messages.feed(self.wire.recv(4096)):
@@ -161,8 +161,7 @@ class Device:
             self.empty -= 1
             self.end(urb, 0)
         else:
-            if endpoint & 0x80:
-                self.messages.wanted.add(urb.request.number)
+            self.messages.asked[urb.request.number] = urb.request.length if endpoint & 0x80 else 0
             self.flying[urb.request.number] = urb
             self.wire.sendall(urb.request.pack(2))
 
@@ -176,6 +175,7 @@ class Device:
         for number, urb in self.flying.items():
             if urb.address == address:
                 self.last += 1
+                self.messages.asked[self.last] = 0
                 self.wire.sendall(Transfer(UNLINK, self.last, unlinked=number).pack(2))
                 while number in self.flying:  # as the kernel waits
                     self.take(self.wire.recv(4096), number, self.last)
@@ -204,7 +204,7 @@ class Device:
                     else:
                         self.end(urb, each.status, formed, each.length)
             elif each.number == unlink and (urb := self.flying.pop(discarded, None)) is not None:
-                self.messages.wanted.discard(discarded)
+                self.messages.asked.pop(discarded, None)
                 self.end(urb, -errno.ENOENT)
 
     def end(self, urb: Urb, status: int, data: bytes = b"", length: int = 0) -> None:
