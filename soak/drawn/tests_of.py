@@ -13,6 +13,7 @@ import re
 import sqlite3
 from collections import Counter, defaultdict
 from collections.abc import Iterable
+from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
@@ -79,7 +80,7 @@ def measured(data: Path, durations: str, quick: Iterable[str]) -> Map:
     """Make a map of a coverage file with a context for each test. `quick`: nodes of the tests of `make quick`."""
     times, fast = seconds(durations), {function(each) for each in quick}
     executed: dict[str, dict[int, set[str]]] = defaultdict(lambda: defaultdict(set))
-    with sqlite3.connect(data) as database:
+    with closing(sqlite3.connect(data)) as database:
         names = {number: function(name) for number, name in database.execute("select id, context from context")}
         paths = {number: _path(name) for number, name in database.execute("select id, path from file")}
         for file, context, begin, end in database.execute("select file_id, context_id, fromno, tono from arc"):
