@@ -141,7 +141,7 @@ async def test_another_program_that_has_the_port_is_named_once(tmp_path: Path) -
     await cell.end()
 
 
-async def test_another_program_beside_us_is_named_once_after_a_return(
+async def test_another_program_beside_us_is_named_once_at_each_return(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A service may take a port as it is plugged in, and without a lock: the port opens all the same."""
@@ -155,7 +155,7 @@ async def test_another_program_beside_us_is_named_once_after_a_return(
             monkeypatch.setattr(serial_port, "beside", lambda port: "ModemManager (pid 9) has it open")
             cell.floor.command("/sim plug press")
             await until(lambda: not bus.lost)
-        assert said.count(f"{bus.name}: ModemManager (pid 9) has it open") == 1
+        assert said.count(f"{bus.name}: ModemManager (pid 9) has it open") == 2
     await cell.end()
 
 
