@@ -115,6 +115,16 @@ async def test_an_enter_that_comes_as_the_selection_changes_by_itself_sends_noth
         await screen.shows("not sent: MR 512")
 
 
+async def test_an_enter_that_comes_with_a_paste_does_not_answer_its_question() -> None:
+    async with demo() as (screen, session, _):
+        await screen.type(b"\x1b[200~MR 1\rMR 2\r\x1b[201~\r")
+        assert isinstance(screen.app.screen, Confirm)
+        assert session.sent == []
+        await asyncio.sleep(PAUSE + 0.1)
+        await screen.type(b"\r")
+        assert session.sent == ["press:a MR 1", "press:a MR 2"]
+
+
 async def test_pasted_lines_go_to_the_drive_that_their_question_names_whatever_is_selected_by_then() -> None:
     async with demo() as (screen, session, _):
         await screen.type(b"\x1b[200~MR 1\rMR 2\r\x1b[201~")

@@ -62,7 +62,10 @@ class Questions:
             if answer == "send":
                 send(lines, place)
 
-        await self._app.push_screen(Confirm(f"Send {count} pasted lines{to}?", shown, answers), answered)
+        question = Confirm(f"Send {count} pasted lines{to}?", shown, answers)
+        self._keyboard.turn_deaf()  # an Enter that came with the paste is no answer
+        question.told = self._keyboard.early
+        await self._app.push_screen(question, answered)
 
     async def go_on(self, question: str) -> bool:
         """Ask before a step that needs a yes; return the answer. A cancellation closes the question."""
