@@ -274,3 +274,87 @@ async def test_a_slew_that_a_trip_ended_is_no_failure(tmp_path: Path) -> None:
         await typed(session, *TRIP)
         await sent(session, "TE=2", "SL 10000", "/wait stopped", "R1=777")
         assert await value(session, "R1") == 777
+
+
+# Motion that the drive itself may end
+
+
+GO = ("PG 1", "SL 0", "E", "PG")
+"""A program at address 1, which an input of type 4 starts. It has ended when the drive is at rest."""
+
+
+@pytest.mark.parametrize(("personality", "setup"), [("LMDCM", "IS=2,4,0"), ("LMM", "IS=2,4,0"), ("MDI", "S2=4,0")])
+@pytest.mark.parametrize("line", ["SL 10000", "MA 900000"])
+async def test_a_program_that_an_input_starts_may_end_a_motion(
+    tmp_path: Path, personality: str, setup: str, line: str
+) -> None:
+    async with session_on(tmp_path, bus("line", drive(personality, "a", VM=20000, A=100000, D=100000))) as session:
+        await typed(session, *GO, setup)
+        await sent(session, line, "/sleep 0.3", "/sim input a 2 0", "/wait stopped", "R1=777")
+        assert await value(session, "R1") == 777
+        await typed(session, setup.replace("4", "0", 1))
+        task = asyncio.get_running_loop().create_task(other(session, "SL 0"))
+        assert (await failed(session, line, "/wait stopped", "R1=778")).reason == "not by this script"
+        await task
+
+
+async def test_an_input_that_stops_the_motion_is_a_failure_with_its_error(tmp_path: Path) -> None:
+    async with on(tmp_path, **SLOW) as session:
+        await session.run("IS=2,5,0")
+        failure = await failed(session, "SL 10000", "/sleep 0.3", "/sim input a 2 0", "/wait stopped", "R1=777")
+        assert failure.reason == "error 91: an input of type stop ended the motion"
+        assert await value(session, "R1") == 0
+
+
+async def test_a_trip_that_is_armed_on_the_way_may_end_a_slew(tmp_path: Path) -> None:
+    async with on(tmp_path, **SLOW) as session:
+        await typed(session, *TRIP)
+        await sent(session, "SL 10000", "TE=2", "/wait stopped", "R1=777")
+        assert await value(session, "R1") == 777
+
+
+async def test_the_end_of_a_program_ends_no_motion_that_a_line_began(tmp_path: Path) -> None:
+    """E ends the program, and a move that is under way goes on (MCode reference 5.1.35)."""
+    async with on(tmp_path, **SLOW) as session:
+        for line in ("MA 20000", "SL 10000"):
+            task = asyncio.get_running_loop().create_task(other(session, "SL 0"))
+            failure = await failed(session, line, "E", "/wait stopped", "R1=777")
+            await task
+            assert (failure.outcome, failure.reason) == ("stopped", "not by this script")
+        await typed(session, "PG 1", "LB G1", "H 9000", "E", "PG")
+        await sent(session, "EX G1", "E", "/wait idle", "R1=778")
+        assert await value(session, "R1") == 778
+
+
+async def test_bridges_that_are_switched_off_end_a_slew_and_are_the_reason(tmp_path: Path) -> None:
+    async with on(tmp_path, **SLOW) as session:
+        failure = await failed(session, "SL 10000", "/sleep 0.3", "DE=0", "/wait stopped")
+        assert (failure.outcome, failure.reason) == ("power", "its output bridges are off (DE=0)")
+
+
+@pytest.mark.parametrize("line", ["JX+", "X-2000"])
+async def test_a_program_of_a_controller_that_still_runs_may_have_ended_a_motion(tmp_path: Path, line: str) -> None:
+    from multidrop.dialects.pmx.manual import program_file
+
+    async with controller(tmp_path, SWITCHES) as session:
+        await session.drive().download(program_file.read("PRG 0\nSTOPX\nDELAY=5000\nEND", "a.prg"))
+        await session.run("ABS")
+        task = asyncio.get_running_loop().create_task(other(session, "SR0=1"))
+        await sent(session, line, "/wait stopped", "V1=777")
+        await task
+        await typed(session, "SR0=0")
+        task = asyncio.get_running_loop().create_task(other(session, "STOPX"))
+        assert (await failed(session, "JX+", "/wait stopped")).outcome == "stopped"
+        await task
+
+
+@pytest.mark.parametrize("line", ["ROR 0, 500", "MVP ABS, 0, 500000"])
+async def test_a_program_of_a_module_that_still_runs_may_have_ended_a_motion(tmp_path: Path, line: str) -> None:
+    from multidrop.dialects.tmcl.manual import program_file
+
+    async with module(tmp_path, "TMCM-1241") as session:
+        await session.drive().download(program_file.read("MST 0\nWAIT TICKS, 0, 900\nSTOP", "a.tmc"))
+        task = asyncio.get_running_loop().create_task(other(session, "129 0, 0, 0"))
+        await sent(session, line, "/wait stopped", "SGP 0, 2, 777")
+        await task
+        assert await asked(session, "GGP 0, 2") == 777
