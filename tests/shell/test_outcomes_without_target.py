@@ -11,6 +11,7 @@ from multidrop.dialects.motions import MoveKind
 from multidrop.dialects.tmcl.host.codec import Tmcl, TmclState
 from multidrop.dialects.tmcl.host.motions import effect
 from multidrop.shell.session import Session
+from multidrop.simulator.lexium.device import MCodeDevice
 from tests.shell.test_outcomes import at_limit, noted, on, ran, value
 from tests.shell.test_outcomes_pmx_tmcl import SWITCHES, controller, module
 from tests.shell.test_outcomes_pmx_tmcl import value as asked
@@ -138,6 +139,61 @@ async def test_a_lag_limit_is_a_failure(tmp_path: Path) -> None:
     async with on(tmp_path, world, **SLOW, AS=1, LG=5000, LT=60000) as session:
         failure = await failed(session, "MA 40000", "/wait stopped", "R1=777")
         assert failure.outcome == "error" and failure.reason.startswith("error 107")
+
+
+async def test_a_lead_limit_is_a_failure(tmp_path: Path) -> None:
+    async with on(tmp_path, **SLOW, AS=1, LD=5000) as session:
+        lines = ("MA 40000", "/sleep 0.5", "/sim push a 9000", "/wait stopped", "R1=777")
+        failure = await failed(session, *lines)
+        assert failure.outcome == "error" and failure.reason.startswith("error 106: lead limit reached")
+        assert await value(session, "R1") == 0
+
+
+@pytest.mark.parametrize(("makes_up", "fails"), [(0, False), (1, True), (2, True)])
+async def test_a_lag_that_is_left_at_the_end_of_a_timed_move_is_a_failure(
+    tmp_path: Path, makes_up: int, fails: bool
+) -> None:
+    """With MU=0 the drive makes it up after the move, and there is no error."""
+    world = "[bus.drive.world]\nlocked = [[0.5, 6.0]]"
+    async with on(tmp_path, world, **SLOW, AS=1, LG=2000000, LT=60000) as session:
+        lines = (f"MU={makes_up}", "MA 20000", "/wait stopped", "R1=777")
+        if fails:
+            failure = await failed(session, *lines)
+            assert failure.outcome == "error" and failure.reason.startswith("error 108")
+        else:
+            await sent(session, *lines)
+            assert abs(await value(session, "LL")) < 512
+        assert await value(session, "R1") == (0 if fails else 777)
+
+
+@pytest.mark.parametrize("lines", [("MA 20000", "/sleep 3"), ("SL 5000", "/sleep 3", "SL 0")])
+async def test_the_greatest_lead_or_lag_is_a_failure(tmp_path: Path, lines: tuple[str, ...]) -> None:
+    """The simulated drive never reaches it (error 105), so it is set from outside."""
+    async with on(tmp_path, **SLOW, AS=1) as session:
+        device = next(iter(session.cells.values())).floor.drives[0].device
+        assert isinstance(device, MCodeDevice)
+        asyncio.get_running_loop().call_later(0.5, device.errors.set, 105)
+        failure = await failed(session, *lines, "/wait stopped", "R1=777")
+        assert failure.outcome == "error" and failure.reason.startswith("error 105")
+        assert await value(session, "R1") == 0
+
+
+# A clock that the drive follows
+
+
+@pytest.mark.parametrize(("limit", "fails"), [(4, True), (90, False)])
+async def test_a_limit_is_a_failure_while_the_drive_follows_a_clock(tmp_path: Path, limit: int, fails: bool) -> None:
+    pulses = [each for n in range(20) for each in ([2 + n / 10, 3, 0], [2.05 + n / 10, 3, 1])]
+    world = f"[bus.drive.world]\nlimit_plus = {limit}\ninputs = {[[0.0, 4, 0], *pulses]}"
+    async with on(tmp_path, world) as session:
+        await typed(session, "IS=3,13,0", "IS=2,2,0")
+        lines = ("FL=1", "/sleep 6", "/wait stopped", "R1=777")
+        if fails:
+            assert (await failed(session, *lines)).reason == "error 83: plus limit reached"
+        else:
+            await sent(session, *lines)
+        assert await value(session, "P") == (4 if fails else 20)
+        assert await value(session, "R1") == (0 if fails else 777)
 
 
 async def test_torque_mode_with_a_locked_rotor_is_a_stall(tmp_path: Path) -> None:
