@@ -96,12 +96,12 @@ def _find_anywhere(state: MCodeState, place: Place) -> Procedure[bool]:
 
 
 def _unseen(state: MCodeState, request: Request) -> bool:
-    """Whether another program's error would not show before a move: nothing of its replies comes here.
+    """Whether another program's error would not show before a command: nothing of its replies comes here.
 
     A drive with EM=2 replies to no command, and one on a network only to the client that asks.
     """
     silent = state.codec.em == 2 or ETHERNET.match(state.product) is not None
-    return silent and request.kind is Kind.COMMAND and classify.starts_motion(request.text)
+    return silent and request.kind in (Kind.COMMAND, Kind.SETTING)
 
 
 def _old_error(state: MCodeState, request: Request) -> Procedure[None]:
