@@ -269,7 +269,8 @@ class Link:
         if request.kind is Kind.COMMAND or request.address in GLOBAL:
             self.departure.begins(f"{request.address}{request.text}")
         self.debris.request_written(data, request, now)
-        if request.address:  # the trace of a lone drive repeats lines that were sent to be stored
+        # The trace of a lone drive repeats lines that were sent to be stored, but no question of multidrop's.
+        if request.address or request.signed:
             self.leftovers.request_written(data, now)
         self.publish(events.Sent(now, request))
         self.publish(events.Traffic(now, True, data))

@@ -209,8 +209,27 @@ async def test_what_is_printed_later_than_a_greeting_is_a_drives_output(tmp_path
     await place.session.open(url)
     await asyncio.sleep(3.0)
     place.floor.loop.call_soon(place.pipe._received, b"12345\r\n")
-    await place.run(url, "/sleep 0.2", "PR P")
+    await asyncio.sleep(0.3)
+    await place.session.run("PR P")
+    await place.session.close()
+    place.floor.close()
     assert place.output == ["12345", "0"]
+
+
+@for_each("name", ["mcode alone EM=0 CK=0", "mcode alone EM=1 CK=0", "mcode alone EM=2 CK=0"])
+async def test_questions_that_come_back_late_and_together_are_no_output(tmp_path, monkeypatch, name):
+    cell, url, _, _ = LINES[name]
+    place = Place(tmp_path, monkeypatch, cell, repeats=False)
+    await place.session.open(url)
+    await place.session.run("PR P")
+    await place.session.run("PR VM")
+    place.floor.loop.call_soon(place.pipe._received, b'PR P,"~"\rPR VM,"~"\r\n')
+    await asyncio.sleep(0.3)
+    place.floor.loop.call_soon(place.pipe._received, b"PR P\r\n")  # the trace of a program
+    await asyncio.sleep(0.3)
+    await place.session.close()
+    place.floor.close()
+    assert place.output == ["0", "768000", "PR P"]
 
 
 @for_each("name", ["pmx", "tmcl"])
