@@ -15,7 +15,7 @@ from multidrop.api.events import Fault, fault_of
 from multidrop.api.fixed import Fixed
 from multidrop.api.pictures import table
 from multidrop.api.programs import AsyncParameters, AsyncPrograms
-from multidrop.api.values import number_of, seconds, text_of
+from multidrop.api.values import seconds, short_text_of, text_of
 from multidrop.dialects import Diagnostic, DriveError, Family, Inexpressible, Motion, Refused
 from multidrop.dialects.text import visible
 from multidrop.dialects.units import QUANTITY
@@ -25,7 +25,7 @@ from multidrop.drives.drive import still
 from multidrop.shell import stop_report, waits
 from multidrop.shell.events import By
 from multidrop.shell.line_syntax import join_target
-from multidrop.shell.scripts.expression import Value, Word, written
+from multidrop.shell.scripts.expression import Value, Word
 from multidrop.shell.scripts.questions import ask
 from multidrop.shell.travel import BEYOND
 from multidrop.shell.workspace import address_of
@@ -202,20 +202,12 @@ class AsyncDrive(DriveFacts):
     async def write(self, name: str | int, value: Value) -> None:
         """Give a word of the drive a value. Raises Refused; Diagnostic where its language has no such form."""
         name = self._actions.word(str(name), self.axis)
-        text = value if isinstance(value, str) else self._number(name, value)
+        text = value if isinstance(value, str) else short_text_of(value, f"{name} of {self.name}")
         line = self._drive.family.assign(name, text) if _WORD.fullmatch(name) else None
         if line is None:
             raise Diagnostic(f"no line gives {name!r} a value", self.name, "send() takes any line of the drive")
         self._check_executes()
         await self._calls.run(lambda: self._send(line))
-
-    def _number(self, name: str, value: Value) -> str:
-        """The text of a number. Raises Diagnostic, also for one of which nine places leave nothing."""
-        number = number_of(value, f"{name} of {self.name}")
-        text = written(number)
-        if number and text == "0":
-            raise Diagnostic(f"{number} is 0 with nine decimal places", f"{name} of {self.name}", "write a text")
-        return text
 
     # Motion
 

@@ -8,6 +8,7 @@ from typing import Any
 
 from multidrop.dialects import Diagnostic
 from multidrop.macros import model
+from multidrop.shell.scripts.expression import written
 
 VALID = "a number or a text"
 
@@ -18,6 +19,15 @@ def text_of(value: object, what: str) -> str:
         return value
     found = number_of(value, what)
     return model.written(found) if isinstance(found, float) else str(found)
+
+
+def short_text_of(value: object, what: str) -> str:
+    """Return the text of a number with nine decimal places. Raises Diagnostic, also where these leave nothing of it."""
+    number = number_of(value, what)
+    text = written(number)
+    if number and text == "0":
+        raise Diagnostic(f"{number} is 0 with nine decimal places", what, "give it as a text")
+    return text
 
 
 def number_of(value: Any, what: str) -> int | float:
