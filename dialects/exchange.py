@@ -101,6 +101,10 @@ class Looking:
     spent: float = 0.0
     heard: bytes = b""
 
+    def begins(self) -> None:
+        """Give the next line the whole time."""
+        self.spent, self.heard = 0.0, b""
+
 
 def limited(who: str, text: str, fate: str, steps: Procedure[T], looking: Looking) -> Procedure[T]:
     """Look for a drive, as long as silence lasts, but not in endless bytes. Raises NoAnswer, which says what came.

@@ -62,7 +62,7 @@ def _limited(state: MCodeState, text: str, fate: str, steps: Procedure[T]) -> Pr
     try:
         return (yield from limited(who(state), text, fate, steps, state.looking))
     finally:
-        state.line_begins()
+        state.looking.begins()
 
 
 def confirm_drive(state: MCodeState, text: str, fate: str) -> Procedure[None]:
@@ -178,7 +178,7 @@ def first_print(state: MCodeState, request: Request) -> Procedure[tuple[str, ...
         return None
     if not expected.replied:
         steps = _present(state, expected.place)
-        state.line_begins()
+        state.looking.begins()
         place = yield from limited(who(state), request.text, "was not sent", steps, state.looking)
         if place is None:
             return None

@@ -60,10 +60,6 @@ class MCodeState(DriveState):
     heading: int | None = None
     """The end of the last move that the host sent, until the drive rests."""
 
-    def line_begins(self) -> None:
-        """Give a line the whole time to find the drive."""
-        self.looking = Looking()
-
     # Settings
 
     def codec_assumed(self, codec: MCode) -> None:
