@@ -24,7 +24,7 @@ from soak.drawn.rooms import ROOT
 from soak.drawn.tests_of import Map, MeasuredTest, function
 
 FIRST = 15.0
-"""s; what the fastest tests take together that are run first: most mutants are seen there, and one that hangs ends soon."""
+"""s; what the tests take together that are run first: most mutants are seen there, and one that hangs ends soon."""
 BUDGET = 90.0
 """s; what the tests of one mutant take at most, as they were measured, without one that is the first."""
 SEEDS = "1-20"
