@@ -75,8 +75,17 @@ class Effect:
     """Axes whose motion it stops on purpose."""
     unknown: frozenset[str] = frozenset()
     """Axes whose positions or targets have another meaning after it, so that a target is not known any more."""
+    halts: bool = False
+    """It ends programs on purpose, and no motion that a line began."""
+    frees: bool = False
+    """It lets the drive move, or end a motion, by itself: a trip, jog inputs, a clock."""
     clears: bool = False
     """It clears a sign of a failure, so that the motions before it are judged first."""
+
+    @property
+    def stops(self) -> bool:
+        """Whether it ends something, and is held back by nothing."""
+        return bool(self.ends) or self.halts
 
 
 NOTHING = Effect()
@@ -88,6 +97,8 @@ def joined(effects: Sequence[Effect]) -> Effect:
         tuple(move for each in effects for move in each.begins),
         frozenset(axis for each in effects for axis in each.ends),
         frozenset(axis for each in effects for axis in each.unknown),
+        any(each.halts for each in effects),
+        any(each.frees for each in effects),
         any(each.clears for each in effects),
     )
 
@@ -178,8 +189,8 @@ class Motions(Generic[S]):
     judge: Callable[[S, str, Evidence], Procedure[Ending | None]] = _reached
     """Judge the motion of an axis that two readings show at rest; None: it is not over yet (it settles).
 
-    Of an own motion it may read, for the reason, what reading clears. STOPPED: it ended short of its target, or without
-    a command where the family can tell, and nothing shows a failure; the caller knows who stopped it.
+    Of an own motion it may read, for the reason, what reading clears. STOPPED: it ended short of its target, or was
+    endless; nothing shows a failure, and nothing in the drive explains it. The caller knows who stopped it.
     """
     fails: Callable[[int], bool] = lambda code: False
     """Whether an error number, once read, is that of a motion or of the machine, and not the refusal of a line."""

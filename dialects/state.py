@@ -62,6 +62,8 @@ class ErrorsRead:
         """When the last one was read, s; infinite until the conversation that has read it goes on."""
         self.moving = False
         """A motion was begun whose end was not judged yet."""
+        self.program = False
+        """One of these motions is that of a program, whose lines may be wrong."""
         self._last: tuple[int, ...] = ()
 
     def add(self, code: int) -> None:
@@ -75,9 +77,9 @@ class ErrorsRead:
         """The numbers that were read since `count` had this value, newest last, as far as they are kept."""
         return self._last[-(self.count - count) :] if self.count > count else ()
 
-    def motion(self, begun: bool) -> None:
-        """Record that a motion was begun, or that the end of all that were begun is judged."""
-        self.moving = begun
+    def motion(self, begun: bool, program: bool = False) -> None:
+        """Record that a motion was begun, by a program or by a line, or that the end of all is judged."""
+        self.moving, self.program = begun, begun and (self.program or program)
 
 
 @dataclass(eq=False)

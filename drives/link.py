@@ -315,7 +315,8 @@ class Link:
             return
         more = f" ({self._came_unasked} in all)" if self._came_unasked > len(lines) else ""
         self._unasked_said = now
-        self.notify(f"received without a question{more}, and not a drive's output: {_short(lines)}", warning=True)
+        why = "no drive sends that by itself: another program uses this line, an adapter repeats, or a reply was late"
+        self.notify(f"received without a question{more}: {_short(lines)}; {why}", warning=True)
 
     # The end
 

@@ -29,7 +29,7 @@ class Course:
     errors: int
     """`DriveState.errors.count` as it began."""
     program: bool = False
-    """A program was started since, or seen to run."""
+    """A program was started since, or seen to run, or a line let the drive move by itself."""
     stopped: bool = False
     """Its own sequence has stopped it."""
     stopped_by_other: bool = False
@@ -60,8 +60,6 @@ class Course:
 
     def _decided(self, found: Ending) -> Ending:
         short = found.outcome is Outcome.STOPPED
-        if found.outcome is Outcome.REACHED and self.move.endless and not self.program:
-            found, short = replace(found, outcome=Outcome.STOPPED), True
         if not short and found.outcome is not Outcome.REACHED:
             return replace(found, failed=True)
         if self.stopped:
@@ -117,12 +115,18 @@ class MotionRecord:
         """Record what else a line does, which was not refused."""
         if effect.ends:
             self.stopped(by, effect.ends)
+        if effect.halts:
+            self._note_stop(by, [each for each in self._all() if each.move.kind is MoveKind.PROGRAM])
+        self.runs(effect.frees)
         for course in self._open(effect.unknown):
             course.move = replace(course.move, target=None, relative=None)
 
     def stopped(self, by: Sequence | None, axes: frozenset[str] | None = None) -> None:
         """Record a stop of axes (None: all). `by` None: of the whole session, which no sequence outlives unasked."""
-        for course in self._all() if axes is None else self._open(axes):
+        self._note_stop(by, self._all() if axes is None else self._open(axes))
+
+    def _note_stop(self, by: Sequence | None, courses: Iterable[Course]) -> None:
+        for course in courses:
             if course.open:
                 course.stopped = course.stopped or by is None or course.by is by
                 course.stopped_by_other = course.stopped_by_other or not (by is None or course.by is by)
@@ -140,7 +144,7 @@ class MotionRecord:
             course.ending = Ending(Outcome.STOPPED, course.move.axis, target=course.move.target)
 
     def runs(self, seen: bool = True) -> None:
-        """Record whether a program was seen to run, or was started."""
+        """Record whether a program was seen to run or was started, or something else may move the drive by itself."""
         for course in self._all():
             course.program = course.program or seen
 

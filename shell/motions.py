@@ -15,7 +15,7 @@ from typing import TypeVar
 
 from multidrop.dialects import Inexpressible, NoAnswer, Procedure, Refused, Stopped
 from multidrop.dialects.errors import MotionFailed
-from multidrop.dialects.motions import NO_MOTIONS, NO_SIGNS, Ending, Evidence, Motions, Outcome, Signs, joined
+from multidrop.dialects.motions import NO_MOTIONS, NO_SIGNS, Ending, Evidence, Motions, MoveKind, Outcome, Signs, joined
 from multidrop.dialects.state import DriveState
 from multidrop.drives.drive import NOT_SENT, Check, Drive, still
 from multidrop.drives.motion_record import Course, Courses, restart
@@ -96,7 +96,7 @@ class _Line:
     async def run(self, execute: Callable[[Check | None], Awaitable[T]]) -> T:
         """Execute it, with a check right before it, and record what it did."""
         check = self._check
-        if self.effect.begins or not self.effect.ends:
+        if self.effect.begins or not self.effect.stops:
             for each in self.reached:
                 if self._may_have_failed(each):
                     await each.run(self._judged_before(each))
@@ -174,7 +174,7 @@ class _Line:
             courses.append(Course(move, self.by, signs, state.errors.count, motions.runs(signs)))
         drive.motions.begin(courses)
         if courses:
-            state.errors.motion(True)
+            state.errors.motion(True, any(each.move.kind is MoveKind.PROGRAM for each in courses))
 
     def _judged_before(self, drive: Drive) -> Procedure[None]:
         """Judge the motions of this sequence whose error the next line would clear. Raises MotionFailed."""

@@ -79,16 +79,17 @@ class Outbox:
         """Take lines that wait for no other line, and that no other line's failure holds."""
         self._add(self._lane(), [self._line(text) for text in texts])
 
-    def paste(self, texts: Sequence[str]) -> None:
-        lines = [self._line(text) for text in texts]
+    def paste(self, texts: Sequence[str], place: Place | None = None) -> None:
+        """Take lines that wait for each other. `place`: the drive that they are for; None: the selected one."""
+        lines = [self._line(text, place) for text in texts]
         buses = {line.bus for line in lines if line.bus}
         lane = next(filter(None, map(self._talking, buses)), None) or self._lane()
         self._add(lane, lines)
 
-    def paste_again(self, texts: Sequence[str]) -> None:
+    def paste_again(self, texts: Sequence[str], place: Place | None = None) -> None:
         """Take lines that were not sent, and that a person agreed to send now."""
         self._unsent = []
-        self.paste(texts)
+        self.paste(texts, place)
 
     def pause(self) -> None:
         """Start no line that waits for the one before it: a quit is being decided."""
@@ -124,8 +125,8 @@ class Outbox:
         if lines:
             self._report("stopped", lines)
 
-    def _line(self, text: str) -> Line:
-        return Line.entered(text, self._session.stops, self._session.place)
+    def _line(self, text: str, place: Place | None = None) -> Line:
+        return Line.entered(text, self._session.stops, self._session.place if place is None else place)
 
     def _talking(self, bus: str) -> Lane | None:
         return next((lane for lane in self._lanes if bus and lane.running and lane.running.bus == bus), None)

@@ -38,7 +38,7 @@ class Selection:
     _label: Callable[[], Row]
     """Returns the row before the input line."""
     _turn_deaf: Callable[[], None]
-    """Discards keys until a pause."""
+    """Drops keys until a pause."""
     _show_line: Callable[[str, str], None]
     shown: Place = Place("", "")
     """The drive that the screen shows."""
@@ -89,7 +89,10 @@ class Selection:
         main.set_label(self._label())
 
     def catch_up(self) -> None:
-        """Follow a selection that changed; see the module for what becomes of the half-typed line."""
+        """Follow a selection that changed; see the module for what becomes of the half-typed line.
+
+        On a page, a single key may move the drive that is selected. So a page takes no keys until a pause, either.
+        """
         meant, self._meant = self._meant, False
         if not self.changed:
             return
@@ -98,7 +101,7 @@ class Selection:
             self.follow()
             self._main.entry.take_in(draft)
             return
-        if self.shown.bus and self._main.entry.unsent:
+        if self.shown.bus and (self._main.entry.unsent or self._main.app.screen is not self._main):
             self._turn_deaf()
         self.follow()
 

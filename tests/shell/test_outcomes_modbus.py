@@ -117,3 +117,11 @@ async def test_a_stall_that_nobody_waits_for_is_among_the_conditions(tmp_path: P
             while "stalled" not in causes:
                 await asyncio.sleep(0.02)
         watch.close()
+
+
+async def test_a_program_that_an_input_starts_may_end_a_slew(tmp_path: Path) -> None:
+    program = "program_text = '''\nPG 1\nSL 0\nE\nPG\n'''"
+    async with on(tmp_path, program, "[bus.drive.world]\ninputs = [[2.5, 2, 0]]") as session:
+        await session.run("IS=2,4,0")
+        await sent(session, "SL 5000", "/wait stopped", "R1=777")
+        assert await value(session, "R1") == 777

@@ -11,6 +11,7 @@ from multidrop.dialects.motions import MoveKind
 from multidrop.dialects.tmcl.host.codec import Tmcl, TmclState
 from multidrop.dialects.tmcl.host.motions import effect
 from multidrop.shell.session import Session
+from multidrop.simulator.lexium.device import MCodeDevice
 from tests.shell.test_outcomes import at_limit, noted, on, ran, value
 from tests.shell.test_outcomes_pmx_tmcl import SWITCHES, controller, module
 from tests.shell.test_outcomes_pmx_tmcl import value as asked
@@ -138,6 +139,61 @@ async def test_a_lag_limit_is_a_failure(tmp_path: Path) -> None:
     async with on(tmp_path, world, **SLOW, AS=1, LG=5000, LT=60000) as session:
         failure = await failed(session, "MA 40000", "/wait stopped", "R1=777")
         assert failure.outcome == "error" and failure.reason.startswith("error 107")
+
+
+async def test_a_lead_limit_is_a_failure(tmp_path: Path) -> None:
+    async with on(tmp_path, **SLOW, AS=1, LD=5000) as session:
+        lines = ("MA 40000", "/sleep 0.5", "/sim push a 9000", "/wait stopped", "R1=777")
+        failure = await failed(session, *lines)
+        assert failure.outcome == "error" and failure.reason.startswith("error 106: lead limit reached")
+        assert await value(session, "R1") == 0
+
+
+@pytest.mark.parametrize(("makes_up", "fails"), [(0, False), (1, True), (2, True)])
+async def test_a_lag_that_is_left_at_the_end_of_a_timed_move_is_a_failure(
+    tmp_path: Path, makes_up: int, fails: bool
+) -> None:
+    """With MU=0 the drive makes it up after the move, and there is no error."""
+    world = "[bus.drive.world]\nlocked = [[0.5, 6.0]]"
+    async with on(tmp_path, world, **SLOW, AS=1, LG=2000000, LT=60000) as session:
+        lines = (f"MU={makes_up}", "MA 20000", "/wait stopped", "R1=777")
+        if fails:
+            failure = await failed(session, *lines)
+            assert failure.outcome == "error" and failure.reason.startswith("error 108")
+        else:
+            await sent(session, *lines)
+            assert abs(await value(session, "LL")) < 512
+        assert await value(session, "R1") == (0 if fails else 777)
+
+
+@pytest.mark.parametrize("lines", [("MA 20000", "/sleep 3"), ("SL 5000", "/sleep 3", "SL 0")])
+async def test_the_greatest_lead_or_lag_is_a_failure(tmp_path: Path, lines: tuple[str, ...]) -> None:
+    """The simulated drive never reaches it (error 105), so it is set from outside."""
+    async with on(tmp_path, **SLOW, AS=1) as session:
+        device = next(iter(session.cells.values())).floor.drives[0].device
+        assert isinstance(device, MCodeDevice)
+        asyncio.get_running_loop().call_later(0.5, device.errors.set, 105)
+        failure = await failed(session, *lines, "/wait stopped", "R1=777")
+        assert failure.outcome == "error" and failure.reason.startswith("error 105")
+        assert await value(session, "R1") == 0
+
+
+# A clock that the drive follows
+
+
+@pytest.mark.parametrize(("limit", "fails"), [(4, True), (90, False)])
+async def test_a_limit_is_a_failure_while_the_drive_follows_a_clock(tmp_path: Path, limit: int, fails: bool) -> None:
+    pulses = [each for n in range(20) for each in ([2 + n / 10, 3, 0], [2.05 + n / 10, 3, 1])]
+    world = f"[bus.drive.world]\nlimit_plus = {limit}\ninputs = {[[0.0, 4, 0], *pulses]}"
+    async with on(tmp_path, world) as session:
+        await typed(session, "IS=3,13,0", "IS=2,2,0")
+        lines = ("FL=1", "/sleep 6", "/wait stopped", "R1=777")
+        if fails:
+            assert (await failed(session, *lines)).reason == "error 83: plus limit reached"
+        else:
+            await sent(session, *lines)
+        assert await value(session, "P") == (4 if fails else 20)
+        assert await value(session, "R1") == (0 if fails else 777)
 
 
 async def test_torque_mode_with_a_locked_rotor_is_a_stall(tmp_path: Path) -> None:
@@ -274,3 +330,87 @@ async def test_a_slew_that_a_trip_ended_is_no_failure(tmp_path: Path) -> None:
         await typed(session, *TRIP)
         await sent(session, "TE=2", "SL 10000", "/wait stopped", "R1=777")
         assert await value(session, "R1") == 777
+
+
+# Motion that the drive itself may end
+
+
+GO = ("PG 1", "SL 0", "E", "PG")
+"""A program at address 1, which an input of type 4 starts. It has ended when the drive is at rest."""
+
+
+@pytest.mark.parametrize(("personality", "setup"), [("LMDCM", "IS=2,4,0"), ("LMM", "IS=2,4,0"), ("MDI", "S2=4,0")])
+@pytest.mark.parametrize("line", ["SL 10000", "MA 900000"])
+async def test_a_program_that_an_input_starts_may_end_a_motion(
+    tmp_path: Path, personality: str, setup: str, line: str
+) -> None:
+    async with session_on(tmp_path, bus("line", drive(personality, "a", VM=20000, A=100000, D=100000))) as session:
+        await typed(session, *GO, setup)
+        await sent(session, line, "/sleep 0.3", "/sim input a 2 0", "/wait stopped", "R1=777")
+        assert await value(session, "R1") == 777
+        await typed(session, setup.replace("4", "0", 1))
+        task = asyncio.get_running_loop().create_task(other(session, "SL 0"))
+        assert (await failed(session, line, "/wait stopped", "R1=778")).reason == "not by this script"
+        await task
+
+
+async def test_an_input_that_stops_the_motion_is_a_failure_with_its_error(tmp_path: Path) -> None:
+    async with on(tmp_path, **SLOW) as session:
+        await session.run("IS=2,5,0")
+        failure = await failed(session, "SL 10000", "/sleep 0.3", "/sim input a 2 0", "/wait stopped", "R1=777")
+        assert failure.reason == "error 91: an input of type stop ended the motion"
+        assert await value(session, "R1") == 0
+
+
+async def test_a_trip_that_is_armed_on_the_way_may_end_a_slew(tmp_path: Path) -> None:
+    async with on(tmp_path, **SLOW) as session:
+        await typed(session, *TRIP)
+        await sent(session, "SL 10000", "TE=2", "/wait stopped", "R1=777")
+        assert await value(session, "R1") == 777
+
+
+async def test_the_end_of_a_program_ends_no_motion_that_a_line_began(tmp_path: Path) -> None:
+    """E ends the program, and a move that is under way goes on (MCode reference 5.1.35)."""
+    async with on(tmp_path, **SLOW) as session:
+        for line in ("MA 20000", "SL 10000"):
+            task = asyncio.get_running_loop().create_task(other(session, "SL 0"))
+            failure = await failed(session, line, "E", "/wait stopped", "R1=777")
+            await task
+            assert (failure.outcome, failure.reason) == ("stopped", "not by this script")
+        await typed(session, "PG 1", "LB G1", "H 9000", "E", "PG")
+        await sent(session, "EX G1", "E", "/wait idle", "R1=778")
+        assert await value(session, "R1") == 778
+
+
+async def test_bridges_that_are_switched_off_end_a_slew_and_are_the_reason(tmp_path: Path) -> None:
+    async with on(tmp_path, **SLOW) as session:
+        failure = await failed(session, "SL 10000", "/sleep 0.3", "DE=0", "/wait stopped")
+        assert (failure.outcome, failure.reason) == ("power", "its output bridges are off (DE=0)")
+
+
+@pytest.mark.parametrize("line", ["JX+", "X-2000"])
+async def test_a_program_of_a_controller_that_still_runs_may_have_ended_a_motion(tmp_path: Path, line: str) -> None:
+    from multidrop.dialects.pmx.manual import program_file
+
+    async with controller(tmp_path, SWITCHES) as session:
+        await session.drive().download(program_file.read("PRG 0\nSTOPX\nDELAY=5000\nEND", "a.prg"))
+        await session.run("ABS")
+        task = asyncio.get_running_loop().create_task(other(session, "SR0=1"))
+        await sent(session, line, "/wait stopped", "V1=777")
+        await task
+        await typed(session, "SR0=0")
+        task = asyncio.get_running_loop().create_task(other(session, "STOPX"))
+        assert (await failed(session, "JX+", "/wait stopped")).outcome == "stopped"
+        await task
+
+
+@pytest.mark.parametrize("line", ["ROR 0, 500", "MVP ABS, 0, 500000"])
+async def test_a_program_of_a_module_that_still_runs_may_have_ended_a_motion(tmp_path: Path, line: str) -> None:
+    from multidrop.dialects.tmcl.manual import program_file
+
+    async with module(tmp_path, "TMCM-1241") as session:
+        await session.drive().download(program_file.read("MST 0\nWAIT TICKS, 0, 900\nSTOP", "a.tmc"))
+        task = asyncio.get_running_loop().create_task(other(session, "129 0, 0, 0"))
+        await sent(session, line, "/wait stopped", "SGP 0, 2, 777")
+        await task
+        assert await asked(session, "GGP 0, 2") == 777

@@ -299,7 +299,8 @@ async def test_the_error_of_a_line_that_a_stop_made_harmless_is_no_refusal_of_th
         assert b"~~~~" in shop.written("press"), "the line was cut"
         await session.run("MR 2700000")
         assert shop.moving()
-        assert any("an error since the last motion began, now cleared: error 20" in text for text in shop.told())
+        assert any("an old error, now cleared: error 20" in text for text in shop.told()), shop.told()
+        assert not any("since the last motion began" in text for text in shop.told()), "the move was never executed"
 
 
 NEW_LINE = ("MR 24000", 'PR "v",/x', "VM=1")

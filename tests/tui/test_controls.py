@@ -270,6 +270,37 @@ async def test_of_a_drive_that_is_not_shown_yet_the_stop_alone_is_sent(key: str,
 
 
 @at_screen
+async def test_a_drive_that_is_selected_by_itself_moves_only_after_a_pause_and_stops_at_once() -> None:
+    """A script closes the selected line, or `/use` of a macro selects another drive: the next press was not for it."""
+    async with on_screen() as (pilot, app, session):
+        page = await opened(pilot, session)
+        session.select("b", "press")
+        await emit(pilot, OnBus("press", Sample(session.time - 0.05, "b", 0, 0)))
+        await settle(pilot)
+        assert "press:b clamp" in page.lines("heading").plain, "it is shown"
+        await press(pilot, "right", "m", "5", "enter", "h", "plus", "enter")
+        assert session.sent == []
+        await press(pilot, "space")
+        assert session.sent == ["press:b SL 0"]
+        app.keyboard._deaf_until = 0.0  # a pause
+        session.time += 1
+        await emit(pilot, OnBus("press", Sample(session.time - 0.05, "b", 0, 0)))
+        await press(pilot, "right")
+        assert session.sent == ["press:b SL 0", "press:b MR 100"]
+
+
+@at_screen
+async def test_a_drive_that_a_person_chooses_on_the_page_takes_the_next_key() -> None:
+    async with on_screen() as (pilot, app, session):
+        await opened(pilot, session)
+        await press(pilot, "ctrl+o", "down", "enter")
+        assert session.addresses["press"] == "b"
+        await emit(pilot, OnBus("press", Sample(session.time - 0.05, "b", 0, 0)))
+        await press(pilot, "right")
+        assert session.sent == ["press:b MR 100"]
+
+
+@at_screen
 async def test_a_refusal_is_shown_on_the_page() -> None:
     session = demo_session()
     session.refuses["MR 100"] = "a: error 83: plus limit reached"

@@ -11,7 +11,7 @@ from textual.message import Message
 
 from multidrop.drives.events import Sample
 from multidrop.shell.events import Failed, OnBus, StateChanged
-from multidrop.tui.screens.dialogs import Search
+from multidrop.tui.screens.dialogs import Confirm, Search
 from multidrop.tui.screens.start import Start
 from multidrop.tui.terminal.keyboard import PAUSE
 from tests.support.fake_session import FakeBus, FakeDrive, FakeSession, demo_session
@@ -113,6 +113,27 @@ async def test_an_enter_that_comes_as_the_selection_changes_by_itself_sends_noth
         assert session.sent == []
         assert assist.history()[-1] == "MR 512"
         await screen.shows("not sent: MR 512")
+
+
+async def test_an_enter_that_comes_with_a_paste_does_not_answer_its_question() -> None:
+    async with demo() as (screen, session, _):
+        await screen.type(b"\x1b[200~MR 1\rMR 2\r\x1b[201~\r")
+        assert isinstance(screen.app.screen, Confirm)
+        assert session.sent == []
+        await asyncio.sleep(PAUSE + 0.1)
+        await screen.type(b"\r")
+        assert session.sent == ["press:a MR 1", "press:a MR 2"]
+
+
+async def test_pasted_lines_go_to_the_drive_that_their_question_names_whatever_is_selected_by_then() -> None:
+    async with demo() as (screen, session, _):
+        await screen.type(b"\x1b[200~MR 1\rMR 2\r\x1b[201~")
+        assert isinstance(screen.app.screen, Confirm)
+        session.select("", "eth")
+        await screen.rest()
+        screen.app.keyboard.hear()  # the person has seen it
+        await screen.type(b"\r")
+        assert session.sent == ["eth: @press:a MR 1", "eth: @press:a MR 2"]
 
 
 async def test_the_line_of_a_bus_that_is_closed_is_kept_and_said() -> None:

@@ -110,6 +110,7 @@ class ControlsPage(SendingPage):
         Binding(each, "drop", show=False) for each in ascii_letters + digits if each not in "lmbhed"
     ]
     WANTS = frozenset({"motion", "conditions"})
+    STOPS = frozenset({"space"})
     PARTS = {"heading": None, "drive": "auto", "controls": "1fr", "number": None, "said": None}
     FIELD = "number"
 

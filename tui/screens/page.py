@@ -108,6 +108,8 @@ class Page(Framed):
     SHEET = "page"
     WANTS: ClassVar[frozenset[str]] = frozenset()
     """The readings that it needs while it is shown, in the words of `tui.panels.table`."""
+    STOPS: ClassVar[frozenset[str]] = frozenset()
+    """The keys that stop something: they work even right after the screen has changed by itself."""
 
     PARTS: ClassVar[Mapping[str, str | int | None]] = {}
     """The parts that are rows, from top to bottom, with their heights; None: as the style sheet has it."""

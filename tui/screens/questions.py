@@ -11,6 +11,7 @@ from textual.app import App
 
 from multidrop.drives.bus import Bus
 from multidrop.shell.channel import Field
+from multidrop.shell.line_syntax import Place
 from multidrop.shell.session import Session
 from multidrop.tui.panels.view import Glance
 from multidrop.tui.screens.dialogs import Confirm, Dialog, Form, GoOn, Match, Offer, TooSmall
@@ -48,9 +49,9 @@ class Questions:
 
         await self._app.push_screen(dialog, answered)
 
-    async def paste(self, lines: list[str], send: Callable[[list[str]], None]) -> None:
-        """Ask before several pasted lines are sent."""
-        drive, count = self._session.selected, len(lines)
+    async def paste(self, lines: list[str], send: Callable[[list[str], Place], None]) -> None:
+        """Ask before several pasted lines are sent to the drive that the question names, whatever is selected later."""
+        drive, place, count = self._session.selected, self._session.place, len(lines)
         to = f" to {drive.label or drive.address or self._session.selected_bus}" if drive is not None else ""
         shown = [f"  {line[:60]}" for line in lines[:PREVIEW]]
         if count > PREVIEW:
@@ -59,9 +60,12 @@ class Questions:
 
         def answered(answer: str | None) -> None:
             if answer == "send":
-                send(lines)
+                send(lines, place)
 
-        await self._app.push_screen(Confirm(f"Send {count} pasted lines{to}?", shown, answers), answered)
+        question = Confirm(f"Send {count} pasted lines{to}?", shown, answers)
+        self._keyboard.turn_deaf()  # an Enter that came with the paste is no answer
+        question.told = self._keyboard.early
+        await self._app.push_screen(question, answered)
 
     async def go_on(self, question: str) -> bool:
         """Ask before a step that needs a yes; return the answer. A cancellation closes the question."""

@@ -67,7 +67,7 @@ class Keyboard:
         if self._closed:
             self._drop(event)
             return True
-        if isinstance(event, events.Key | events.Paste) and self._not_heard():
+        if self._may_be_too_early(event) and self._not_heard():
             self._drop(event)
             return True
         self._waiting.append(event)
@@ -127,11 +127,18 @@ class Keyboard:
         if not self._held:
             self._dropped = ""
         waited = list(self._waiting)
-        self._waiting = deque(event for event in waited if isinstance(event, events.MouseDown | events.MouseUp))
+        self._waiting = deque(event for event in waited if not self._may_be_too_early(event))
         for event in waited:
-            self._drop(event)
+            if self._may_be_too_early(event):
+                self._drop(event)
         if len(self._waiting) < len(waited):
             self._not_heard()
+
+    def _may_be_too_early(self, event: Typed) -> bool:
+        """Whether an event must wait for the person to have seen the screen; a key that stops something need not."""
+        if isinstance(event, events.Key):
+            return event.key not in getattr(self._app.screen, "STOPS", ())
+        return isinstance(event, events.Paste)
 
     def hear(self) -> None:
         """Let keys count at once: a stop closed what had appeared under them."""

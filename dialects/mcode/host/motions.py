@@ -19,8 +19,9 @@ from multidrop.dialects.errors import DriveError
 from multidrop.dialects.mcode.host import classify, exchange, operations
 from multidrop.dialects.mcode.host.before_request import before_request, value_of
 from multidrop.dialects.mcode.host.classify import INTEGER
+from multidrop.dialects.mcode.host.settings import listed
 from multidrop.dialects.mcode.host.state import MCodeState, described, earlier_error, refuse_in_program, who
-from multidrop.dialects.mcode.manual import errors, points
+from multidrop.dialects.mcode.manual import errors, parameters, points
 from multidrop.dialects.mcode.manual.errors import ErrorNumber as E
 from multidrop.dialects.mcode.manual.grammar import Number, Statement, parsed
 from multidrop.dialects.mcode.manual.mnemonic import EVERY
@@ -75,6 +76,10 @@ OUTCOMES: Mapping[int, Outcome] = {
     E.NO_MOTOR_VOLTAGE: Outcome.POWER,
 }
 STALLED = "stalled"
+POINTS = ("S1", "S2", "S3", "S4")
+"""The set-ups of the inputs of an MDrivePlus."""
+GO = 4
+"""The type of an input that starts the program at address 1 (5.1.64)."""
 RUNS = ("BY", "TE")
 """Not 0: a program runs, or a trip may start one; a trip disarms itself (5.1.125)."""
 MOVES = {"MA", "MR"}
@@ -108,11 +113,15 @@ def effect(state: DriveState, text: str) -> Effect:
         return Effect(begins=(Move(MoveKind.PROGRAM, AXIS),))
     if word in WITHOUT_TARGET and value in WITHOUT_TARGET[word]:
         return Effect(begins=(Move(MoveKind.VELOCITY, AXIS),))
-    if word in ("PS", "E"):
+    if word == "PS":
         return Effect(ends=ONLY)
+    if word == "E":  # a motion that is under way goes on (5.1.35)
+        return Effect(halts=True)
     if word == "CF" or classify.written_word(text) in CLEARED:
         return Effect(clears=True)
-    if word in REFERS or classify.written_word(text) in classify.SCALE | {"JE", "FL", "TE"}:
+    if classify.written_word(text) in FREE:
+        return Effect(frees=True)
+    if word in REFERS or classify.written_word(text) in classify.SCALE:
         return Effect(unknown=ONLY)
     return NOTHING
 
@@ -135,6 +144,8 @@ class Access(Generic[S]):
     """Read ER, which clears it; None: it could not be read."""
     handles_errors: Callable[[S], Procedure[bool]]
     """Whether the program in the drive has an OE routine."""
+    program_input: Callable[[S], Procedure[bool]]
+    """Whether an input is set up to start a program (type 4, 5.1.64)."""
     check: Callable[[S, str], object] = lambda state, text: None
     """Raise Inexpressible for a line that no frame can carry, before anything is asked for it."""
 
@@ -201,8 +212,8 @@ def _judge(access: Access[S], state: S, evidence: Evidence) -> Procedure[Ending 
         count = state.errors.count
         if program and (yield from access.handles_errors(state)):
             return ending
-        listed = state.errors.since(count)  # the list has reported it, and cleared it
-        code = listed[-1] if listed else (yield from access.error(state))
+        reported = state.errors.since(count)  # the list has reported it, and cleared it
+        code = reported[-1] if reported else (yield from access.error(state))
         if code is None:
             return replace(ending, outcome=Outcome.UNKNOWN, reason="an error is set, and its number could not be read")
         codes += [code] if code and (code in errors.BY_ITSELF or not evidence.stopped) else []
@@ -217,17 +228,28 @@ def _judge(access: Access[S], state: S, evidence: Evidence) -> Procedure[Ending 
         return replace(ending, outcome=fault[0], reason=fault[1])
     if (yield from _makes_up(access, state, found)):
         return None
-    target = move.target
-    if target is None or position is None or found.get("AS") == TORQUE or evidence.program or found.get("BY"):
+    if evidence.program or found.get("BY") or found.get("AS") == TORQUE:
         return ending
-    if abs(position - target) <= _tolerance(found):
+    if move.endless:
+        return (yield from _unexplained(access, state, ending, evidence))
+    target = move.target
+    if target is None or position is None or abs(position - target) <= _tolerance(found):
         return ending
     if found.get("EE") and found.get("MP"):
         return None  # position maintenance may still correct it
+    return (yield from _unexplained(access, state, ending, evidence))
+
+
+def _unexplained(access: Access[S], state: S, ending: Ending, evidence: Evidence) -> Procedure[Ending]:
+    """Judge a motion that ended short of its target, or that only a command ends: did the drive end it by itself?"""
     free = yield from access.values(state, (*FREE, "DE"))
     if not free.get("DE", 1):
         return replace(ending, outcome=Outcome.POWER, reason="its output bridges are off (DE=0)")
-    return ending if any(free.get(each) for each in FREE) else replace(ending, outcome=Outcome.STOPPED)
+    if any(free.get(each) for each in FREE):
+        return ending
+    if not evidence.stopped and (yield from access.program_input(state)):
+        return ending
+    return replace(ending, outcome=Outcome.STOPPED)
 
 
 def _makes_up(access: Access[S], state: S, found: Mapping[str, int]) -> Procedure[bool]:
@@ -329,8 +351,24 @@ def _handles_errors(state: MCodeState) -> Procedure[bool]:
     return any(re.search(r"(?<![\w\"])OE\b", line, re.I) for line in lines)
 
 
+def _program_input(state: MCodeState) -> Procedure[bool]:
+    """Read the set-ups of the inputs: a list, or on an MDrivePlus the words S1 to S4."""
+    if "IS" in parameters.lists(state.product, state.version):
+        return starts_program((yield from listed(state, "PR IS")))
+    for word in known_words(state.product, POINTS):
+        printed = yield from value_of(state, word, parameters.Form.FIELDS.value)
+        if printed.partition(",")[0].strip() == str(GO):
+            return True
+    return False
+
+
+def starts_program(lines: Sequence[str]) -> bool:
+    """Whether a line that `PR IS` prints is of an input that starts a program: `IS = 1, 4, 0`."""
+    return any(re.fullmatch(rf" *IS *= *\d+ *, *{GO} *,.*", line) for line in lines)
+
+
 def _check(state: MCodeState, text: str) -> None:
     state.codec.encode(state.codec.request(state.address, text))
 
 
-MOTIONS = motions(Access(_values, exchange.read_error, _handles_errors, _check))
+MOTIONS = motions(Access(_values, exchange.read_error, _handles_errors, _program_input, _check))

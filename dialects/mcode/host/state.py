@@ -183,8 +183,12 @@ def report_error(state: DriveState, code: int) -> None:
 
 
 def earlier_error(code: int, state: DriveState) -> str:
-    """Say what an error was that was read before a line, which is not to blame for it."""
-    if state.errors.moving:  # an older one was read, and cleared, as the motion began
+    """Say what an error was that was read before a line, which is not to blame for it.
+
+    An error of a line, such as 20 for one that a stop has cut off, is that of a program's motion at most.
+    """
+    known = state.errors
+    if known.moving and (known.program or code in errors.BY_ITSELF):  # an older one was cleared as the motion began
         return f"an error since the last motion began, now cleared: {described(code, state)}"
     return f"an old error, now cleared: {described(code, state)}"
 

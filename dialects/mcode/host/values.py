@@ -19,7 +19,7 @@ from multidrop.dialects.mcode.host.exchange import (
     question,
     value,
 )
-from multidrop.dialects.mcode.host.motions import cause
+from multidrop.dialects.mcode.host.motions import POINTS, cause
 from multidrop.dialects.mcode.host.operations import perform
 from multidrop.dialects.mcode.host.settings import (
     BETWEEN,
@@ -66,8 +66,6 @@ from multidrop.dialects.values import (
 STATE = ("EF", "BY", "MV", "VC", "MP", "DE", "ST", "P", "IN", "I5", "AF")
 """What changes by itself, or by a program; the flags first, which need no separator."""
 SETTINGS = ("EE", "AS", "RC", "HC", "VI", "VM", "A", "D")
-POINTS = ("S1", "S2", "S3", "S4")
-"""The set-ups of an MDrivePlus."""
 SETTLED = "IS1"
 """Among the facts once the set-ups were read."""
 UNSURE = frozenset({"EE", "AS", "AF", "I5", "ST"})

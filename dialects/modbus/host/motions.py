@@ -10,9 +10,10 @@ from collections.abc import Mapping, Sequence
 
 from multidrop.dialects.codec import Procedure
 from multidrop.dialects.errors import Refused
-from multidrop.dialects.mcode.host.motions import Access, motions
+from multidrop.dialects.files import split_lines
+from multidrop.dialects.mcode.host.motions import Access, motions, starts_program
 from multidrop.dialects.modbus.host.codec import ModbusState
-from multidrop.dialects.modbus.host.operations import PRODUCT, error_number, value
+from multidrop.dialects.modbus.host.operations import PRODUCT, error_number, printed, value
 from multidrop.dialects.modbus.manual.registers import REGISTERS
 
 
@@ -37,4 +38,10 @@ def _no_handler(state: ModbusState) -> Procedure[bool]:
     yield
 
 
-MOTIONS = motions(Access(_values, error_number, _no_handler))
+def _program_input(state: ModbusState) -> Procedure[bool]:
+    """Read the set-ups of the inputs, which function 65 prints as text."""
+    text = yield from printed(state, "IS")
+    return starts_program(split_lines(text))
+
+
+MOTIONS = motions(Access(_values, error_number, _no_handler, _program_input))

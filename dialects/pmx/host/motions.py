@@ -153,13 +153,24 @@ def judge(state: PmxState, axis: str, evidence: Evidence) -> Procedure[Ending | 
         return ending
     if evidence.move.kind is MoveKind.PROGRAM:
         return (yield from _program_ended(state, ending, before))
-    short = not evidence.program and (yield from _is_short(state, ending, evidence.move, loop))
+    move = evidence.move
+    short = not evidence.program and (move.endless or (yield from _is_short(state, ending, move, loop)))
     met = next((way for bit, way in SWITCHES.items() if status & bit), "")
-    no_target = evidence.move.target is None and evidence.move.kind is not MoveKind.POSITION
+    no_target = move.target is None and move.kind is not MoveKind.POSITION
     unexplained = (short or no_target) and not (evidence.stopped or evidence.program)
     if met and unexplained and (yield from number(state, "IERR")):  # else it would be latched
         return replace(ending, outcome=Outcome.LIMIT, reason=f"{met} limit switch is on (IERR=1 keeps no error)")
+    if short and not evidence.stopped and (yield from _program_runs(state)):
+        return ending
     return replace(ending, outcome=Outcome.STOPPED) if short else ending
+
+
+def _program_runs(state: PmxState) -> Procedure[bool]:
+    """Whether a program runs now, which may have ended the motion."""
+    for program in PROGRAMS:
+        if (yield from number(state, f"SASTAT{program}")) == RUNNING:
+            return True
+    return False
 
 
 def _is_short(state: PmxState, ending: Ending, move: Move, loop: int) -> Procedure[bool]:

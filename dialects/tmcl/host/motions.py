@@ -153,6 +153,9 @@ def _short(state: TmclState, ending: Ending, motor: int, way: int, evidence: Evi
         for bit, (outcome, reason) in REASONS.items():
             if flags & bit:
                 return replace(ending, outcome=outcome, reason=reason)
+    homing = evidence.move is not None and evidence.move.kind is MoveKind.HOMING
+    if not (evidence.stopped or homing) and (yield from busy(state)):
+        return ending  # its program runs now, which may have ended the motion
     return replace(ending, outcome=Outcome.STOPPED)
 
 

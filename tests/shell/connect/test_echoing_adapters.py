@@ -243,4 +243,4 @@ async def test_what_another_host_does_on_the_line_is_said_and_no_drives_output(t
     await place.run(url)
     assert place.output == []
     said = [text for text in place.told if "without a question" in text]
-    assert len(said) == 1 and "not a drive's output" in said[0]
+    assert len(said) == 1 and "another program uses this line" in said[0]
