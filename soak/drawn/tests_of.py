@@ -1,4 +1,4 @@
-"""Which tests execute a line: measured by `make unmeasured`, kept in `tests.json.xz`, and read here.
+"""Which tests execute a line: measured by `make map`, kept in `tests.json.xz`, and read here.
 
 A function of the product is divided into blocks: lines that the same tests execute. A line is counted from the first
 line of its function, so that a change elsewhere in the file moves nothing. A line that is new has the tests of all
