@@ -117,7 +117,7 @@ def _compact(executed: dict[str, dict[int, set[str]]], times: dict[str, float], 
 
 
 def _chosen(tests: set[str], times: dict[str, float], weights: Counter[str]) -> set[str]:
-    """Some of the tests of a line: the fastest, those that execute least else, which are about it, and one of each file.
+    """Some of the tests of a line: the fastest, those that execute least else (they are about it), one of each file.
 
     A line that every session runs is seen by the tests of one promise, in a file that the other two do not reach.
     """
