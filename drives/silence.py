@@ -27,14 +27,17 @@ def explained(error: E, link: Link, family: str) -> E:
     if link.heard.answered:
         other = link.transport.other_user()
         return type(error)(f"{error}; {other}") if other else error
-    return type(error)(f"{error}; {reason(link, family)}")
+    why = reason(link, family)
+    return type(error)(f"{error}; {why}") if why else error
 
 
 def reason(link: Link, family: str) -> str:
-    """Say what came in place of replies, and what to check."""
+    """Say what came in place of replies, and what to check; empty: whole messages came, and the failure names them."""
     check = NETWORK if link.transport.network else SERIAL
     came, echoed = link.heard.foreign(), link.heard.came
     what = seen(came, family) if came else ECHO if echoed else "nothing was received"
+    if not what:
+        return ""
     if other := link.transport.other_user():
         return f"{what}; {other}"
     advice = NOISE if came and what.endswith("another baud rate?") else f"; {check}"

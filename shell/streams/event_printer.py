@@ -75,20 +75,13 @@ class Printer:
             for row in laid_out(visible(event.text, tabs=True), get_terminal_size().columns):
                 self._write(sys.stdout, row)
         elif isinstance(event, OnBus):
-            if self._unsolicited and isinstance(event.event, Unsolicited):
-                self._print_unsolicited(event.bus, event.event)
+            if self._unsolicited and isinstance(event.event, Unsolicited) and not event.event.greeting:
+                self._write(sys.stdout, *event.event.lines, spare=True)
         elif isinstance(event, Output | Printed):
             self._write(sys.stdout, event.text)
         elif self._talkative or (isinstance(event, Notified) and (event.warning or event.outcome)):
             warning = Colour.WARNING if isinstance(event, Notified) and event.warning else None
             self.notify(event.text, Colour.FAILURE if isinstance(event, Failed) else warning)
-
-    def _print_unsolicited(self, bus: str, event: Unsolicited) -> None:
-        if not event.greeting:
-            return self._write(sys.stdout, *event.lines, spare=True)
-        for each in event.lines:
-            text = f"{bus}: received before a drive replied, so perhaps a gateway's greeting: {each!r}"
-            self.notify(text, Colour.WARNING)
 
     def notify(self, text: str, colour: Colour | None = None) -> None:
         """Write a line to standard error. The same line twice in a row is written once, unless talkative."""

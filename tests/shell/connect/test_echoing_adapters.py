@@ -214,6 +214,8 @@ async def test_what_is_printed_later_than_a_greeting_is_a_drives_output(tmp_path
     await place.session.close()
     place.floor.close()
     assert place.output == ["12345", "0"]
+    said = [text for text in place.told if "'Welcome'" in text and "may be a gateway's greeting" in text]
+    assert len(said) == 1
 
 
 @for_each("name", ["mcode alone EM=0 CK=0", "mcode alone EM=1 CK=0", "mcode alone EM=2 CK=0"])
