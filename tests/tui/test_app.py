@@ -27,6 +27,7 @@ from tests.support.fake_session import (
     make_app,
     on_screen,
     press,
+    readable,
     settle,
     toasts,
 )
@@ -120,6 +121,7 @@ async def test_one_pasted_line_is_typed_and_several_are_asked_about_and_sent_in_
         assert isinstance(app.screen, Confirm)
         assert "3" in app.screen.heading
         assert session.lines == []
+        readable(pilot)
         await press(pilot, "enter")
         assert [line for line, _ in session.lines] == ["PG 100", "MR 1", "PG"]
 
@@ -141,6 +143,7 @@ async def test_pasted_lines_after_one_that_failed_are_not_sent() -> None:
     async with on_screen(session) as (pilot, app, _):
         app.post_message(events.Paste("BAD\nMR 1\nMR 2"))
         await pilot.pause()
+        readable(pilot)
         await press(pilot, "enter")
         assert [line for line, _ in session.lines] == ["BAD"]
         await pilot.pause(BURST + 0.1)
@@ -207,7 +210,8 @@ def test_a_picker_takes_the_drive_of_that_address_and_no_part_of_a_word() -> Non
 async def test_a_letter_chooses_an_answer_and_one_that_begins_none_takes_nothing() -> None:
     async with on_screen() as (pilot, app, session):
         for letter, sent in {"z": [], "n": [], "s": ["press:a MR 1", "press:a MR 2"]}.items():
-            await app.questions.paste(["MR 1", "MR 2"], lambda lines: [app.outbox.type(line) for line in lines])
+            await app.questions.paste(["MR 1", "MR 2"], lambda lines, place: [app.outbox.type(line) for line in lines])
+            readable(pilot)
             await press(pilot, letter, "enter")
             assert isinstance(app.screen, Confirm) is (letter == "z")
             assert session.sent == sent, letter

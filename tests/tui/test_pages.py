@@ -23,6 +23,7 @@ from tests.support.fake_session import (
     make_app,
     on_screen,
     press,
+    readable,
     settle,
     toasts,
 )
@@ -49,6 +50,8 @@ async def test_enter_selects_a_drive_without_trouble_and_goes_back() -> None:
         session.emit(*a_move(session))
         await press(pilot, "ctrl+a")
         session.select("b", "press")
+        await settle(pilot)
+        readable(pilot)
         await press(pilot, *"gantry")
         assert len(rows(app)) == 1
         await press(pilot, "enter")

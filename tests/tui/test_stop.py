@@ -31,6 +31,7 @@ from tests.support.fake_session import (
     make_app,
     on_screen,
     press,
+    readable,
     settle,
 )
 from tests.support.pty_screen import demo
@@ -226,6 +227,7 @@ async def test_pasted_lines_that_wait_are_never_sent_after_a_stop() -> None:
     session.gate = asyncio.Event()
     async with on_screen(session) as (pilot, app, _):
         await paste(pilot, "MR 1\nMR 2\nMR 3\n")
+        readable(pilot)
         await pilot.press("enter")
         await pilot.pause()
         assert session.lines == [("MR 1", By.OPERATOR)]
