@@ -26,7 +26,7 @@ from bench_line import ANSWER, FRAME, PEER, REQUEST, timed, transact
 from report import Row, alone, compared, main
 
 from multidrop.drives.bus import Bus
-from multidrop.transports.serial_ports import lock_owner
+from multidrop.transports.port_users import lock_owner
 from multidrop.transports.ssh import RELAY, SOCAT, FarPort
 from multidrop.transports.ssh_session import open_ssh
 from tests.support.ssh_server import SSH, SSHD, ssh_server
@@ -77,7 +77,9 @@ async def through_bus(far: FarPort, count: int, way: str) -> tuple[float, float,
     """Seconds, processor seconds here, and those of the relay."""
     bus = Bus("bench", await open_ssh(far, way=way))
     bus.start()
-    relay = int(lock_owner(far.path).rpartition("pid ")[2].rstrip(")"))
+    owner = lock_owner(far.path)
+    assert owner is not None
+    relay = owner.pid
     try:
         for _ in range(100):
             await transact(bus.link, REQUEST)

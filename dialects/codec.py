@@ -102,6 +102,8 @@ class Reply:
     """The bytes of the reply; set by the line."""
     took: float = 0.0
     """The time from the last byte of the request to the end of its reply, s; set by the line."""
+    at: float = 0.0
+    """When it ended, s; set by the line."""
     body: bytes = b""
     """The reply's content where it is binary."""
     flagged: bool = False

@@ -94,21 +94,35 @@ SHOWN = 40
 """Most characters that are shown of that."""
 
 
-def limited(who: str, text: str, fate: str, steps: Procedure[T], longest: float = LONGEST) -> Procedure[T]:
+@dataclass
+class Looking:
+    """How long a drive has been looked for among other bytes, s, and the last ones."""
+
+    spent: float = 0.0
+    heard: bytes = b""
+
+    def begins(self) -> None:
+        """Give the next line the whole time."""
+        self.spent, self.heard = 0.0, b""
+
+
+def limited(who: str, text: str, fate: str, steps: Procedure[T], looking: Looking) -> Procedure[T]:
     """Look for a drive, as long as silence lasts, but not in endless bytes. Raises NoAnswer, which says what came.
 
-    `text`: the line that waits for it; `fate`: what has become of that line.
+    `text`: the line that waits for it; `fate`: what has become of that line; `looking`: one for all steps of that line.
     """
-    spent, heard = 0.0, b""
+    ended: float | None = None
     try:
         asked = next(steps)
         while True:
             try:
-                if spent > longest:
-                    raise NoAnswer(f"{who} was looked for in {spent:.0f} s of other bytes: '{text}' {fate}")
+                if looking.spent > LONGEST:
+                    raise NoAnswer(f"{who} was looked for in {looking.spent:.0f} s of other bytes: '{text}' {fate}")
                 reply = yield asked
-                if reply.raw:
-                    spent, heard = spent + reply.took, reply.raw
+                if reply.raw:  # with the wait for a quiet line before the request
+                    looking.spent += reply.took if ended is None else reply.at - ended
+                    looking.heard = reply.raw
+                ended = reply.at
             except GeneratorExit:
                 steps.close()
                 raise
@@ -120,7 +134,7 @@ def limited(who: str, text: str, fate: str, steps: Procedure[T], longest: float 
         result: T = end.value
         return result
     except NoAnswer as error:
-        if came := visible(heard[:SHOWN].decode("latin-1").strip()):
+        if came := visible(looking.heard[:SHOWN].decode("latin-1").strip()):
             raise NoAnswer(f"{error}; what came is no reply ('{came}'): check dialect, baud and the line") from None
         raise
 

@@ -469,5 +469,7 @@ class Units(Generic[S]):
     """What a question prints: its axis, and how that counts; None: no quantity."""
     setting: Callable[[S, str], tuple[str, Takes] | None] | None = None
     """What a setting holds: its axis, and how that counts; None in place of it: as the line that assigns one."""
+    setting_name: Callable[[str, str], str] = lambda axis, name: name
+    """The name among the settings of a drive of one that the counting of an axis rests on."""
     target: Callable[[S], Procedure[Takes]] | None = None
     """Read what a field of `Takes.TARGET` means now."""

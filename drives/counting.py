@@ -7,36 +7,15 @@ hold, until a reading shows the settings that were accepted.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
-from typing import TYPE_CHECKING, Any, Protocol
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
 
 from multidrop.dialects.codec import Kind, Priority, Procedure, Request, at_priority
-from multidrop.dialects.family import Family
 from multidrop.dialects.state import DriveState
 from multidrop.dialects.values import Value, number
 
 if TYPE_CHECKING:
     from multidrop.dialects.units import Settings, Units
-
-
-class Counted(Protocol):
-    """A drive, as far as its counts need it."""
-
-    @property
-    def counting(self) -> Counting: ...
-    @property
-    def state(self) -> DriveState: ...
-    @property
-    def family(self) -> Family[Any]: ...
-
-
-def note(drives: Iterable[Counted], request: Request) -> None:
-    """Note a request for these drives, which may be executed, that may change what their axes count."""
-    if request.kind is Kind.PROGRAM:
-        return
-    for each in drives:
-        if each.counting.axes and not each.state.programming and each.family.units.recounts(request):
-            each.state.counts_may_have_changed()
 
 
 class Counting:
@@ -75,13 +54,19 @@ class Counting:
         """Whether the settings of every axis were read since the last thing that may have changed one."""
         return all(self._read[axis][0] == recounts for axis in self._accepted)
 
-    def contradicted(self, values: Mapping[str, Value]) -> bool:
+    def sent(self, request: Request, units: Units[Any], state: DriveState) -> None:
+        """Note a request that may be executed, if it may change what the axes with a scale count."""
+        stored = request.kind is Kind.PROGRAM or state.programming
+        if self._accepted and not stored and units.recounts(request):
+            state.counts_may_have_changed()
+
+    def contradicted(self, values: Mapping[str, Value], units: Units[Any]) -> bool:
         """Whether settings of a drive, by name, are other ones than were accepted for one of its axes."""
         return any(
-            number(values[key]) != float(accepted)
+            number(values[name]) != float(accepted)
             for axis, settings in self._accepted.items()
-            for name, accepted in settings
-            if (key := f"{name}_{axis}" if axis not in ("", "0") and axis.isdigit() else name) in values
+            for setting, accepted in settings
+            if (name := units.setting_name(axis, setting)) in values
         )
 
     def changes(self, axis: str) -> list[str]:

@@ -24,7 +24,7 @@ from multidrop.dialects.program_files import Held, ProgramFiles
 from multidrop.dialects.state import DriveState
 from multidrop.dialects.values import Value
 from multidrop.drives.conversations import ASKING, Conversation, Conversations, OnOver, awaited, refuse_stranger
-from multidrop.drives.counting import Counting, note
+from multidrop.drives.counting import Counting
 from multidrop.drives.events import Changed, Outcome, Transaction
 from multidrop.drives.line_checks import check_name, check_quantities
 from multidrop.drives.link import Link
@@ -425,7 +425,8 @@ class Drive:
             if transaction.request.kind not in ASKING:
                 commanded, self.commands = True, self.commands + transaction.sent
             if transaction.sent:
-                note(self._meant, transaction.request)
+                for each in self._meant:
+                    each.counting.sent(transaction.request, each.family.units, each.state)
 
         def over(outcome: Outcome[T]) -> None:
             self._neighbours.conversation_ended(self, address, commanded or isinstance(outcome.error, Stopped))

@@ -85,6 +85,8 @@ class Unsolicited(NamedTuple):
 
     at: float
     lines: tuple[str, ...]
+    greeting: bool = False
+    """They may be a gateway's greeting: the connection is new, and no drive has replied yet."""
 
 
 class Notice(NamedTuple):

@@ -236,8 +236,7 @@ class Leftovers:
         `answers_host`: whether only a question of a host makes a drive send a line.
         """
         if now <= self._sent_at + LATE:
-            ends = tuple(self._sent)
-            lines = tuple(each for each in lines if not (each.endswith(ends) and self._is_echo(each)))
+            lines = tuple(each for each in lines if not self._is_echo(each))
         if self.recovering:
             return (), lines
         if now > self._opened_at + LATE:
@@ -246,8 +245,11 @@ class Leftovers:
         return tuple(each for each in lines if each not in left), left
 
     def _is_echo(self, line: str) -> bool:
-        """Whether a line repeats a request, after a prompt at most."""
-        return any(line.endswith(each) and not line.removesuffix(each).strip(PROMPT) for each in self._sent)
+        """Whether a line repeats requests, one or several, after a prompt at most."""
+        rest = line
+        while own := max((each for each in self._sent if rest.endswith(each)), key=len, default=""):
+            rest = rest.removesuffix(own).rstrip("\r\n")
+        return rest != line and not rest.strip(PROMPT)
 
 
 CERTAINLY_OVER = 0.018

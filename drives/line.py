@@ -373,9 +373,8 @@ class Line:
         if found.reply.end in (End.TIMEOUT, End.DAMAGED):  # what came may be the late reply to a doubtful one
             self._doubt.stray(flight.request.codec.parse_unsolicited(heard)[0])
         weight = self._doubt.weigh(flight.request, found.reply, now, heard)
-        reply = copy_with(
-            found.reply, raw=heard[: found.used], doubtful=weight.doubtful, took=now - flight.transmitted_at
-        )
+        took = now - flight.transmitted_at
+        reply = copy_with(found.reply, raw=heard[: found.used], doubtful=weight.doubtful, took=took, at=now)
         reply = self._doubt.with_evidence(flight.request, reply)
         ended = Transaction(flight.request, reply, flight.sent_at, now, flight.transmitted_at, flight.sent)
         self._events.append(Finished(flight.ticket, ended))

@@ -28,6 +28,12 @@ HELD_UP = 0.01
 ECHO = "the adapter repeats what it sends: our own bytes are removed for this session, as with echo=local"
 UNASKED = 10.0
 """Time between two notices of what came without a question, s: another host may ask all the time."""
+UNLIKE_A_DRIVE = (
+    "no drive sends that by itself: another program uses this line, an adapter repeats, or a reply was late"
+)
+AS_GREETING = "not taken for a drive's output: it may be a gateway's greeting, or another program uses this line"
+GREETING = 2.0
+"""Time after a connection in which a gateway may greet, s; later, what comes is a drive's."""
 LONGEST_HEARD = 60
 """Most characters shown of a reply that was destroyed."""
 
@@ -73,7 +79,7 @@ class Link:
         self.debris, self.heard = Debris(), Heard()
         self.leftovers = Leftovers()
         self._counted = 0
-        self._came_unasked, self._unasked_said = 0, -inf
+        self._came_unasked, self._unasked_said, self._opened_at = 0, -inf, -inf
         self._orderly = False
         """The port was still open when it was shut."""
         self._rest: list[StopPiece] = []
@@ -89,7 +95,8 @@ class Link:
         self._answering = events.isolated(f"a conversation on {name}")
 
     def start(self) -> None:
-        self.leftovers.opened(self.now())
+        self._opened_at = self.now()
+        self.leftovers.opened(self._opened_at)
         self.transport.start(self._received, self._broke)
 
     @property
@@ -266,7 +273,8 @@ class Link:
         if request.kind is Kind.COMMAND or request.address in GLOBAL:
             self.departure.begins(f"{request.address}{request.text}")
         self.debris.request_written(data, request, now)
-        if request.address:  # the trace of a lone drive repeats lines that were sent to be stored
+        # The trace of a lone drive repeats lines that were sent to be stored, but no question of multidrop's.
+        if request.address or request.signed:
             self.leftovers.request_written(data, now)
         self.publish(events.Sent(now, request))
         self.publish(events.Traffic(now, True, data))
@@ -295,22 +303,25 @@ class Link:
                 lines = tuple(each for each in lines if each not in damaged)
         if unasked := [each for each in lines if not self.line.inbox.codec.printed(each)]:
             lines = tuple(each for each in lines if each not in unasked)
-            self._unasked(unasked, now)
+            self._unasked(unasked, now, "without a question", UNLIKE_A_DRIVE)
         lines, left = self.leftovers.divided(lines, self.line.inbox.codec.answers_host, now)
         if left:
             self.notify(f"left by a session before, not printed by a program: {_short(left)}", warning=True)
         if lines:
-            self.publish(events.Unsolicited(event.at, lines))
+            unproved = not self.heard.answered or self._held is not None
+            greeting = self.transport.network and unproved and now < self._opened_at + GREETING
+            if greeting:
+                self._unasked(lines, now, "before a drive replied", AS_GREETING)
+            self.publish(events.Unsolicited(event.at, lines, greeting))
 
-    def _unasked(self, lines: Sequence[str], now: float) -> None:
-        """Say, not too often, what came without a question where drives only reply."""
+    def _unasked(self, lines: Sequence[str], now: float, how: str, why: str) -> None:
+        """Say, not too often, what came and is not taken for a drive's output."""
         self._came_unasked += len(lines)
         if now < self._unasked_said + UNASKED:
             return
         more = f" ({self._came_unasked} in all)" if self._came_unasked > len(lines) else ""
         self._unasked_said = now
-        why = "no drive sends that by itself: another program uses this line, an adapter repeats, or a reply was late"
-        self.notify(f"received without a question{more}: {_short(lines)}; {why}", warning=True)
+        self.notify(f"received {how}{more}: {_short(lines)}; {why}", warning=True)
 
     # The end
 

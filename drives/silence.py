@@ -1,6 +1,7 @@
 """A line on which no drive has replied in this session: what came on it, and what may be the cause.
 
-One place for every front end and family. It explains each failure until the first reply; from then on the line works.
+One place for every front end and family. It explains each failure until the first reply; from then on the line works,
+unless another program takes its bytes.
 """
 
 from __future__ import annotations
@@ -19,17 +20,26 @@ ECHO = "only our own bytes came back (an adapter that repeats what it sends), an
 
 
 def explained(error: E, link: Link, family: str) -> E:
-    """Return the failure, with what came and the likely causes where no drive of the link has replied yet."""
+    """Return the failure, with what came and the likely causes where no drive of the link has replied yet.
+
+    Another program on the port is named at any time.
+    """
     if link.heard.answered:
-        return error
-    return type(error)(f"{error}; {reason(link, family)}")
+        other = link.transport.other_user()
+        return type(error)(f"{error}; {other}") if other else error
+    why = reason(link, family)
+    return type(error)(f"{error}; {why}") if why else error
 
 
 def reason(link: Link, family: str) -> str:
-    """Say what came in place of replies, and what to check."""
+    """Say what came in place of replies, and what to check; empty: whole messages came, and the failure names them."""
     check = NETWORK if link.transport.network else SERIAL
     came, echoed = link.heard.foreign(), link.heard.came
-    if not came:
-        return f"{ECHO if echoed else 'nothing was received'}; {check}"
-    text = seen(came, family)
-    return text + NOISE if text.endswith("another baud rate?") else f"{text}; {check}"
+    what = seen(came, family) if came else ECHO if echoed else "nothing was received"
+    if not what:
+        return ""
+    if other := link.transport.other_user():
+        return f"{what}; {other}"
+    advice = NOISE if came and what.endswith("another baud rate?") else f"; {check}"
+    suspects = link.transport.suspects()
+    return what + advice + (f"; a service may have the port open: {suspects}" if suspects else "")

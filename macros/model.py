@@ -136,7 +136,7 @@ def written(value: Value) -> str:
         return str(value)
     from decimal import Decimal  # takes 1 ms to import, and only a fraction wants it
 
-    text = format(Decimal(repr(value)), "f")
+    text = format(Decimal(repr(float(value))), "f")  # a number of NumPy has another repr
     return text.removesuffix(".0")
 
 

@@ -50,7 +50,7 @@ from multidrop.dialects.files import opened, text_of, toml_of, utf8_of, why
 from multidrop.dialects.text import NOT_FIRST, acts_first, visible
 from multidrop.macros.atomic import write_atomically
 from multidrop.shell.broken_configuration import TABLES, WrongConfiguration, salvage
-from multidrop.shell.file_owners import other_writer
+from multidrop.shell.file_owners import other_writer, places
 from multidrop.shell.roles import TIMES
 
 if TYPE_CHECKING:
@@ -241,7 +241,7 @@ def load(lenient: bool = False) -> Settings:
             return Settings()
         raise
     if writer := other_writer(path):
-        hint = f"chmod go-w {path.parent} {path}, or give both to your account"
+        hint = f"chmod go-w {' '.join(map(str, places(path)))}, or give them to your account"
         unused = Diagnostic(f"can be changed by {writer}, so it is not used", str(path), hint)
         if lenient:
             return Settings(problems=(unused,), in_doubt={"": str(unused)})

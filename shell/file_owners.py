@@ -9,6 +9,12 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
+
+def places(path: Path) -> list[Path]:
+    """A file and the folders in which it can be replaced; of a link that of its target, too."""
+    return list(dict.fromkeys((path, path.parent, path.resolve().parent)))
+
+
 if sys.platform == "win32":
 
     def other_writer(path: Path) -> str:
@@ -21,7 +27,7 @@ else:
 
     def other_writer(path: Path) -> str:
         """Who else can change a file, or put another one in its place, in words; empty: only its owner and root can."""
-        for each in (path, path.parent):
+        for each in places(path):
             state = os.stat(each)
             if state.st_uid not in (0, os.geteuid()):
                 return f"account {_name(pwd.getpwuid, state.st_uid)}, who owns {each}"

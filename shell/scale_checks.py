@@ -50,7 +50,9 @@ class ScaleChecks:
         """Take no scale to hold that settings which were read contradict."""
         bus = self.workspace.buses.get(event.bus) if isinstance(event, SettingsRead) else None
         drive = bus.drives.get(event.address) if bus is not None and isinstance(event, SettingsRead) else None
-        if drive is not None and isinstance(event, SettingsRead) and drive.counting.contradicted(event.readings.values):
+        if drive is None or not isinstance(event, SettingsRead):
+            return
+        if drive.counting.contradicted(event.readings.values, drive.family.units):
             drive.state.counts_may_have_changed()
 
     def _sampled(self, event: SessionEvent) -> None:

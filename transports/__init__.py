@@ -111,7 +111,7 @@ class Transport(ABC):
     control: PortControl | None = None
     """The settings of the port; None: it is not a serial port."""
     limits = ""
-    """The promises of others that it cannot keep, for a person who opens it."""
+    """What a person who opens it must know: promises of others that it cannot keep, another program on its port."""
     network = False
     """It leads to a network port, which may be a drive's own."""
     preemptible = False
@@ -162,6 +162,14 @@ class Transport(ABC):
         cannot do this.
         """
         return False
+
+    def other_user(self) -> str:
+        """Name a program of this machine that has the port open, too, and the remedy; empty: none is known."""
+        return ""
+
+    def suspects(self) -> str:
+        """Name the services that may have the port open, where nobody may look, and their remedies; empty: none."""
+        return ""
 
     def yielded(self, note: Callable[[bool], None] = lambda last: None) -> bool:
         """Take note of one `preempt`; return whether it was the last, so that the loop writes again.

@@ -17,7 +17,8 @@ from types import ModuleType
 from typing import Any
 
 from multidrop.transports import Unreachable, performax
-from multidrop.transports.serial_ports import PortInfo, holder, list_ports, natural
+from multidrop.transports.port_users import holder
+from multidrop.transports.serial_ports import PortInfo, list_ports, natural
 
 RULE = Path(__file__).with_name("60-multidrop-usb.rules")
 """The rule of udev that gives the users of this machine access."""

@@ -18,7 +18,8 @@ from typing import TypeVar
 import serial
 
 from multidrop.transports import PortControl, Transport, Unreachable
-from multidrop.transports.serial_ports import com_name, holder, present
+from multidrop.transports.port_users import TERMINALS, beside, holder, in_use, taker
+from multidrop.transports.serial_ports import com_name, present
 
 if sys.platform != "win32":
     import fcntl
@@ -30,7 +31,7 @@ if sys.platform != "win32":
 
     _REFUSALS: tuple[type[Exception], ...] = (ValueError, OverflowError, termios.error)
 else:
-    from multidrop.transports.serial_ports import mark
+    from multidrop.transports.port_users import mark
 
     _REFUSALS = (ValueError, OverflowError)
 
@@ -48,7 +49,7 @@ async def open_serial(port: str, baud: int = 9600) -> Transport:
     """Open a port by its name or path, at `baud` bits/s, and drop stale input. Raises Unreachable."""
     if baud < 1:
         raise Unreachable(f"{port}: invalid baud rate {baud}; give one such as 9600")
-    from multidrop.transports.pipe import DescriptorPipe, in_thread
+    from multidrop.transports.pipe import in_thread
     from multidrop.transports.threaded import ThreadedPipe, closing
 
     if sys.platform == "win32":
@@ -59,7 +60,9 @@ async def open_serial(port: str, baud: int = 9600) -> Transport:
         return ThreadedPipe(device, device.control)
     else:
         endpoint = await in_thread(lambda: opened(SerialEndpoint, port, baud), SerialEndpoint.close)
-        return DescriptorPipe(endpoint, endpoint.control)
+        from multidrop.transports.serial_pipe import SerialPipe
+
+        return SerialPipe(endpoint, endpoint.control, endpoint.other_user)
 
 
 def opened(kind: Callable[[str, int], T], port: str, baud: int) -> T:
@@ -81,7 +84,7 @@ def open_error(port: str, error: OSError) -> Unreachable:
 def _why(port: str, error: OSError) -> str:
     number = error.errno
     if number in (errno.EBUSY, errno.EAGAIN, errno.EWOULDBLOCK):
-        return f"{port} is in use by {holder(port) or 'another program'}; close it there"
+        return f"{port} is in use by {in_use(port)}"
     if number in (errno.EACCES, errno.EPERM):
         return f"no permission to open {port}; {_permission(port)}"
     if number in (errno.ENOENT, errno.ENODEV, errno.ENXIO, errno.ENOTDIR):
@@ -109,7 +112,7 @@ def _why_on_windows(port: str, text: str) -> str:
 
 
 def _nothing(port: str) -> str:
-    return f"no port {port}; plug it in, or see `multidrop ports`"
+    return f"no port {port}; plug it in, or see `multidrop ports`{taker()}"
 
 
 USUAL = "dialout"
@@ -263,8 +266,10 @@ if sys.platform != "win32":
                 raise OSError(*error.args) from error
             # Shut out programs that ignore pyserial's advisory lock. A pseudo-terminal is not claimed: it keeps the
             # mark while its other side is open, so a killed program would leave a port that cannot be opened again.
-            if not os.path.realpath(self.name).startswith("/dev/pts/"):
+            if not os.path.realpath(self.name).startswith(TERMINALS):
                 self._exclusive(termios.TIOCEXCL)
+            self.other_user = beside(port)
+            """The program that has the port open as well, with the remedy; empty: none was known at the opening."""
 
         def _exclusive(self, request: int) -> None:
             with contextlib.suppress(OSError):

@@ -1,9 +1,7 @@
-"""The serial ports of this machine, and the programs that have them open."""
+"""The serial ports of this machine."""
 
 from __future__ import annotations
 
-import contextlib
-import mmap
 import os
 import re
 import sys
@@ -91,18 +89,6 @@ def usb_names(ports: Iterable[ListPortInfo]) -> dict[str, str]:
     return {device: name for device, name in names.items() if ports_of[name] == 1}
 
 
-if sys.platform == "win32":
-
-    def _shared(port: str) -> mmap.mmap:
-        return mmap.mmap(-1, 4, tagname=f"multidrop {com_name(port)}".replace("\\", "/"))
-
-    def mark(port: str) -> mmap.mmap:
-        """Mark a port as this process's, until the mark is closed or the process ends."""
-        shared = _shared(port)
-        shared[:] = os.getpid().to_bytes(4, "little")
-        return shared
-
-
 def natural(name: str) -> list[tuple[int, str]]:
     """A sort key that puts COM9 before COM10."""
     return [(int(part), "") if part.isdigit() else (-1, part) for part in re.split(r"([0-9]+)", name)]
@@ -129,68 +115,3 @@ def _entries(folder: Path) -> list[Path]:
         return sorted(folder.iterdir())
     except OSError:
         return []
-
-
-def holder(device: str, root: Path = Path("/")) -> str:
-    """The program that has a port open, as `name (pid n)`; empty if none is known.
-
-    Looked at: the locks of the kernel, lock files, and on Linux the open files of every process that may be read. It
-    takes a few milliseconds. `root` is the folder of `proc` and `var`. Windows tells of none, so there it is the mark
-    of another multidrop.
-    """
-    if sys.platform == "win32":
-        with _shared(device) as shared:
-            pid = int.from_bytes(shared[:], "little")
-        return "" if not pid else "this program itself" if pid == os.getpid() else f"multidrop (pid {pid})"
-    else:
-        return lock_owner(device) or _with_lock_file(device, root) or _with_open_file(device, root)
-
-
-def lock_owner(port: str) -> str:
-    """The program that has locked this port, as `name (pid n)`; empty if unknown (only Linux reports it)."""
-    if sys.platform == "win32":
-        return ""
-    else:
-        try:
-            node = os.stat(port)
-            locks = Path("/proc/locks").read_text()
-        except OSError:
-            return ""
-        place = f"{os.major(node.st_dev):02x}:{os.minor(node.st_dev):02x}:{node.st_ino}"
-        for line in locks.splitlines():
-            fields = line.split()
-            if len(fields) > 5 and fields[1] == "FLOCK" and fields[5] == place and fields[4] != "0":
-                return "this program itself" if int(fields[4]) == os.getpid() else _program(fields[4], Path("/"))
-        return ""
-
-
-def _with_lock_file(device: str, root: Path) -> str:
-    """The program of a UUCP lock file, as minicom and picocom leave it; empty if that has ended."""
-    name = f"LCK..{Path(os.path.realpath(device)).name}"
-    for folder in ("run/lock", "var/lock", "var/lock/lockdev"):
-        try:
-            found = re.search(r"\d+", (root / folder / name).read_text(encoding="latin-1"))
-        except OSError:
-            continue
-        if found and (root / "proc" / found[0]).is_dir():
-            return _program(found[0], root)
-    return ""
-
-
-def _with_open_file(device: str, root: Path) -> str:
-    port = os.path.realpath(device)
-    for process in _entries(root / "proc"):
-        if process.name.isdigit() and int(process.name) != os.getpid():
-            for link in _entries(process / "fd"):
-                with contextlib.suppress(OSError):
-                    if os.readlink(link) == port:
-                        return _program(process.name, root)
-    return ""
-
-
-def _program(pid: str, root: Path) -> str:
-    try:
-        name = (root / "proc" / pid / "comm").read_text(encoding="utf-8", errors="replace").strip()
-    except OSError:
-        return f"pid {pid}"
-    return f"{name} (pid {pid})"

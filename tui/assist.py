@@ -129,7 +129,7 @@ class Assist:
 def _ports(state: Path) -> list[StartEntry]:
     from multidrop.shell.state.port_state import memory_of
     from multidrop.transports.controllers import all_ports
-    from multidrop.transports.serial_ports import holder
+    from multidrop.transports.port_users import holder
 
     entries = []
     for port in all_ports():

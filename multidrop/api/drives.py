@@ -15,16 +15,17 @@ from multidrop.api.events import Fault, fault_of
 from multidrop.api.fixed import Fixed
 from multidrop.api.pictures import table
 from multidrop.api.programs import AsyncParameters, AsyncPrograms
+from multidrop.api.values import seconds, short_text_of, text_of
 from multidrop.dialects import Diagnostic, DriveError, Family, Inexpressible, Motion, Refused
+from multidrop.dialects.text import visible
 from multidrop.dialects.units import QUANTITY
 from multidrop.dialects.values import DISABLE, ENABLE, Conditions
 from multidrop.dialects.values import Value as Fact
 from multidrop.drives.drive import still
-from multidrop.macros import model
 from multidrop.shell import stop_report, waits
 from multidrop.shell.events import By
 from multidrop.shell.line_syntax import join_target
-from multidrop.shell.scripts.expression import Value, Word, written
+from multidrop.shell.scripts.expression import Value, Word
 from multidrop.shell.scripts.questions import ask
 from multidrop.shell.travel import BEYOND
 from multidrop.shell.workspace import address_of
@@ -39,11 +40,13 @@ A = TypeVar("A", Motion, Conditions)
 
 def _amount(number: float, unit: str) -> int | str:
     """Whole steps, or a quantity as a line has it. Raises Diagnostic for another number, TypeError for such steps."""
+    if isinstance(number, bool):
+        raise TypeError(f"{number} is no number of steps")
     if not unit:
         return operator.index(number)  # type: ignore[arg-type]
-    text = f"{{{model.written(number)} {unit}}}"
+    text = f"{{{text_of(number, 'a quantity')} {unit}}}"
     if QUANTITY.fullmatch(text) is None:
-        raise Diagnostic(f"not a quantity: {number} {unit}", "", 'valid: as in move(12.5, "mm")')
+        raise Diagnostic(f"not a quantity: {visible(f'{number} {unit}')}", "", 'valid: as in move(12.5, "mm")')
     return text
 
 
@@ -199,7 +202,8 @@ class AsyncDrive(DriveFacts):
     async def write(self, name: str | int, value: Value) -> None:
         """Give a word of the drive a value. Raises Refused; Diagnostic where its language has no such form."""
         name = self._actions.word(str(name), self.axis)
-        line = self._drive.family.assign(name, written(value)) if _WORD.fullmatch(name) else None
+        text = value if isinstance(value, str) else short_text_of(value, f"{name} of {self.name}")
+        line = self._drive.family.assign(name, text) if _WORD.fullmatch(name) else None
         if line is None:
             raise Diagnostic(f"no line gives {name!r} a value", self.name, "send() takes any line of the drive")
         self._check_executes()
@@ -244,7 +248,7 @@ class AsyncDrive(DriveFacts):
         Raises MotionFailed where its last motion of this session did not end as it should, Timeout after `timeout`
         seconds, DriveError where a homing has ended with an error.
         """
-        drive, shell = self._drive, self._calls.shell
+        drive, shell, timeout = self._drive, self._calls.shell, seconds(timeout, "wait")
         await self._calls.run(lambda: waits.wait(shell, timeout, idle=idle, drives=[drive], said="wait"))
         for axis in [each for each in drive.homings if each not in drive.homed]:
             well = await self._calls.run(partial(drive.homing_ended, axis))
@@ -258,7 +262,7 @@ class AsyncDrive(DriveFacts):
 
         Raises MotionFailed once a motion of this session has failed, Timeout, Diagnostic.
         """
-        wanted, shell = waits.condition(condition), self._calls.shell
+        wanted, shell, timeout = waits.condition(condition), self._calls.shell, seconds(timeout, "wait_for")
         if wanted is None or wanted.target:
             raise Diagnostic(f"no condition {condition!r}", self.name, "valid: as in wait_for('I1=1')")
         wanted = replace(wanted, word=self._actions.word(wanted.word, self.axis))

@@ -7,6 +7,7 @@ import logging
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
+from math import inf
 from types import TracebackType
 from typing import TYPE_CHECKING, TypeVar
 
@@ -18,6 +19,7 @@ from multidrop.api.fixed import Fixed
 from multidrop.api.pictures import drives_table, table
 from multidrop.api.returns import Returns
 from multidrop.api.telemetry import RATE, AsyncTelemetry
+from multidrop.api.values import seconds, text_of
 from multidrop.dialects import Diagnostic, DriveError
 from multidrop.dialects.errors import Timeout
 from multidrop.drives.events import isolated
@@ -148,7 +150,8 @@ class AsyncSession(Fixed):
 
     async def wait_back(self, timeout: float = waits.LIMIT) -> None:
         """Wait until every lost connection is back. Raises Timeout, and Lost where one is not tried again."""
-        await self._calls.run(lambda: self._back(timeout))
+        limit = seconds(timeout, "wait_back")
+        await self._calls.run(lambda: self._back(limit))
         if self._calls.returns is not None:
             await self._calls.returns.compared()
 
@@ -236,7 +239,8 @@ class AsyncSession(Fixed):
         from multidrop.shell.scripts.executor import run_script
         from multidrop.shell.scripts.reading import read_script  # with all verbs, which few programs need
 
-        script = read_script(file, {name: str(value) for name, value in values.items()}, self._shell.macros)
+        texts = {name: text_of(value, f"{name} of {file}") for name, value in values.items()}
+        script = read_script(file, texts, self._shell.macros)
         results: list[Result] = []
         await self._calls.run(lambda: run_script(self._shell, script, results.append))
         return Run(file, tuple(results))
@@ -269,6 +273,8 @@ class AsyncSession(Fixed):
 
         `every`: seconds between two readings of a drive.
         """
+        if not (isinstance(every, (int, float)) and 0 < every < inf):  # with NaN nothing would ever be read
+            raise Diagnostic(f"no period {every!r}", "events", "valid: above 0, in seconds")
         drives = [self._found(each) for each in addresses] or [each._drive for each in self.drives]
         return self._calls.kept(AsyncEvents(self._shell, drives, every))
 

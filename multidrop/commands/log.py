@@ -110,8 +110,7 @@ def judge(chosen: argparse.Namespace) -> int:
 
     code = _reported(work)
     if found.unreadable:
-        lines = counted(len(found.unreadable), "line cannot be read", "lines cannot be read")
-        write(sys.stderr, f"{lines}, first {found.unreadable[0]}: what they held was not judged")
+        write(sys.stderr, files.left_out(found.unreadable, "judged"))
     counts = [counted(found.commands, "command"), counted(found.stops, "stop")]
     counts += [counted(found.gaps, "gap")] * bool(found.gaps) + ["older sessions left out"] * bool(found.unmarked)
     held = "no breach in the rest" if found.unreadable or found.gaps else f"all {len(RULES)} rules held"
@@ -185,27 +184,32 @@ def _time(moment: datetime) -> str:
 
 
 def bisect(chosen: argparse.Namespace) -> int:
-    """Print the first difference between two runs; the exit code says whether there is any."""
+    """Print the first difference between two runs; the exit code says whether there is any, or may be."""
     from multidrop.shell.log import moments
 
     runs = [moments.Run(Path(file)) for file in (chosen.file1, chosen.file2)]
     found = moments.first_difference(*runs)
     lines = [None if index is None else run.line(index) for run, index in zip(runs, found or (None, None), strict=True)]
+    damaged = [place for file in (chosen.file1, chosen.file2) for place in files.damaged(Path(file))]
+    if damaged:
+        write(sys.stderr, files.left_out(damaged, "compared"))
 
     def work() -> None:
         if chosen.json:
             both = [None if line is None else {"where": line.where, **json.loads(line.data)} for line in lines]
             fact = {"differ": found is not None, "lines": [len(run.steps) for run in runs], "first": both}
+            fact |= {"unreadable": damaged} if damaged else {}
             write(sys.stdout, json.dumps(fact))
         elif found is None:
-            write(sys.stdout, f"no difference in {counted(len(runs[0].steps), 'line')}")
+            readable = " that can be read" if damaged else ""
+            write(sys.stdout, f"no difference in {counted(len(runs[0].steps), 'line')}{readable}")
         else:
             for file, run, line in zip((chosen.file1, chosen.file2), runs, lines, strict=True):
                 none = f"{file}: nothing: its run has {counted(len(run.steps), 'line')}"
                 entry = None if line is None else line.entry
                 write(sys.stdout, none if line is None or entry is None else f"{line.where}: {text(entry)}")
 
-    return _reported(work) or (DIFFERENT if found else 0)
+    return _reported(work) or (DIFFERENT if found or damaged else 0)
 
 
 def _stamp(entry: Entry) -> str:
@@ -217,6 +221,8 @@ def replay(chosen: argparse.Namespace) -> int:
     found = steps.read(Path(chosen.file))
     if not found.steps:
         raise Diagnostic("no line of the log was sent to a drive", chosen.file, "/log before the lines keeps them")
+    if found.damaged:  # a stop may be missing
+        write(sys.stderr, files.left_out(found.damaged, "sent"))
     from multidrop.shell.batch import runner
     from multidrop.shell.batch.replay import ReplayReport, VirtualLoop
     from multidrop.shell.batch.replay import replay as run

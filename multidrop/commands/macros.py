@@ -92,6 +92,8 @@ def _store() -> MacroStore:
 
 def _run(command: list[str], otherwise: str) -> None:
     """Run an editor to its end; Ctrl+C is its own. Raises Diagnostic where it cannot run or fails."""
+    import errno
+    import shutil
     import subprocess
 
     before = signal.getsignal(signal.SIGINT)
@@ -99,7 +101,9 @@ def _run(command: list[str], otherwise: str) -> None:
         with subprocess.Popen(command) as process:
             signal.signal(signal.SIGINT, signal.SIG_IGN)
             code = process.wait()
-    except OSError as error:
+    except OSError:
+        if shutil.which(command[0]) is None:  # a folder of the PATH that may not be read gives another reason
+            error = FileNotFoundError(errno.ENOENT, "")
         raise Diagnostic(f"cannot run ({why(error)})", command[0], f"set VISUAL or EDITOR; {otherwise}") from None
     finally:
         signal.signal(signal.SIGINT, before)

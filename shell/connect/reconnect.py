@@ -321,6 +321,9 @@ class _Return:
                 self._stopped = ", ".join(drive.shown for drive in halt.affected) or "every drive"
                 why = f"'{cut}' was cut off by the loss" if cut else "the loss kept it from the drives"
                 self._say(f"{bus.name}: the stop of {self._stopped} was sent first ({why})")
+            if (limits := bus.link.transport.limits) and limits not in self._said:
+                self._said.add(limits)
+                self._say(f"{bus.name}: {limits}")
         await bus.find_again(self._way.hints)
 
     def _failed(self, reason: str) -> None:

@@ -24,6 +24,7 @@ from multidrop.shell import stop_report
 from multidrop.shell.channel import Job, running
 from multidrop.shell.connect.opening import BAUDED, Opened, Opener, far_port, port_name
 from multidrop.shell.connect.urls import DIRECT, Connection, with_echo
+from multidrop.shell.finding.limits import searched
 from multidrop.shell.state.port_state import memory_of
 from multidrop.shell.workspace import Workspace
 from multidrop.transports import TransportLost
@@ -443,7 +444,7 @@ class Scanning:
 
         reach = replace(reach, asks=asks, cut=hints.cut, first_mark=hints.first_mark)
         with bus.link.received() as heard:
-            outcome = await bus.search(stage.scan.search(reach, found, step))
+            outcome = await searched(bus, stage.scan, reach, found, step)
         self._other = spoken(bytes(heard), stage.family) or self._other
         self._warn(f"{port}: {stage.words}", filter(None, (*outcome.remarks, self._other)))
 
@@ -475,7 +476,7 @@ async def extend(workspace: Workspace, bus: Bus) -> list[str]:
         job(done, total)
 
     with running(workspace, f"{bus.name}: scan") as job:
-        outcome = await bus.search(scan.search(reach, found.append, step))
+        outcome = await searched(bus, scan, reach, found.append, step)
     for each in outcome.remarks:
         workspace.notify(f"{bus.name}: {each}", bus=bus.name, warning=True)
     await bus.add(found)

@@ -12,14 +12,17 @@ from __future__ import annotations
 import contextlib
 import json
 import os
-from collections.abc import Iterator
+import re
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from datetime import datetime
+from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from multidrop.dialects import Diagnostic
 from multidrop.dialects.files import opened, why
+from multidrop.dialects.text import counted
 from multidrop.macros.atomic import private_folder, read_private, write_atomically
 from multidrop.shell.configuration import Settings
 from multidrop.shell.secrets import without_secrets
@@ -221,3 +224,29 @@ def whole(path: Path) -> Iterator[Line]:
     """The lines of a log and of its rotated parts, the oldest first. Raises Diagnostic."""
     for each in parts(path):
         yield from lines(each)
+
+
+_FORM = re.compile(rb'\{"time": ".*\}\n', re.S)
+_BEGINS = re.compile(rb'\{"time": "[^"]*", "kind": "log", "text": "' + BEGIN.encode())
+
+
+def damaged(path: Path) -> list[str]:
+    """The places of lines in the last session of a log that are no entries, by their form. Raises Diagnostic."""
+    found: list[str] = []
+    for each in parts(path):
+        try:
+            with opened(each) as file:
+                for number, data in enumerate(iter(partial(file.readline, LONGEST), b""), 1):
+                    if _BEGINS.match(data):
+                        found = []
+                    elif not _FORM.fullmatch(data) and data.strip():
+                        found.append(f"{each}:{number}")
+        except (OSError, ValueError) as problem:
+            raise Diagnostic(f"cannot be read: {why(problem)}", str(each)) from None
+    return found
+
+
+def left_out(places: Sequence[str], fate: str) -> str:
+    """Say that lines cannot be read, and what was not done with them."""
+    lines = counted(len(places), "line cannot be read", "lines cannot be read")
+    return f"{lines}, first {places[0]}: what they held was not {fate}"

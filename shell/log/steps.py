@@ -66,6 +66,8 @@ class Steps:
     unsent: int = 0
     """The lines that were never sent."""
     polls: list[Exchange] = field(default_factory=list)
+    damaged: list[str] = field(default_factory=list)
+    """The places of lines that cannot be read."""
 
 
 def read(path: Path) -> Steps:
@@ -81,7 +83,9 @@ def read(path: Path) -> Steps:
     for line in lines:
         if line.entry is not None:
             found.take(line.where, line.entry)
-    return found.whole()
+    whole_ = found.whole()
+    whole_.damaged = [line.where for line in lines if line.entry is None and line.data.strip()]
+    return whole_
 
 
 class _Reader:

@@ -75,7 +75,7 @@ class Printer:
             for row in laid_out(visible(event.text, tabs=True), get_terminal_size().columns):
                 self._write(sys.stdout, row)
         elif isinstance(event, OnBus):
-            if self._unsolicited and isinstance(event.event, Unsolicited):
+            if self._unsolicited and isinstance(event.event, Unsolicited) and not event.event.greeting:
                 self._write(sys.stdout, *event.event.lines, spare=True)
         elif isinstance(event, Output | Printed):
             self._write(sys.stdout, event.text)

@@ -1,8 +1,8 @@
 """Draw mutants and try them. Run: `make mutants ROOM=drives N=100 SEED=7`; without ROOM, N in each room.
 
 Prints what saw each, and a line for each room: `drives: 92 of 100 seen`. A mutant that behaves as the program does is
-marked in `soak/drawn/equivalent.csv`, with the reason, and is not drawn. `make unmeasured` measures again which tests
-execute which line.
+marked in `soak/drawn/equivalent.csv`, with the reason, and is not drawn. `make map` measures again which tests execute
+which line.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         tests_of.keep(tests_of.measured(data, durations.read_text(), quick.read_text().split()))
         return 0
     if not tests_of.FILE.exists() and not chosen.list:
-        print(f"{tests_of.FILE} is missing; `make unmeasured` makes it", file=sys.stderr)
+        print(f"{tests_of.FILE} is missing; `make map` makes it", file=sys.stderr)
         return 2
     rooms = [chosen.room] if chosen.room else list(ROOMS)
     lines = [_room(room, chosen) for room in rooms]

@@ -1,4 +1,4 @@
-"""Which tests execute a line: measured by `make unmeasured`, kept in `tests.json.xz`, and read here.
+"""Which tests execute a line: measured by `make map`, kept in `tests.json.xz`, and read here.
 
 A function of the product is divided into blocks: lines that the same tests execute. A line is counted from the first
 line of its function, so that a change elsewhere in the file moves nothing. A line that is new has the tests of all
@@ -13,6 +13,7 @@ import re
 import sqlite3
 from collections import Counter, defaultdict
 from collections.abc import Iterable
+from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
@@ -21,8 +22,8 @@ from soak.drawn.operators import functions
 from soak.drawn.rooms import ROOMS, ROOT, files
 
 FILE = Path(__file__).with_name("tests.json.xz")
-MOST = 24
-"""Greatest number of tests that are kept of a block: the fastest ones, and as many that execute least else."""
+FASTEST, CLOSEST = 12, 24
+"""How many tests are kept of a block: the fastest ones, those that execute least else, and the fastest of each file."""
 UNTIMED = 0.01
 """s; a test for which pytest printed no duration."""
 
@@ -79,7 +80,7 @@ def measured(data: Path, durations: str, quick: Iterable[str]) -> Map:
     """Make a map of a coverage file with a context for each test. `quick`: nodes of the tests of `make quick`."""
     times, fast = seconds(durations), {function(each) for each in quick}
     executed: dict[str, dict[int, set[str]]] = defaultdict(lambda: defaultdict(set))
-    with sqlite3.connect(data) as database:
+    with closing(sqlite3.connect(data)) as database:
         names = {number: function(name) for number, name in database.execute("select id, context from context")}
         paths = {number: _path(name) for number, name in database.execute("select id, path from file")}
         for file, context, begin, end in database.execute("select file_id, context_id, fromno, tono from arc"):
@@ -116,10 +117,16 @@ def _compact(executed: dict[str, dict[int, set[str]]], times: dict[str, float], 
 
 
 def _chosen(tests: set[str], times: dict[str, float], weights: Counter[str]) -> set[str]:
-    """Some of the tests of a line: the fastest, and those that execute least else, which are about it."""
-    fastest = sorted(tests, key=lambda each: (times[each], each))[: MOST // 2]
-    closest = sorted(tests, key=lambda each: (weights[each], each))[: MOST // 2]
-    return {*fastest, *closest}
+    """Some of the tests of a line: the fastest, those that execute least else (they are about it), one of each file.
+
+    A line that every session runs is seen by the tests of one promise, in a file that the other two do not reach.
+    """
+    fastest = sorted(tests, key=lambda each: (times[each], each))
+    closest = sorted(tests, key=lambda each: (weights[each], each))[:CLOSEST]
+    of_files = dict[str, str]()
+    for each in fastest:
+        of_files.setdefault(each.partition("::")[0], each)
+    return {*fastest[:FASTEST], *closest, *of_files.values()}
 
 
 def keep(made: Map) -> None:

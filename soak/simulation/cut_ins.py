@@ -56,6 +56,8 @@ WRITING = (
     "line Line._launch",
 )
 """The points on the way of a line to the wire."""
+STEP, STEPS = ("line", 8) if sys.version_info[:2] == (3, 12) else ("opcode", 1)
+"""What is counted, and how many instructions it stands for. Python 3.12 crashes where instructions are traced."""
 HELD = 0.02
 """The longest time, s, for which the stop's thread is held up while the loop waits."""
 OWN_WORK = 1500
@@ -190,7 +192,7 @@ class CutIns:
     def _called(self, frame: FrameType, event: str, argument: Any) -> Any:
         if self._run is None or frame.f_code.co_filename not in self._files:
             return None
-        frame.f_trace_opcodes = True
+        frame.f_trace_opcodes = STEP == "opcode"
         return self._traced
 
     def _traced(self, frame: FrameType, event: str, argument: Any) -> Any:
@@ -201,9 +203,9 @@ class CutIns:
             if not self._aim.point or name == self._aim.point:
                 self._passes -= 1
                 if not self._passes:
-                    self._further = self._aim.further
+                    self._further = self._aim.further // STEPS
                     self._passed(name or "a line between two points")
-        elif event == "opcode" and not self._passes:
+        if event == STEP and not self._passes:
             self._further -= 1
             if self._further < 0:
                 run = self._run
@@ -213,7 +215,7 @@ class CutIns:
 
     def _cut_in(self, aim: Aim, work: Callable[[], None]) -> None:
         self.thread = thread = Beside(lambda: self._beside(work))
-        self._own = aim.own
+        self._own = -(-aim.own // STEPS)
         thread.go()
         if not thread.over and thread.waits is None and self._run is None:  # held up
             self._trace(Aim("", 1, aim.others), self.hurry)
@@ -230,11 +232,11 @@ class CutIns:
     def _called_beside(self, frame: FrameType, event: str, argument: Any) -> Any:
         if not self._own or frame.f_code.co_filename not in self._files:
             return None
-        frame.f_trace_opcodes = True
+        frame.f_trace_opcodes = STEP == "opcode"
         return self._traced_beside
 
     def _traced_beside(self, frame: FrameType, event: str, argument: Any) -> Any:
-        if event == "opcode" and self._own:
+        if event == STEP and self._own:
             self._own -= 1
             if not self._own and self.thread is not None:
                 self._passed(UP)

@@ -22,7 +22,7 @@ from multidrop.drives import pacing
 from multidrop.shell.connect import reconnect
 from multidrop.simulator.lexium import power
 from multidrop.simulator.serving.running import Listener, RunningFloor
-from multidrop.transports import libusb, relay, serial_port, serial_ports, sockets, ssh_session
+from multidrop.transports import libusb, relay, serial_pipe, serial_port, serial_ports, sockets, ssh_session
 from soak.simulation.far import SshProgram
 from soak.simulation.network import Network, Socket
 from soak.simulation.pacer import Pacer
@@ -223,10 +223,10 @@ class Kernel:
         """The links of all adapters, by their nodes."""
         return {each.node: each.link for each in self.adapters if each.node}
 
-    def holder(self, path: str) -> str:
-        """The program that has a port open."""
+    def in_use(self, path: str) -> str:
+        """The program that has a port open, and the remedy."""
         found = self.found(path)
-        return OTHER if found is not None and found.held else ""
+        return f"{OTHER if found is not None and found.held else 'another program'}; close it there"
 
     @contextlib.contextmanager
     def installed(self) -> Iterator[None]:
@@ -243,7 +243,10 @@ class Kernel:
             (serial_port, "termios", tty),
             (serial_port, "fcntl", SimpleNamespace(ioctl=lambda *given: 0)),
             (serial_port, "output_queue", self.unsent),
-            (serial_port, "holder", self.holder),
+            (serial_port, "in_use", self.in_use),
+            (serial_port, "beside", lambda port: ""),
+            (serial_pipe, "beside", lambda port: ""),
+            (serial_pipe, "suspects", lambda port: ""),
             (libusb, "LibusbCarrier", self.usb),
             (sockets, "socket", _like(socket, socket=self.socket)),
             (sockets, "output_queue", self.unsent),

@@ -12,6 +12,7 @@ from collections.abc import Iterator
 from contextlib import suppress
 from math import inf
 
+from multidrop.dialects.mcode.manual.errors import BY_ITSELF as MACHINES
 from multidrop.transports.relay import Garbled
 from soak.languages import TICKS
 from soak.simulation.departures import for_drives
@@ -39,7 +40,8 @@ BARE_REFUSAL = Grant("a refusal of noise, without a checksum", "A refusal withou
 BARE_COMMAND = Grant("a damaged command without a checksum", "Noise on the line")
 FLAG_CLEARED = Grant("a flag that a program clears", "A flag that a program clears")
 NO_SIGN = Grant("a mode without a sign of execution", "0010")
-ITS_OWN = "or that came by itself and it was executed"
+ITS_OWN = re.compile(r"or that came by itself and it was executed|NAK, maybe for error (\d+)")
+"""The host's words where a motion before the command may have had the error; the second names it."""
 BY_ITSELF = Grant("an error that a motion may have had, too", "What a report means")
 RUNS = Grant("a program that runs in the drive", "What a report means")
 STOP_PIECE = re.compile(rb"ABORT|SR[01]=0")
@@ -227,7 +229,8 @@ def _unknown(world: World) -> Iterator[str | Granted]:
             continue
         runs = command.ended >= history.told.programs.get(command.line, inf)
         grant = NO_SIGN if world.place(command.line).em == 2 else RUNS if runs else None
-        grant = BY_ITSELF if ITS_OWN in command.said else grant
+        own = ITS_OWN.search(command.said)
+        grant = BY_ITSELF if own and (own[1] is None or int(own[1]) in MACHINES) else grant
         yield Granted(grant, words) if grant else words
 
 

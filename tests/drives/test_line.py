@@ -200,6 +200,18 @@ def test_a_write_that_the_transport_drops_is_no_half_sent_line_and_ends_as_not_s
     assert not ended.transaction.sent and ended.reply.end is End.STOPPED
 
 
+def test_after_a_break_nothing_is_written_until_the_wire_has_been_quiet():
+    line = Line(QUIETLY)
+    line.ask(request("MR 1"))
+    line.ask(request("PR V"))
+    line.events(0.0)
+    flight = line.cut_off(1.0, begun=False)
+    assert flight is not None and flight.request.text == "MR 1" and not line.waiting
+    line.ask(request("PR P"))
+    run = LineRun(line, 3.0, {1.05: b"\r\n"}, start=1.0)
+    assert run.written[0] == (round(1.05 + QUIET, 4), b"PR P\r")
+
+
 @pytest.mark.parametrize("every", [0.005, 0.02, 0.033, 0.05, 0.1])
 def test_a_stop_key_that_is_held_down_keeps_no_piece_of_the_stop_from_the_wire(every):
     line = Line(MCode())

@@ -68,13 +68,40 @@ async def test_a_move_that_was_executed_is_never_called_refused(em, name, foreig
     await line.bus.close()
 
 
-@for_each("foreign", FOREIGN)
-async def test_the_error_of_another_client_of_a_drive_on_the_network_is_an_old_one(foreign):
+@for_each(
+    "em, name, foreign, at",
+    [
+        (em, name, text, at / 1000)
+        for em in range(4)
+        for name in ("", "a")
+        for text in FOREIGN
+        for at in (0, 14, 28, 49)
+        if em != 2 or "=" not in text  # an error that the setting can have, within the ms behind the reading of EF
+    ],
+)
+async def test_a_setting_that_was_executed_is_never_called_refused(em, name, foreign, at):
+    line = await SimulatedBus(party("a", EM=em, CK=0) if name else ALONE.format(em, 0)).open(*filter(None, [name]))
+    loop = asyncio.get_running_loop()
+    loop.call_later(at, other, line, f"{name}{foreign.strip()}".encode() + (b"\n" if name else b"\r"))
+    try:
+        await line.send(name, "VM=500000")
+        certainly = False
+    except DriveError as error:
+        certainly = isinstance(error, Refused) and error.certain
+    await asyncio.sleep(2.0)
+    [device] = line.devices.values()
+    if device.memory.values["VM"] == 500000:
+        assert not certainly, line.said
+    await line.bus.close()
+
+
+@for_each("foreign, text", [(foreign, text) for foreign in FOREIGN for text in ("MR 100", "VM=500000", "R1=5", "S")])
+async def test_the_error_of_another_client_of_a_drive_on_the_network_is_an_old_one(foreign, text):
     line = await SimulatedBus(ETHERNET, baud=0).open()
     [device] = line.devices.values()
     device.execute(foreign.strip(), line.floor.now())  # its reply goes to that client
     assert device.memory.error_flag
-    assert await outcome(line, "", "MR 100") == "done" and "an old error, now cleared" in line.said
+    assert await outcome(line, "", text) == "done" and "an old error, now cleared" in line.said
     await line.bus.close()
 
 

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from decimal import Decimal
+from fractions import Fraction
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -50,8 +53,13 @@ async def test_what_cannot_be_is_refused_and_nothing_moves(saved: tuple[str, str
         with pytest.raises(TypeError):
             await a.move(12.5)
         for number in (float("nan"), float("inf")):
-            with pytest.raises(Diagnostic, match="not a quantity"):
+            with pytest.raises(Diagnostic, match="no value for a line"):
                 await a.move(number, "mm")
+        with pytest.raises(Diagnostic, match=r"not a quantity: 5\\x0aMR 5 mm"):
+            await a.move("5\nMR 5", "mm")  # type: ignore[arg-type]
+        for truth in ("mm", ""):
+            with pytest.raises(TypeError):
+                await a.move(True, truth)
         with pytest.raises(Diagnostic, match="after rounding"):
             await a.move(1e-12, "mm")
         for unit, named in (
@@ -92,3 +100,56 @@ def test_the_same_blocking(saved: tuple[str, str]) -> None:
         a.move(0.5, "mm")
         a.wait()
         assert (a.position, a.position_in("mm"), a.velocity_in("mm/s")) == (5120, 0.5, 0)
+
+
+class NumPy(float):
+    """A float as NumPy has it: its repr is no number."""
+
+    def __repr__(self) -> str:
+        return f"np.float64({float(self)!r})"
+
+
+@pytest.mark.virtual
+async def test_numbers_of_other_libraries_are_numbers(saved: tuple[str, str], tmp_path: Path) -> None:
+    (tmp_path / "speed.txt").write_text("VM={SPEED}\nPR VM\n")
+    async with connect_async(saved[0]) as session:
+        a = session.drive("a")
+        for number in (NumPy(0.1), Decimal("0.1"), Fraction(1, 10)):
+            await a.move_to(number, "mm")  # type: ignore[arg-type]
+            await a.wait()
+            assert await a.position() == 1024
+            await a.move_to(0)
+            await a.wait()
+        for value in (NumPy(500_000), 500_000.0, Decimal(500_000), "500000"):
+            await a.write("VM", 400_000)
+            await a.write("VM", value)  # type: ignore[arg-type]
+            assert await a.read("VM") == 500_000
+            run = await session.run(str(tmp_path / "speed.txt"), SPEED=value)
+            assert run.results[-1].printed == ("500000",)
+        await a.write("EE", True)
+        assert await a.read("EE") == 1
+
+
+@pytest.mark.virtual
+@pytest.mark.parametrize("value", [float("nan"), float("inf"), Decimal("NaN"), None, [5], b"5", 1e-12])
+async def test_what_is_no_number_is_not_sent_to_a_drive(saved: tuple[str, str], tmp_path: Path, value: Any) -> None:
+    (tmp_path / "speed.txt").write_text("VM={SPEED}\n")
+    async with connect_async(saved[0]) as session:
+        with pytest.raises(Diagnostic):
+            await session.drive("a").write("VM", value)
+        with pytest.raises(Diagnostic):
+            await session.run(str(tmp_path / "speed.txt"), SPEED=value)
+        assert await session.drive("a").read("VM") == 768_000
+
+
+@pytest.mark.virtual
+@pytest.mark.parametrize("limit", [float("nan"), -1, "5", None])
+async def test_a_wait_without_a_time_limit_that_is_one_is_refused(saved: tuple[str, str], limit: Any) -> None:
+    """A wait until NaN would never end, and a watch with such a period never read anything."""
+    async with connect_async(saved[0]) as session:
+        a = session.drive("a")
+        for waiting in (a.wait(limit), a.wait_for("P=5", limit), session.wait_back(limit)):
+            with pytest.raises(Diagnostic, match="no timeout"):
+                await waiting
+        with pytest.raises(Diagnostic, match="no period"):
+            session.events(every=limit)

@@ -252,6 +252,24 @@ def test_bisect_refuses_a_file_that_has_no_entry_of_this_version(log, done, tmp_
         assert (code, lines) == (2, []) and "one JSON object a line" in err, words
 
 
+@pytest.mark.parametrize("torn", [b"{\n", b'{"time": "2026', b"\x00\xff\n", b"x" * 3_000_000 + b"\n"])
+def test_bisect_and_replay_say_what_they_cannot_read(torn, log, done, tmp_path, multidrop):
+    other, lines = tmp_path / "other.jsonl", [line_of(each) for each in ENTRIES]
+    begin = b'{"time": "2026-11-22T11:40:00+00:00", "kind": "log", "text": "session of process 7", "format": 1}\n'
+    other.write_bytes(torn.rstrip(b"\n") + b"\n" + begin + b"".join(lines))  # a session before was cut off
+    log.write_bytes(begin + b"".join(lines))
+    assert done("bisect", log, other)[0] == 0
+    other.write_bytes(begin + b"".join(lines) + torn)
+    code, [said], [err] = done("bisect", log, other)
+    place = f"{other}:{len(lines) + 2}"
+    assert code == 1 and said.endswith("that can be read")
+    assert err.endswith(f"cannot be read, first {place}: what they held was not compared")
+    assert (
+        f"first {place}: what they held was not sent"
+        in multidrop("log", "replay", str(other), "--to", "sim:", "--yes").stderr
+    )
+
+
 def test_bisect_names_a_damaged_line_at_the_first_difference(log, done, tmp_path):
     other = tmp_path / "other.jsonl"
     damaged = [*map(line_of, ENTRIES)]

@@ -22,7 +22,7 @@ from multidrop.shell.configuration import Settings
 from multidrop.shell.session import Session
 from multidrop.shell.signals import early_ends
 from multidrop.transports import Transport, TransportLost, Unreachable, ssh_session
-from multidrop.transports.serial_ports import lock_owner
+from multidrop.transports.port_users import User, lock_owner
 from multidrop.transports.ssh import FarPort
 from multidrop.transports.ssh_session import open_ssh, reason
 from tests.support.cell_session import bus, party
@@ -35,8 +35,8 @@ pytestmark = pytest.mark.fork
 CELL = bus("press", party("a"), baud=0)
 
 
-def pid_of(owner: str) -> int:
-    return int(owner.rpartition("pid ")[2].rstrip(")") or 0)
+def pid_of(owner: User | None) -> int:
+    return owner.pid if owner is not None else 0
 
 
 def ssh_here() -> int:

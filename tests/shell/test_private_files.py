@@ -140,6 +140,17 @@ def test_a_configuration_that_everyone_can_write_is_not_used(config: Path, mode:
         configuration.load()
 
 
+def test_a_configuration_that_is_a_link_into_a_folder_of_everyone_is_not_used(config: Path, tmp_path: Path) -> None:
+    shared = tmp_path / "shared"
+    shared.mkdir()
+    config.rename(shared / "real.toml")
+    config.symlink_to(shared / "real.toml")
+    assert "press" in configuration.load().connections
+    shared.chmod(0o777)
+    with pytest.raises(Diagnostic, match=f"every account.* chmod go-w {config} .*{shared}"):
+        configuration.load()
+
+
 @pytest.mark.skipif(getattr(os, "geteuid", lambda: 1)() != 0, reason="only root can give files away")
 def test_a_configuration_of_another_account_or_a_shared_group_is_not_used(config: Path) -> None:
     os.chown(config, 65534, -1)

@@ -11,6 +11,7 @@ import pytest
 
 from multidrop.api.telemetry import AsyncTelemetry
 from multidrop.dialects import DriveError
+from multidrop.dialects.tmcl.manual.commands import Axis, Call, Command
 from multidrop.drives.events import Sample
 from multidrop.shell import setting_units, snapshots
 from multidrop.shell.events import Notified, Output
@@ -289,6 +290,18 @@ async def test_settings_that_were_read_contradict_a_scale(tmp_path: Path, monkey
         shop.device("press:a").execute("MS=128", shop.floor.now())
         await shop.session.run("/params backup two.toml")
         assert units.given(drive, "", 51200) is None
+
+
+async def test_settings_of_a_second_motor_contradict_its_scale(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    scales = 'units = { 0 = "5 mm/turn", 1 = "5 mm/turn" }'
+    async with CellSession(tmp_path, bus("feeds", drive("TMCM-6110", "1", scales))) as shop:
+        module, units = shop.session.drive("feeds", "1"), shop.session.units
+        await shop.session.run("/params backup one.toml")
+        assert units.given(module, "0", 51200) and units.given(module, "1", 51200) == (5.0, "mm")
+        shop.device("feeds:1").carry_out(Call(Command.SAP, Axis.MICROSTEPS, 1, 4), shop.floor.now())
+        await shop.session.run("/params backup two.toml")
+        assert units.given(module, "1", 51200) is None
 
 
 async def test_a_drive_that_was_switched_off_and_on_is_not_shown_in_units_before_its_settings_are_read(

@@ -11,6 +11,7 @@ import re
 import sqlite3
 import sys
 from collections import Counter, defaultdict
+from contextlib import closing
 from pathlib import Path
 
 SHARE = 0.985
@@ -47,7 +48,7 @@ def main(data: str, durations: str) -> None:
     for line in Path(durations).read_text().splitlines():
         if found := re.match(r"([\d.]+)s (?:call|setup|teardown)\s+(\S.*)$", line):
             times[function(found[2])] += float(found[1])
-    with sqlite3.connect(data) as database:
+    with closing(sqlite3.connect(data)) as database:
         names = {number: function(name) for number, name in database.execute("select id, context from context")}
         shown: dict[str, set[tuple[int, int, int]]] = defaultdict(set)
         for file, context, begin, end in database.execute("select file_id, context_id, fromno, tono from arc"):

@@ -20,13 +20,18 @@ from coverage import Coverage
 REPEATING = ("wide", "nightly", "slow")
 """Markers of products of parameters and of floods, which go the same ways again."""
 
+TRACED = "tests/soak/"
+"""Tests that trace threads themselves."""
 UNMEASURED = Path(__file__).with_name("unmeasured.txt")
 """Test functions that take long and go the ways of cheaper ones (`tests.support.choose_measured`)."""
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    """Add `--measure-all`."""
+    """Add `--measure-all` and `--measure-cases`."""
     parser.addoption("--measure-all", action="store_true", help="measure coverage in the first case of every test")
+    parser.addoption(
+        "--measure-cases", action="store_true", help="measure it in every case of every test but the seeds"
+    )
 
 
 class Measuring:
@@ -80,6 +85,9 @@ class Measuring:
     @pytest.hookimpl(trylast=True)
     def pytest_collection_modifyitems(self, config: pytest.Config, items: list[pytest.Item]) -> None:
         """Choose the tests."""
+        if config.getoption("measure_cases"):
+            self._measured = {item.nodeid for item in items if not item.nodeid.startswith(TRACED)}
+            return
         unmeasured = set() if config.getoption("measure_all") else set(UNMEASURED.read_text().split())
         self._measured = {item.nodeid for item in items} - {item.nodeid for item in _repeating(items, unmeasured)}
 

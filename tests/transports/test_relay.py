@@ -15,6 +15,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from multidrop.transports import TransportLost, relay
+from multidrop.transports.port_users import lock_owner
 from multidrop.transports.relay import (
     BEAT,
     CREDIT,
@@ -29,7 +30,6 @@ from multidrop.transports.relay import (
     frame,
 )
 from multidrop.transports.relay_pipe import RelayEndpoint, RelayPipe, SocketStream
-from multidrop.transports.serial_ports import lock_owner
 from tests.support.lent_port import lent
 
 pytestmark = pytest.mark.fork
@@ -383,7 +383,7 @@ def test_a_relay_that_gets_no_sign_of_life_ends_and_frees_its_port() -> None:
         with lent(os.ttyname(slave), silence=0.1) as connection:
             found, _, _ = select.select([connection.fileno()], [], [], 10.0)
             assert found and connection.read(10) == b""
-            assert lock_owner(os.ttyname(slave)) == ""
+            assert lock_owner(os.ttyname(slave)) is None
     finally:
         os.close(master)
         os.close(slave)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import math
+import re
 from collections.abc import Awaitable, Callable, Sequence
 from pathlib import Path
 
@@ -17,6 +18,7 @@ from multidrop.shell.events import Bytes, OnBus, Phase, Printed, ProgramRead, Pr
 from multidrop.shell.prompt.complete import Completion
 from multidrop.shell.roles import Filter, Series
 from multidrop.transports import TransportLost
+from multidrop.tui.app import MultidropApp
 from multidrop.tui.curves.samples import Quantity
 from multidrop.tui.curves.trigger import Setting
 from multidrop.tui.screens.program import ProgramPage
@@ -152,17 +154,23 @@ def test_snapshot_of_the_start_page_where_there_is_room(snap_compare: Compare) -
     assert drawn(snap_compare, "120x40", after(), session=FakeSession())
 
 
+def test_no_picture_is_empty() -> None:
+    """A picture that was taken before the first paint would show nothing for ever."""
+    pictures = list(Path(__file__).with_name("__snapshots__").rglob("*.svg"))
+    words = {
+        each.name: len(re.findall(r"textLength=\"[\d.]+\"[^>]*>[^<]*\w", each.read_text("utf-8"))) for each in pictures
+    }
+    assert len(words) > 50 and [name for name, count in words.items() if count < 10] == []
+
+
 def test_snapshot_of_the_tour(snap_compare: Compare) -> None:
-    session = demo_session()
-    app = make_app(session)
-
-    async def act(pilot: Pilot[int]) -> None:
+    async def act(pilot: Pilot[int], session: FakeSession) -> None:
+        app = pilot.app
+        assert isinstance(app, MultidropApp)
         app.tour.begin_on("press")
-        await pilot.pause()
         await after()(pilot, session)
-        await settle(pilot)
 
-    assert snap_compare(app, terminal_size=SIZES["80x24"], run_before=act)
+    assert drawn(snap_compare, "80x24", act)
 
 
 def test_snapshot_of_many_lines_in_ascii(snap_compare: Compare) -> None:

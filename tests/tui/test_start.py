@@ -8,7 +8,6 @@ import pytest
 from multidrop.dialects import Diagnostic
 from multidrop.shell.state import store
 from multidrop.transports import Unreachable
-from multidrop.transports.serial_ports import holder
 from multidrop.tui.app import MultidropApp
 from multidrop.tui.assist import StartEntry
 from multidrop.tui.screens.dialogs import Options
@@ -128,23 +127,6 @@ def test_what_was_opened_last_is_kept_newest_first(tmp_path: Path) -> None:
     assert store.lately(tmp_path) == []
     store.note(tmp_path, "b")
     assert [each.url for each in store.lately(tmp_path)] == ["b"]
-
-
-@pytest.mark.fork
-def test_the_holder_of_a_port_is_found_by_its_lock_file_or_its_open_file(tmp_path: Path) -> None:
-    port = tmp_path / "dev/ttyUSB7"
-    for folder in ("dev", "proc/41/fd", "proc/42/fd", "var/lock"):
-        (tmp_path / folder).mkdir(parents=True)
-    port.touch()
-    assert holder(str(port), tmp_path) == ""
-    (tmp_path / "proc/42/comm").write_text("minicom\n")
-    (tmp_path / "proc/42/fd/3").symlink_to(port)
-    assert holder(str(port), tmp_path) == "minicom (pid 42)"
-    (tmp_path / "proc/41/comm").write_text("picocom\n")
-    (tmp_path / "var/lock/LCK..ttyUSB7").write_text("        41\n")
-    assert holder(str(port), tmp_path) == "picocom (pid 41)"
-    (tmp_path / "var/lock/LCK..ttyUSB7").write_text("99\n")
-    assert holder(str(port), tmp_path) == "minicom (pid 42)", "a lock file that was left says nothing"
 
 
 @pytest.mark.parametrize(

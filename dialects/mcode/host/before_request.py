@@ -8,6 +8,7 @@ does not fit, the host looks for it in the other place and reports what is diffe
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import TypeVar
 
 from multidrop.dialects.codec import End, Kind, Procedure, Request
 from multidrop.dialects.errors import Inexpressible, NoAnswer
@@ -20,6 +21,8 @@ from multidrop.dialects.mcode.host.identity import activate_party, asked, find, 
 from multidrop.dialects.mcode.host.state import MCodeState, Place, earlier_error, who
 from multidrop.dialects.mcode.manual.mnemonic import ETHERNET
 
+T = TypeVar("T")
+
 
 def before_request(state: MCodeState, request: Request) -> Procedure[Request]:
     """Clear what earlier requests left, so that it is not taken for the outcome of this request.
@@ -29,7 +32,7 @@ def before_request(state: MCodeState, request: Request) -> Procedure[Request]:
     if state.unconfirmed is not None:
         yield from _confirmed(state, request.text, "was not sent")
     elif state.settings_unknown:
-        yield from limited(who(state), request.text, "was not sent", find_again(state, request))
+        yield from _limited(state, request.text, "was not sent", find_again(state, request))
     elif state.reply_pending:
         if not (yield from synchronise(state, request.priority)):
             yield from find_again(state, request)
@@ -51,7 +54,15 @@ def value_of(state: MCodeState, items: str, form: str) -> Procedure[str]:
 
 
 def _confirmed(state: MCodeState, text: str, fate: str) -> Procedure[None]:
-    return (yield from limited(who(state), text, fate, confirm_drive(state, text, fate)))
+    return (yield from _limited(state, text, fate, confirm_drive(state, text, fate)))
+
+
+def _limited(state: MCodeState, text: str, fate: str, steps: Procedure[T]) -> Procedure[T]:
+    """Look for the drive in the time that `first_print` has left of the line's. Raises NoAnswer."""
+    try:
+        return (yield from limited(who(state), text, fate, steps, state.looking))
+    finally:
+        state.looking.begins()
 
 
 def confirm_drive(state: MCodeState, text: str, fate: str) -> Procedure[None]:
@@ -96,12 +107,12 @@ def _find_anywhere(state: MCodeState, place: Place) -> Procedure[bool]:
 
 
 def _unseen(state: MCodeState, request: Request) -> bool:
-    """Whether another program's error would not show before a move: nothing of its replies comes here.
+    """Whether another program's error would not show before a command: nothing of its replies comes here.
 
     A drive with EM=2 replies to no command, and one on a network only to the client that asks.
     """
     silent = state.codec.em == 2 or ETHERNET.match(state.product) is not None
-    return silent and request.kind is Kind.COMMAND and classify.starts_motion(request.text)
+    return silent and request.kind in (Kind.COMMAND, Kind.SETTING)
 
 
 def _old_error(state: MCodeState, request: Request) -> Procedure[None]:
@@ -166,7 +177,9 @@ def first_print(state: MCodeState, request: Request) -> Procedure[tuple[str, ...
     if expected is None or request.kind is not Kind.PRINT or pattern is None or not _fits(state, request):
         return None
     if not expected.replied:
-        place = yield from limited(who(state), request.text, "was not sent", _present(state, expected.place))
+        steps = _present(state, expected.place)
+        state.looking.begins()
+        place = yield from limited(who(state), request.text, "was not sent", steps, state.looking)
         if place is None:
             return None
         expected = replace(expected, place=place, replied=True)

@@ -209,6 +209,19 @@ OF_MOVES = errors.BY_ITSELF | {
 }
 """The errors of a move without a label or a user variable; every other one is another line's."""
 
+OF_NO_SETTING = frozenset(
+    {
+        E.INSTRUCTION_NOT_SETTABLE,
+        E.NOT_EXECUTABLE,
+        E.NOT_PRINTABLE,
+        E.NO_PROGRAM_RUNNING,
+        E.NO_SUCH_ADDRESS,
+        E.STACK_FULL,
+        E.NOT_IN_PROGRAM_MODE,
+    }
+)
+"""The errors of executing, printing or storing: a line that gives a variable a number has none of them."""
+
 
 @lru_cache(maxsize=256)
 def may_cause(text: str, code: int, product: str) -> bool:
@@ -220,6 +233,9 @@ def may_cause(text: str, code: int, product: str) -> bool:
         return True
     if code in OF_DEFINITIONS:
         return statement.word in DEFINE
+    row = lookup(statement.word, product)
+    if code in OF_NO_SETTING and row is not None and row.kind in ("variable", "flag") and statement.arguments:
+        return False
     return code != E.NO_SUCH_NAME and (statement.word not in MOVES or code in OF_MOVES)
 
 

@@ -106,6 +106,7 @@ def signed(state: MCodeState, request: Request) -> Request:
 
 
 REPEATS = 3
+UNKNOWN_WORDS = (ErrorNumber.UNKNOWN_VARIABLE, ErrorNumber.UNKNOWN_COMMAND)
 
 
 def answered(state: MCodeState, request: Request) -> Procedure[Reply]:
@@ -236,7 +237,7 @@ def refused(state: MCodeState, request: Request, acknowledged: bool = False) -> 
         )
     _check_cause(state, request, code, heard)
     # A drive may lack a variable that the manual has.
-    elsewhere = code == ErrorNumber.UNKNOWN_VARIABLE and not classify.uses_own_name(request.text)
+    elsewhere = code in UNKNOWN_WORDS and not classify.uses_own_name(request.text)
     if elsewhere or _came_by_itself(request, code):
         other = "is of another line" if elsewhere else "came by itself"
         raise Refused(

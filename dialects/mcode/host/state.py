@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 from multidrop.dialects.errors import Refused
+from multidrop.dialects.exchange import Looking
 from multidrop.dialects.mcode.host.codec import MCode
 from multidrop.dialects.mcode.manual import errors
 from multidrop.dialects.state import DriveState, Remembered
@@ -49,6 +50,8 @@ class MCodeState(DriveState):
     """In program mode: the address of the next line."""
     unconfirmed: Unconfirmed | None = None
     """The drive is only expected; its settings are unknown then."""
+    looking: Looking = field(default_factory=Looking)
+    """The search for the drive that the present line has begun."""
     stepping: bool = False
     """The drive was seen to wait for a key before each line of its program, and nothing was sent that ends that."""
 

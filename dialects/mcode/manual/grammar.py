@@ -36,6 +36,8 @@ TAKES_NAME = frozenset({"BP", "BR", "CL", "CP", "DC", "EX", "IC", "IV", "LB", "O
 
 READ_LINES = 4096
 """The number of lines that are kept as they were read: session, codec and conversation ask for the same one."""
+LARGEST = 2**31
+"""Beyond it no drive takes a whole number."""
 MOST_TOKENS = 256
 """Far more than fit into a drive's 64 characters; limits the parser's recursion."""
 
@@ -266,7 +268,9 @@ def _check_points(found: Sequence[Token]) -> None:
         if first and last and token.kind == "number" and not token.text.isdecimal():
             whole, _, fraction = token.text.partition(".")
             group = f", or {whole}{fraction}" if len(fraction) == 3 and fraction.isdecimal() else ""
-            why = f"{token.text} is not whole, and {row.name} takes whole numbers; write {float(token.text):.0f}{group}"
+            near = float(token.text)
+            write = f"{near:.0f}{group}" if abs(near) < LARGEST else "a whole number"
+            why = f"{token.text} is not whole, and {row.name} takes whole numbers; write {write}"
             raise LineError(ErrorNumber.ILLEGAL_DATA, token.start, why)
 
 

@@ -31,8 +31,19 @@ EXCEPTIONS = {
     10: "gateway path unavailable",
     11: "gateway target does not respond",
 }
-NO_REFUSAL = frozenset({5, 11})
-"""Exceptions after which the request may have been executed: the server works on it, or its reply did not arrive."""
+NO_PATH, NO_TARGET = 10, 11
+NO_RESULT = frozenset({5, NO_TARGET})
+"""Exceptions after which a request may have been executed: the server works on it, or its reply did not arrive."""
+NOT_EXECUTED = frozenset({1, 2, 3, 6, NO_PATH})
+"""Exceptions that say that a request was not executed. After 04 that is not known, unless the drive has an error of its
+own (the failure came in the execution), nor is it after a number that the standard has not."""
+SAY_NOTHING = frozenset({NO_PATH, *NO_RESULT})
+"""Exceptions that do not come from the device that was asked, or are no reply yet."""
+GATEWAYS = {
+    NO_PATH: "the gateway did not pass it on; check unit= and the gateway's settings",
+    NO_TARGET: "the gateway got no reply; check the drive behind it, its power and unit=",
+}
+"""Exceptions of a gateway, not of a drive: what it did, and what to do."""
 
 _LEAST, _MOST = 2, 254
 """Limits of the header's length: a unit and at least a function code, at most 253 bytes of PDU."""

@@ -97,12 +97,15 @@ def refusal(state: ModbusState, asked: Request, reply: Reply, code: int | None, 
     """
     number = reply.body[1]
     name, place = framing.EXCEPTIONS.get(number, "unknown"), mapping.place(asked.body)
-    if number in framing.NO_REFUSAL:
-        return NoAnswer(
-            f"{who(state)}: '{asked.text}' was not refused and has no result: exception {number:02} {name} at {place}; "
-            "it is not known whether it was executed; it was sent once"
-        )
-    text = f"{who(state)} refused '{asked.text}': exception {number:02} {name} at {place}{valid}"
+    exception = f"exception {number:02} {name} at {place}"
+    gateway = f"; {framing.GATEWAYS[number]}" if number in framing.GATEWAYS else ""
+    reads = asked.kind is Kind.PRINT
+    if number in framing.NO_RESULT or not (number in framing.NOT_EXECUTED or code or reads):
+        fate = "" if reads else "; it is not known whether it was executed; it was sent once"
+        return NoAnswer(f"{who(state)}: '{asked.text}' has no result: {exception}{gateway}{fate}")
+    if number == framing.NO_PATH:
+        return Refused(f"'{asked.text}' did not reach {who(state)}: {exception}{gateway}")
+    text = f"{who(state)} refused '{asked.text}': {exception}{valid}"
     return Refused(f"{text}; {described(code, state)}" if code else text, code)
 
 
@@ -352,12 +355,19 @@ def write_coil(state: ModbusState, number: int, on: bool) -> Procedure[tuple[str
 
 
 def identification(state: ModbusState, code: int = mapping.EVERY_OBJECT) -> Procedure[dict[int, str]]:
-    """Read all objects of the device identification. Raises DriveError."""
+    """Read all objects of the device identification.
+
+    Raises Refused for a device that lacks it, NoAnswer where nothing shows what the device is.
+    """
     found: dict[int, str] = {}
     begin: int | None = 0
     while begin is not None:
         asked = request(state, "/device", pdu_codec().identify(code, begin))
         reply = yield asked
+        if reply.end is End.REFUSED:
+            failure = refusal(state, asked, reply, None)
+            lacks = reply.body[1] not in framing.SAY_NOTHING
+            raise Refused(str(failure)) if lacks else NoAnswer(str(failure))
         try:
             more, following = pdu_codec().objects(sure(state, asked, reply))
         except framing.NotModbus:

@@ -119,4 +119,5 @@ UNITS = Units(
     recounts,
     reads,
     setting,
+    lambda axis, name: commands.setting_name(f"{name}_{axis}" if axis else name),
 )

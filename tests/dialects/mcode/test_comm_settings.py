@@ -137,8 +137,11 @@ def test_a_command_that_a_drive_missed_after_power_up_is_not_told_as_done(bench,
 def test_an_error_that_came_by_itself_is_not_told_as_a_refusal(bench, em, party):
     desk = Desk(bench, (em, 0), party=party)
     desk.device.fail(84, desk.bench.now)
-    with pytest.raises(Refused, match="error 84: .* or that came by itself and it was executed"):
+    if em == 2:  # read first
         desk.type("R1=5")
+    else:
+        with pytest.raises(Refused, match="error 84: .* or that came by itself and it was executed"):
+            desk.type("R1=5")
     assert len(desk.witness.executed("R1=5")) == 1
 
 
@@ -193,8 +196,11 @@ def test_a_setting_that_was_made_while_an_error_came_by_itself_is_not_taken_for_
     desk = Desk(bench, (em, 0))
     desk.state.codec = MCode(em=em, escape=desk.device.memory.escape_mode)
     desk.device.fail(84, desk.bench.now)
-    with pytest.raises(Refused, match="error 84"):
+    if em == 2:  # read first
         desk.type("ES=0")
+    else:
+        with pytest.raises(Refused, match="error 84"):
+            desk.type("ES=0")
     assert desk.device.memory.escape_mode == 0
     assert desk.state.settings_unknown or desk.agrees()  # stale: a stop takes every form
     desk.type("R1=1")

@@ -271,23 +271,56 @@ def test_a_refused_write_of_raw_registers_names_the_value_that_is_wrong(address,
     assert named in str(caught.value)
 
 
-@pytest.mark.parametrize(("number", "name"), [(5, "acknowledge"), (11, "gateway target does not respond")])
-@pytest.mark.parametrize("text", ["MR 5", "EX A3", "O1=1", "PR P", "PR IS"])
-def test_an_exception_of_a_request_that_may_be_executed_is_no_refusal(number, name, text, far):
+NAMES = {4: "device failure", 5: "acknowledge", 8: "unknown", 11: "gateway target does not respond", 255: "unknown"}
+
+
+@pytest.mark.parametrize(
+    ("number", "text"),
+    [(number, text) for number in NAMES for text in ("MR 5", "EX A3", "O1=1")]
+    + [(number, text) for number in (5, 11) for text in ("PR P", "PR IS")],
+)
+def test_an_exception_of_a_request_that_may_be_executed_is_no_refusal(number, text, far):
     def answer(asked):
         return Reply(end=End.REFUSED, body=bytes((asked.body[0] | 0x80, number)))
 
-    with pytest.raises(
-        NoAnswer, match=f"'{text}' was not refused .* exception {number:02} {name} at .*it was sent once"
-    ):
+    with pytest.raises(NoAnswer, match=f"'{text}' has no result: exception {number:02} {NAMES[number]} at ") as caught:
         say(MODBUS.perform(state(), text), answer)
+    assert ("it was sent once" in str(caught.value)) != text.startswith("PR")
+    assert ("the gateway got no reply" in str(caught.value)) == (number == 11)
+
+
+@pytest.mark.parametrize("text", ["MR 5", "EX A3", "O1=1", "PR P"])
+def test_a_gateway_without_a_path_is_not_called_the_drives_refusal(text, far):
+    def answer(asked):
+        return Reply(end=End.REFUSED, body=bytes((asked.body[0] | 0x80, 10)))
+
+    with pytest.raises(Refused, match=f"^'{text}' did not reach the drive: exception 10 .*the gateway did not pass"):
+        say(MODBUS.perform(state(), text), answer)
+
+
+@pytest.mark.parametrize("number", [5, 10, 11])
+def test_a_gateway_that_replies_in_place_of_a_drive_makes_no_stranger_of_it(number):
+    def answer(asked):
+        return Reply(end=End.REFUSED, body=bytes((asked.body[0] | 0x80, number)))
+
+    with pytest.raises(NoAnswer, match=f"exception {number:02}"):
+        say(identify(Hints()), answer)
+
+
+@pytest.mark.parametrize("number", [1, 2, 3, 4, 6, 8])
+def test_a_device_without_an_identification_is_a_stranger(number):
+    def answer(asked):
+        return Reply(end=End.REFUSED, body=bytes((asked.body[0] | 0x80, number)))
+
+    [found] = say(identify(Hints()), answer)
+    assert found.stranger
 
 
 def test_a_busy_gateway_does_not_hide_the_error_flag(far):
     """Exception 06 at EF says nothing of the flag: an error that a drive has is not taken for the next line's."""
     drive = state()
     far.raises = {"MR": (4, 0), "EF": (6, 0)}
-    with pytest.raises(Refused):
+    with pytest.raises(NoAnswer, match="exception 04"):
         type_("MR 5", far, drive)
     assert drive.error
 
@@ -348,7 +381,7 @@ def test_an_error_from_before_is_read_and_told_first():
 def test_an_error_whose_flag_could_not_be_read_is_told_before_the_next_command_and_not_blamed_on_it():
     far, drive = Far(), state()
     far.raises, far.silent = {"SL": (4, 85)}, {"EF"}
-    with pytest.raises(Refused, match="exception 04"):
+    with pytest.raises(NoAnswer, match="exception 04"):
         type_("SL 5000", far, drive)
     far.raises, far.silent = {}, set()
     assert type_("R2=5", far, drive) == ()

@@ -131,7 +131,8 @@ def test_a_line_that_is_refused_is_one_request_and_no_error_of_a_lexium_is_read(
     far = Far(1, 1, error=error)
     state = opened(far)
     far.sent.clear()
-    with pytest.raises(Refused, match=f"exception 0{error}"):
+    failed = error == 4 and not line.startswith("PR")  # not known: it failed in the execution
+    with pytest.raises(NoAnswer if failed else Refused, match=f"exception 0{error}"):
         said(MODBUS.perform(state, line), far)
     assert [each.hex()[: len(pdu)] for each in far.sent] == [pdu]
 

@@ -47,7 +47,7 @@ class Place:
 
     def __init__(
         self, folder: Path, patch: pytest.MonkeyPatch, cell: str, *, repeats: bool = True, lazy: bool = False,
-        greeting: bytes = b"", late: bool = False,
+        greeting: bytes = b"", late: bool = False, network: bool = False,
     ) -> None:  # fmt: skip
         folder = folder / str(next(FOLDERS))
         self.floor = RunningFloor(Floor(read(cell, "cell.toml")))
@@ -59,7 +59,7 @@ class Place:
         async def transport(connection: Any, port: str = "", within: Any = None, baud: Any = None) -> Any:
             rate = baud or connection.baud or FAMILIES[connection.hints.family or "mcode"].baud
             pipe: Any = Greeting(self.floor, "b", rate, repeats)
-            pipe.greeting, pipe.late = greeting, late
+            pipe.greeting, pipe.late, pipe.network = greeting, late, network
             self.pipe = pipe
             return pipe
 
@@ -81,7 +81,7 @@ class Place:
         for event in self.events:
             if isinstance(event, Printed):
                 lines.append(event.text)
-            elif isinstance(event, OnBus) and isinstance(event.event, Unsolicited):
+            elif isinstance(event, OnBus) and isinstance(event.event, Unsolicited) and not event.event.greeting:
                 lines += event.event.lines
         return lines
 
@@ -183,6 +183,55 @@ async def test_a_greeting_brings_no_reply_of_multidrops_own_questions_to_the_out
     place = Place(tmp_path, monkeypatch, cell, repeats=repeats, greeting=greeting, late=late)
     await place.run(url, *lines)
     assert place.output == printed
+
+
+@for_each(
+    "name, greeting, late, lazy",
+    [
+        (name, greeting, late, lazy)
+        for name in LINES
+        if "mcode" in name
+        for greeting in (b"Welcome\r\n12345\r\n", b"Port 1 is open\r\nlogin: ")
+        for late in (False, True)
+        for lazy in (False, True)
+    ],
+)
+async def test_a_gateways_greeting_is_no_output_of_a_drive(tmp_path, monkeypatch, name, greeting, late, lazy):
+    cell, url, lines, printed = LINES[name]
+    place = Place(tmp_path, monkeypatch, cell, repeats=False, lazy=lazy, greeting=greeting, late=late, network=True)
+    await place.run(url, "/sleep 0.2", *lines)
+    assert place.output == printed
+
+
+async def test_what_is_printed_later_than_a_greeting_is_a_drives_output(tmp_path, monkeypatch):
+    cell, url, _, _ = LINES["mcode alone EM=1 CK=0"]
+    place = Place(tmp_path, monkeypatch, cell, repeats=False, lazy=True, greeting=b"Welcome\r\n", network=True)
+    await place.session.open(url)
+    await asyncio.sleep(3.0)
+    place.floor.loop.call_soon(place.pipe._received, b"12345\r\n")
+    await asyncio.sleep(0.3)
+    await place.session.run("PR P")
+    await place.session.close()
+    place.floor.close()
+    assert place.output == ["12345", "0"]
+    said = [text for text in place.told if "'Welcome'" in text and "may be a gateway's greeting" in text]
+    assert len(said) == 1
+
+
+@for_each("name", ["mcode alone EM=0 CK=0", "mcode alone EM=1 CK=0", "mcode alone EM=2 CK=0"])
+async def test_questions_that_come_back_late_and_together_are_no_output(tmp_path, monkeypatch, name):
+    cell, url, _, _ = LINES[name]
+    place = Place(tmp_path, monkeypatch, cell, repeats=False)
+    await place.session.open(url)
+    await place.session.run("PR P")
+    await place.session.run("PR VM")
+    place.floor.loop.call_soon(place.pipe._received, b'PR P,"~"\rPR VM,"~"\r\n')
+    await asyncio.sleep(0.3)
+    place.floor.loop.call_soon(place.pipe._received, b"PR P\r\n")  # the trace of a program
+    await asyncio.sleep(0.3)
+    await place.session.close()
+    place.floor.close()
+    assert place.output == ["0", "768000", "PR P"]
 
 
 @for_each("name", ["pmx", "tmcl"])

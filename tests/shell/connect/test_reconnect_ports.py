@@ -22,6 +22,7 @@ from multidrop.simulator.cells import load
 from multidrop.simulator.floor import Floor
 from multidrop.simulator.serving.endpoints import Served, serve_bus
 from multidrop.simulator.serving.running import RunningFloor
+from multidrop.transports import serial_port
 from tests.support.posix import fcntl
 from tests.support.processes import Running
 from tests.support.until import until
@@ -137,6 +138,24 @@ async def test_another_program_that_has_the_port_is_named_once(tmp_path: Path) -
         assert sum("in use by" in text for text in said) == 1 and bus.lost
         os.close(holder)
         await until(lambda: not bus.lost)
+    await cell.end()
+
+
+async def test_another_program_beside_us_is_named_once_at_each_return(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A service may take a port as it is plugged in, and without a lock: the port opens all the same."""
+    cell = ServedCell(tmp_path, "pty:press.tty")
+    url = await cell.begin()
+    async with session(tmp_path) as (shop, said):
+        (bus,) = await shop.open(url)
+        for _ in range(2):
+            cell.floor.command("/sim unplug press")
+            await until(lambda: bus.lost)
+            monkeypatch.setattr(serial_port, "beside", lambda port: "ModemManager (pid 9) has it open")
+            cell.floor.command("/sim plug press")
+            await until(lambda: not bus.lost)
+        assert said.count(f"{bus.name}: ModemManager (pid 9) has it open") == 2
     await cell.end()
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import itertools
 from typing import Any
 
@@ -80,3 +81,30 @@ async def test_a_line_that_has_replied_is_not_doubted(tmp_path):
         with pytest.raises(DriveError) as caught:
             await cell.session.run("@c PR P")
         assert "A and B" not in str(caught.value)
+
+
+class Gateway(Talker):
+    """A Modbus gateway that replies to each request with an exception."""
+
+    def __init__(self, number: int) -> None:
+        super().__init__(network=True)
+        self.number = number
+
+    def write(self, data: bytes) -> bool:
+        reply = data[:4] + b"\x00\x03" + data[6:7] + bytes((data[7] | 0x80, self.number))
+        asyncio.get_running_loop().call_soon(self._received, reply)
+        return True
+
+
+@for_each("number, says", [(10, "the gateway did not pass it on"), (11, "the gateway got no reply")])
+async def test_a_gateways_own_words_are_followed_by_no_other_cause(tmp_path, monkeypatch, number, says):
+    async def transport(connection: Any, port: str = "", within: Any = None, baud: Any = None) -> Any:
+        return Gateway(number)
+
+    monkeypatch.setattr(opening, "_transport", transport)
+    folder = tmp_path / str(next(FOLDERS))
+    session: Any = Session(Settings({}, folder / "c", folder / "s", data=folder / "d"))
+    with pytest.raises(DriveError, match=says) as caught:
+        await session.open("modbus://10.0.0.5")
+    await session.close()
+    assert "A and B" not in str(caught.value) and "; ;" not in str(caught.value)

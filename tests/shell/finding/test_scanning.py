@@ -6,11 +6,16 @@ import pytest
 
 from multidrop.dialects import Diagnostic, NoAnswer, Stopped
 from multidrop.dialects.state import Remembered
+from multidrop.shell.configuration import Settings
+from multidrop.shell.connect import opening
 from multidrop.shell.connect.urls import parse
+from multidrop.shell.events import Notified
 from multidrop.shell.finding.scanning import NothingFound, Scanning, url_of
+from multidrop.shell.session import Session
 from multidrop.shell.state.port_state import PortState
 from multidrop.transports import TransportLost
 from tests.support.cell_session import CellSession, bus, drive, party, pmx
+from tests.support.talker import Talker
 from tests.support.tuned_ports import Port
 
 pytestmark = [pytest.mark.virtual, pytest.mark.slow]
@@ -363,3 +368,24 @@ async def test_a_silent_line_is_not_taken_for_tmcl(tmp_path):
         await opened.bus.identify(opened.hints)
     assert "TMCL" not in str(failure.value)
     await port.session.forget(opened.bus)
+
+
+@pytest.mark.parametrize("family", ["pmx", "mcode", "tmcl"])
+@pytest.mark.parametrize(("says", "every"), [(b"12345\r\n", 0.02), (b"\xf3\x80", 0.004), (b"OK\r", 0.05)])
+async def test_a_search_among_endless_bytes_ends_and_says_what_came(tmp_path, monkeypatch, family, says, every):
+    async def transport(connection, port="", within=None, baud=None):
+        return Talker(says, every)
+
+    monkeypatch.setattr(opening, "_transport", transport)
+    session = Session(Settings({}, tmp_path / "c", tmp_path / "s", data=tmp_path / "d"))
+    session.questions.agreed = True
+    said = []
+    session.subscribe(lambda event: said.append(event.text), Notified)
+    search = Scanning(session, opening.open_buses, parse(f"/dev/ttyUSB9?dialect={family}"), lambda drive: None)
+    begun = session.now()
+    with pytest.raises(NothingFound, match=r"no drive replies on .*bytes came"):
+        await search.run([9600], False)
+    assert session.now() - begun < 120
+    if session.now() - begun > 30:
+        assert [text for text in said if "given up after" in text and "bytes came" in text]
+    await session.close()

@@ -18,7 +18,7 @@ import pytest
 from multidrop.shell import threads
 from multidrop.shell.streams import output_streams, stdout
 from multidrop.shell.streams.output_streams import descriptor_writer
-from tests.support.posix import pty
+from tests.support.posix import fcntl, pty
 from tests.support.served_cell import until
 from tests.support.until import PATIENCE
 
@@ -42,11 +42,12 @@ class Pipe:
         return got
 
     def fill(self, kilobytes):
-        """Put so many lines of 1000 bytes; the pipe takes 64 of them at most."""
+        """Put so many lines of 1000 bytes; the pipe takes 64 of them at most, less where its user has many pipes."""
         for _ in range(kilobytes):
             assert self.out.put(b"x" * 999 + b"\n", keep=True)
         if sys.platform != "win32":  # where a write into a full pipe waits for all of it
-            until(lambda: self.out.written > 48_000, "the pipe never filled")
+            room = fcntl.fcntl(self.writer, fcntl.F_GETPIPE_SZ) if sys.platform == "linux" else 16_384
+            until(lambda: self.out.written >= room // 2, "the pipe never filled")
 
     def close(self):
         self.out.give_up()

@@ -136,3 +136,10 @@ def test_a_reader_that_leaves_interrupts_work_once_and_nothing_after_it(monkeypa
             assert watch.left and came == ["interrupted"]
     finally:
         signal.signal(signal.SIGUSR2, before)
+
+
+def test_what_may_be_a_gateways_greeting_is_not_on_standard_output(capsys):
+    printer = Printer()
+    printer.show(OnBus("gw", Unsolicited(0.0, ("Welcome", "12345\x1b"), greeting=True)))
+    printer.show(OnBus("gw", Unsolicited(0.0, ("500",))))
+    assert capsys.readouterr() == ("500\n", "")
