@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Iterator
 from math import inf
 
@@ -25,6 +26,24 @@ def _automation(world: World) -> Iterator[str]:
 
 def _spared(world: World) -> Iterator[str]:
     yield from world.history.told.unspared
+
+
+STOPS = ("41 2020", "10 0078")
+"""The messages of a stop over Modbus: the end of the program, and SL 0."""
+REPEATED = 10.0
+"""The time, s, in which a stop is repeated, or sent to a connection that was lost."""
+
+
+def _stranger(world: World) -> Iterator[str]:
+    """Each message is that of a typed line, as often as it was typed at most, or part of a stop."""
+    for strange in world.history.told.strangers:
+        left = Counter(strange.typed)
+        for at, message in strange.heard:
+            if message in STOPS and any(each <= at <= each + REPEATED for each in strange.stops):
+                continue
+            left[message] -= 1
+            if left[message] < 0:
+                yield f"{message!r} at {at:.3f}, typed {strange.typed.count(message)} times"
 
 
 NEAR = 2
@@ -173,6 +192,12 @@ PROMISES = (
         "A line that was refused, reads, or sets a value stops no drive.",
         "What a report means",
         _spared,
+    ),
+    Rule(
+        "stranger",
+        "A device that did not identify itself gets only what was typed for it, and the stop of a person.",
+        "0108",
+        _stranger,
     ),
     Rule(
         "asked",

@@ -23,6 +23,7 @@ from soak.simulation.acts.hand import HAND
 from soak.simulation.acts.meetings import HELD_UP, MEETINGS
 from soak.simulation.acts.operators import OPERATORS
 from soak.simulation.acts.quitting import QUITTING
+from soak.simulation.acts.strangers import STRANGER
 from soak.simulation.acts_kill import files, kill, power_cut
 from soak.simulation.bounds import sample
 from soak.simulation.cut_ins import drawn_aim
@@ -163,7 +164,7 @@ CREW, LAST = 200, 5
 """The number of the first step with one, and how many there are."""
 AFTER = CREW + LAST
 """The number of the first step of the acts that end it."""
-AT_LAST = (*AFTER_CREWS, *QUITTING)
+AT_LAST = (*AFTER_CREWS, *QUITTING, STRANGER)
 """Those acts, each once."""
 
 

@@ -99,6 +99,18 @@ class Quit:
 
 
 @dataclass
+class Strange:
+    """A Modbus device that did not identify itself. A message is its function and its register: `10 0043`."""
+
+    typed: list[str] = field(default_factory=list)
+    """The messages of the lines that were typed for it, by a person or by automation."""
+    heard: list[tuple[float, str]] = field(default_factory=list)
+    """The messages that have reached it, without the questions what it is."""
+    stops: list[float] = field(default_factory=list)
+    """When the stop key was pressed."""
+
+
+@dataclass
 class Told:
     """All of it, in its order."""
 
@@ -120,6 +132,7 @@ class Told:
     awaited: list[Awaited] = field(default_factory=list)
     """What scripts waited for whose motions may have failed."""
     quits: list[Quit] = field(default_factory=list)
+    strangers: list[Strange] = field(default_factory=list)
     halts: list[float] = field(default_factory=list)
     """When everything was stopped."""
     stored: list[Put] = field(default_factory=list)

@@ -124,6 +124,8 @@ class World:
     """Called where a session writes down what it owes a drive."""
     beside_it: list[asyncio.Task[None]] = field(default_factory=list)
     """What runs beside the prompt."""
+    visits: list[asyncio.Task[None]] = field(default_factory=list)
+    """People at devices that are none of the machine's."""
 
     def place(self, line: str) -> Place:
         """A line of the machine."""
@@ -390,6 +392,8 @@ class World:
             self.person.type(b"n")  # the answer to a question, if there is one
             await asyncio.sleep(1.0)
         await self._close()
+        for visit in self.visits:
+            await visit
         for other in self.others:  # while he writes to a line, the next session is refused there
             await other.leave()
         if self.history.lives > 1 or self._owing():

@@ -144,6 +144,27 @@ async def test_a_line_that_waited_for_a_silent_drive_was_not_sent_and_stops_noth
         assert shop.moving() == {"press:b"}
 
 
+async def test_a_line_without_a_reply_may_have_started_its_drive_which_is_stopped(tmp_path, monkeypatch):
+    """Its fate is unknown: it was executed, and only the reply got lost."""
+    async with CellSession(tmp_path, press(EM=1, CK=1)) as shop:
+        await typed(shop.session, "@press:a PR P")
+        line = type(shop.session.buses["press"].link.line)
+        receive = line.receive
+
+        def lossy(line, data, now):
+            if b"SL 50001" not in shop.written("press"):
+                receive(line, data, now)
+
+        with pytest.raises(NoAnswer, match="not known whether"):
+            async with shop.session.automations.run():
+                with monkeypatch.context() as lost:
+                    lost.setattr(line, "receive", lossy)
+                    await shop.session.run("@press:a SL 50001")
+        await asyncio.sleep(3)
+        assert "press:a" not in shop.moving()  # a drive that did not reply gets the stop of its line
+        assert any("stopped a" in text for text in shop.warned()), shop.warned()
+
+
 async def test_a_routine_for_errors_that_moves_the_drive_is_stopped(tmp_path):
     async with CellSession(tmp_path, press()) as shop:
         await typed(shop.session, *(f"@press:a {line}" for line in ROUTINE), "@press:b SL 40000")
