@@ -236,7 +236,7 @@ class Leftovers:
         `answers_host`: whether only a question of a host makes a drive send a line.
         """
         if now <= self._sent_at + LATE:
-            lines = tuple(each for each in lines if not self._is_echo(each))
+            lines = tuple(each for each in self._without_parts(lines) if not self._is_echo(each))
         if self.recovering:
             return (), lines
         if now > self._opened_at + LATE:
@@ -244,12 +244,25 @@ class Leftovers:
         left = tuple(filter(answers_host, lines))
         return tuple(each for each in lines if each not in left), left
 
+    def _without_parts(self, lines: tuple[str, ...]) -> tuple[str, ...]:
+        """Leave out lines that are one request together: a search ends each of its first letters with a line feed."""
+        sent = {_without_blanks(each) for each in self._sent}
+        for begin in range(len(lines)):
+            for end in range(len(lines), begin + 1, -1):
+                if _without_blanks("".join(lines[begin:end])) in sent:
+                    return lines[:begin] + self._without_parts(lines[end:])
+        return lines
+
     def _is_echo(self, line: str) -> bool:
         """Whether a line repeats requests, one or several, after a prompt at most."""
         rest = line
         while own := max((each for each in self._sent if rest.endswith(each)), key=len, default=""):
             rest = rest.removesuffix(own).rstrip("\r\n")
         return rest != line and not rest.strip(PROMPT)
+
+
+def _without_blanks(text: str) -> str:
+    return "".join(text.split())
 
 
 CERTAINLY_OVER = 0.018
