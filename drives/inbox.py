@@ -247,11 +247,17 @@ class Leftovers:
     def _without_parts(self, lines: tuple[str, ...]) -> tuple[str, ...]:
         """Leave out lines that are one request together: a search ends each of its first letters with a line feed."""
         sent = {_without_blanks(each) for each in self._sent}
-        for begin in range(len(lines)):
-            for end in range(len(lines), begin + 1, -1):
-                if _without_blanks("".join(lines[begin:end])) in sent:
-                    return lines[:begin] + self._without_parts(lines[end:])
-        return lines
+        kept, begin = list[str](), 0
+        while begin < len(lines):
+            whole = (
+                end
+                for end in range(min(begin + PARTS, len(lines)), begin + 1, -1)
+                if _without_blanks("".join(lines[begin:end])) in sent
+            )
+            if (end := next(whole, None)) is None:
+                kept.append(lines[begin])
+            begin = begin + 1 if end is None else end
+        return tuple(kept)
 
     def _is_echo(self, line: str) -> bool:
         """Whether a line repeats requests, one or several, after a prompt at most."""
@@ -259,6 +265,10 @@ class Leftovers:
         while own := max((each for each in self._sent if rest.endswith(each)), key=len, default=""):
             rest = rest.removesuffix(own).rstrip("\r\n")
         return rest != line and not rest.strip(PROMPT)
+
+
+PARTS = 3
+"""Lines that one request is sent as, at most: a search ends its first two letters with a line feed each."""
 
 
 def _without_blanks(text: str) -> str:

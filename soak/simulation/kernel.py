@@ -245,6 +245,7 @@ class Kernel:
             (serial_port, "output_queue", self.unsent),
             (serial_port, "in_use", self.in_use),
             (serial_port, "beside", lambda port: ""),
+            (serial_port, "taker", lambda: ""),
             (serial_pipe, "beside", lambda port: ""),
             (serial_pipe, "suspects", lambda port: ""),
             (libusb, "LibusbCarrier", self.usb),

@@ -9,7 +9,7 @@ from multidrop.dialects import Owed, Request
 from multidrop.dialects.codec import Kind
 from multidrop.dialects.mcode.host.codec import MCode
 from multidrop.drives.events import Unsolicited
-from multidrop.drives.inbox import LASTS, Debris
+from multidrop.drives.inbox import LASTS, Debris, Leftovers
 from multidrop.shell.configuration import Settings
 from multidrop.shell.connect.opening import open_buses
 from multidrop.shell.events import OnBus
@@ -162,3 +162,10 @@ async def test_once_the_drives_have_replied_a_line_of_that_form_is_a_print(tmp_p
         cell.received(b'0"b"\r\n')
         await asyncio.sleep(1)
         assert cell.shown == ['0"b"'] and cell.warned() == []
+
+
+def test_the_parts_of_a_question_that_come_back_as_lines_are_no_output_and_a_flood_stays_whole():
+    leftovers = Leftovers()
+    leftovers.request_written(b'P\nR\n "<>",SN,"~2"\r', 9.0)
+    parts, flood = ("P", "R", ' "<>",SN,"~2"'), ("P", "R", "17") * 2000
+    assert leftovers.divided((*flood, *parts, "17"), lambda line: False, 9.1) == ((*flood, "17"), ())
