@@ -160,8 +160,16 @@ def under_way(world: World, line: str, stop: Stop) -> bool:
             break
         if name == line and (left := _written(world, line, index)):
             # Its forms were made when it came: what was half sent then may have left since.
-            return any(_is_stop(each, line, left) for each in (stop, *earlier))
+            known = any(_is_stop(each, line, left) for each in (stop, *earlier))
+            return known or _of_an_opening(world, line, stop, left)
     return bool(earlier)  # nothing of it has left yet
+
+
+def _of_an_opening(world: World, line: str, stop: Stop, left: bytes) -> bool:
+    """Whether what left is the stop of a key that came as the line was being opened, with no drives known yet."""
+    keys = [each for each in world.history.stops if stop.at - STILL <= each.at < stop.at and each.who == stop.who]
+    opening = any(line not in each.forms and line not in each.lost for each in keys)
+    return opening and re.match(LANGUAGES[world.place(line[:2]).language].stop, left) is not None
 
 
 def _is_stop(stop: Stop, line: str, left: bytes) -> bool:

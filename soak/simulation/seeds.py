@@ -138,6 +138,7 @@ FIXED = {
     300935: "a slow disk that kept the thread from writing the rest of a stop (of the simulation itself)",
     301438: "a move into a limit that is active, whose error may be another motion's (of the simulation itself)",
     15371770: "the same, refused with a NAK on a line with a checksum (of the simulation itself)",
+    12867803: "a stop behind that of a key that came as its line was being opened (of the simulation itself)",
     301731: "two lines that ask, the same, of which the first was agreed to (of the simulation itself)",
     300170: "a stop on a line that was lost again as it came back (of the simulation itself)",
     8002337: "a stop of which a loop that was held up sent the other controllers nothing for four seconds",
