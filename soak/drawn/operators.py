@@ -237,6 +237,11 @@ class _Finder(ast.NodeVisitor):
             self._swap(first, second, node)
         self.generic_visit(node)
 
+    def visit_keyword(self, node: ast.keyword) -> None:
+        """Leave out `strict` of a zip: it is an assertion, which no input can fail."""
+        if node.arg != "strict":
+            self.generic_visit(node)
+
     def _swap(self, first: ast.expr, second: ast.expr, call: ast.Call) -> None:
         if isinstance(call.func, ast.Name) and call.func.id in ("isinstance", "cast", "TypeVar", "NamedTuple"):
             return

@@ -78,6 +78,11 @@ def test_what_is_no_behaviour_is_not_changed() -> None:
     assert not [each for each in mutants("line.py", SOURCE) if each.before in ("int", "bytes", "each + 1")]
 
 
+def test_the_assertion_in_a_zip_is_no_behaviour() -> None:
+    assert changes(b"def f(a, b):\n    g(zip(a, strict=True), sort(a, reverse=True))\n") >= {("True", "False")}
+    assert changes(b"def f(a):\n    for x in zip(a, strict=True):\n        h = x\n") == set()
+
+
 def test_each_mutant_is_another_program_and_names_its_function() -> None:
     whole = ast.dump(ast.parse(SOURCE))
     for each in mutants("line.py", SOURCE):
