@@ -122,18 +122,22 @@ def test_the_tests_of_a_line_are_those_that_executed_it_the_fast_ones_first(tmp_
         data.execute("create table file (id, path)")
         data.execute("create table arc (file_id, context_id, fromno, tono)")
         data.executemany(
-            "insert into context values (?, ?)", [(0, ""), (1, "t.py::slow[1]|run"), (2, "t.py::fast|run")]
+            "insert into context values (?, ?)",
+            [(0, ""), (1, "t.py::slow[1]|run"), (2, "t.py::fast|run"), (3, "t.py::process|run")],
         )
         data.execute("insert into file values (1, ?)", (str(rooms.ROOT / "multidrop" / path),))
-        arcs = [(1, 0, first, last), (1, 1, -1, first), (1, 1, first, last), (1, 2, first, -1)]
+        arcs = [(1, 0, first, last), (1, 1, -1, first), (1, 1, first, last), (1, 2, first, -1), (1, 3, first, last)]
         data.executemany("insert into arc values (?, ?, ?, ?)", arcs)
     data.close()
     durations = "1.20s call     t.py::slow[1]\n0.30s setup    t.py::slow[2]\n0.02s call     t.py::fast\n"
+    durations += "0.01s call     t.py::process\n"
     made = tests_of.measured(tmp_path / "data", durations, ["t.py::fast"])
     slow, fast = MeasuredTest("t.py::slow", 1.5, False), MeasuredTest("t.py::fast", 0.02, True)
+    process = MeasuredTest("t.py::process", 0.01, False)
     source = (rooms.ROOT / path).read_bytes()
-    assert made.of(path, first, source) == [fast, slow] and made.of(path, last, source) == [slow]
-    assert made.of(path, first, b"\n\n" + source) == [fast, slow], "a new line elsewhere moves nothing"
+    assert made.of(path, first, source) == [fast, process, slow], "those of make quick first"
+    assert made.of(path, last, source) == [process, slow]
+    assert made.of(path, first, b"\n\n" + source) == [fast, process, slow], "a new line elsewhere moves nothing"
     assert name in made.blocks[path] and made.of("macros/model.py", 1, b"") == []
 
 

@@ -127,6 +127,13 @@ def test_bytes_have_their_bus_and_the_drive_of_their_request_and_polls_are_marke
     ]
 
 
+def test_bytes_after_a_request_that_did_not_leave_are_of_no_drive(session, tmp_path):
+    SessionLog(session, tmp_path / "day.log")
+    session.publish(OnBus("press", Sent(1.0, request("PR P"))), OnBus("press", Ended(1.0, None)))
+    session.publish(OnBus("press", Traffic(1.0, True, b"\x1b")), OnBus("press", Traffic(1.0, False, b">")))
+    assert [each.get("drive") for each in without_time(tmp_path / "day.log")[1:]] == [None, None]
+
+
 def test_commands_and_stops_are_marked_and_a_stop_is_before_its_bytes(session, tmp_path):
     SessionLog(session, tmp_path / "day.log")
     for each in (
