@@ -63,11 +63,11 @@ unmeasured: $(VENV)/.dev
 	-$(PYTEST) --measure-all --cov --cov-report= --cov-context=test --durations=0 > $(VENV)/durations.txt
 	$(BIN)/python -m tests.support.choose_measured .coverage $(VENV)/durations.txt
 
-# Measure again which tests execute which line, for `make mutants`: half an hour.
+# Measure again which tests execute which line, for `make mutants`: half an hour. TESTS="tests/drives": of these alone.
 map: $(VENV)/.dev
-	-COVERAGE_FILE=$(VENV)/map $(PYTEST) --measure-cases --cov --cov-report= --cov-context=test --durations=0 > $(VENV)/durations.txt
-	$(BIN)/python -m pytest --collect-only -q -m "$(QUICK)" > $(VENV)/quick.txt
-	$(BIN)/python -m soak.drawn --measured $(VENV)/map $(VENV)/durations.txt $(VENV)/quick.txt
+	-COVERAGE_FILE=$(VENV)/map $(PYTEST) --measure-cases --cov --cov-report= --cov-context=test --durations=0 $(TESTS) > $(VENV)/durations.txt
+	$(BIN)/python -m pytest --collect-only -q -m "$(QUICK)" $(TESTS) > $(VENV)/quick.txt
+	$(BIN)/python -m soak.drawn --measured $(VENV)/map $(VENV)/durations.txt $(VENV)/quick.txt $(if $(TESTS),--some)
 
 # Draw mutants of the product by a seed, and say which of them the tests and the seeds see: ROOM=drives N=100 SEED=7.
 mutants: $(VENV)/.dev

@@ -30,10 +30,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument(
         "--measured", nargs=3, metavar=("DATA", "DURATIONS", "QUICK"), help="make the map of tests anew"
     )
+    parser.add_argument("--some", action="store_true", help="keep what is known of tests that were not measured")
     chosen = parser.parse_args(arguments)
     if chosen.measured:
         data, durations, quick = map(Path, chosen.measured)
-        tests_of.keep(tests_of.measured(data, durations.read_text(), quick.read_text().split()))
+        made = tests_of.measured(data, durations.read_text(), quick.read_text().split())
+        tests_of.keep(tests_of.joined(tests_of.kept(), made) if chosen.some else made)
         return 0
     if not tests_of.FILE.exists() and not chosen.list:
         print(f"{tests_of.FILE} is missing; `make map` makes it", file=sys.stderr)

@@ -104,16 +104,45 @@ def _compact(executed: dict[str, dict[int, set[str]]], times: dict[str, float], 
     tests = [MeasuredTest(name, round(max(times[name], UNTIMED), 2), name in fast) for name in names]
     blocks: dict[str, dict[str, list[tuple[list[int], list[int]]]]] = {}
     for path in sorted({each for room in ROOMS for each in files(room)} & set(executed)):
-        found: dict[str, dict[tuple[int, ...], list[int]]] = defaultdict(lambda: defaultdict(list))
+        found: dict[str, dict[int, set[int]]] = defaultdict(dict)
         places = list(functions((ROOT / path).read_bytes()))
         for line, tests_of_line in sorted(executed[path].items()):
             inner = [each for each in places if each[1] <= line <= each[2]]
             if inner:
                 name, first, _ = inner[-1]
-                chosen = _chosen(tests_of_line, times, weights)
-                found[name][tuple(sorted(number[each] for each in chosen))].append(line - first)
-        blocks[path] = {name: [(lines, list(chosen)) for chosen, lines in each.items()] for name, each in found.items()}
+                found[name][line - first] = {number[each] for each in _chosen(tests_of_line, times, weights)}
+        blocks[path] = _grouped(found)
     return Map(tests, blocks)
+
+
+def joined(old: Map, new: Map) -> Map:
+    """Return the map with what was measured anew: the tests of these files replace all that was known of the files."""
+    again = {each.node.partition("::")[0] for each in new.tests}
+    tests = {each.node: each for each in old.tests if each.node.partition("::")[0] not in again}
+    tests |= {each.node: each for each in new.tests}
+    names = sorted(tests)
+    number = {name: at for at, name in enumerate(names)}
+    lines: dict[str, dict[str, dict[int, set[int]]]] = {}
+    for made in (old, new):
+        for path, functions_of_path in made.blocks.items():
+            for name, blocks in functions_of_path.items():
+                here = lines.setdefault(path, {}).setdefault(name, {})
+                for offsets, numbers in blocks:
+                    kept_here = {number[node] for at in numbers if (node := made.tests[at].node) in number}
+                    for offset in offsets:
+                        here.setdefault(offset, set()).update(kept_here)
+    return Map([tests[name] for name in names], {path: _grouped(each) for path, each in lines.items()})
+
+
+def _grouped(lines: dict[str, dict[int, set[int]]]) -> dict[str, list[tuple[list[int], list[int]]]]:
+    """The blocks of the functions of a file, from the tests of each line."""
+    found: dict[str, list[tuple[list[int], list[int]]]] = {}
+    for name, tests_of_lines in lines.items():
+        blocks: dict[tuple[int, ...], list[int]] = defaultdict(list)
+        for offset, tests in sorted(tests_of_lines.items()):
+            blocks[tuple(sorted(tests))].append(offset)
+        found[name] = [(offsets, list(tests)) for tests, offsets in blocks.items()]
+    return found
 
 
 def _chosen(tests: set[str], times: dict[str, float], weights: Counter[str]) -> set[str]:

@@ -141,6 +141,20 @@ def test_the_tests_of_a_line_are_those_that_executed_it_the_fast_ones_first(tmp_
     assert name in made.blocks[path] and made.of("macros/model.py", 1, b"") == []
 
 
+def test_what_is_measured_anew_replaces_all_that_was_known_of_a_test_file() -> None:
+    a, old, other = (
+        MeasuredTest("a.py::a", 1.0, True),
+        MeasuredTest("b.py::old", 2.0, True),
+        MeasuredTest("c.py::c", 3.0, False),
+    )
+    b = MeasuredTest("b.py::b", 0.5, True)
+    before = Map([a, old, other], {"x.py": {"f": [([0, 1], [0, 1]), ([2], [2])], "g": [([0], [1])]}})
+    made = tests_of.joined(before, Map([b], {"x.py": {"f": [([1, 3], [0])]}}))
+    source = b"def f():\n    1\n    2\n    3\n"
+    assert [made.of("x.py", line, source) for line in (1, 2, 3, 4)] == [[a], [b, a], [other], [b]]
+    assert [each.node for each in made.tests] == ["a.py::a", "b.py::b", "c.py::c"]
+
+
 def test_a_trial_has_time_for_the_fast_tests_and_for_one_at_least() -> None:
     slow = [MeasuredTest("a", 100.0, True), MeasuredTest("b", 0.1, True)]
     assert trial.chosen(slow) == slow[:1]
