@@ -292,7 +292,9 @@ def described(name: str, language: Language | None = None, product: str = "") ->
         return [*verb.described(), *["Needs the screen, which multidrop tui shows."] * (verb.fits in ON_SCREEN)]
     for each in [language] if language else languages():
         if each.knows(name):
-            return each.describe(name, product)
+            verb = f"/{name.lower()}"
+            more = [f"also: the verb {verb}; help {verb} explains it"] if verb in {**VERBS, **SCRIPT_VERBS} else []
+            return [*each.describe(name, product), *more]
     if f"/{name}" in VERBS:
         return described(f"/{name}")
     word = name.lower() if name.startswith("/") else f"/{name.lower()}"
