@@ -109,14 +109,14 @@ class Returns:
         stale = any(drive.settings[name][1] != drive.commands for name in parts if name in drive.settings)
         commanded = drive.commands != commands or drive.started_at > at or stale
         positions = drive.rested
-        if not positions and not commanded and self._program_guessed(drive):
-            positions = places
+        if not commanded and not self._ran_program(drive):
+            positions = positions or places
         return Known(_identity(drive), positions, settings, commanded, read=at > NEVER)
 
-    def _program_guessed(self, drive: Drive) -> bool:
-        """Whether a program is only taken to run, because the drive was not asked yet."""
+    def _ran_program(self, drive: Drive) -> bool:
+        """Whether a drive has shown that a program runs; false where that is only a guess."""
         runs = drive.running is not None and drive.running.runs
-        return not (runs or drive in self._programs_read)
+        return runs or (drive.state.running and drive in self._programs_read)
 
     async def _follow(self) -> None:
         while True:
