@@ -104,7 +104,7 @@ async def test_a_line_goes_where_it_says(both, line, bus, sent):
         ("^MA 0", "@^ MA 0"),
         ("@* bMR 5", "@b MR 5"),
         ("b MR 10000", "@b MR 10000"),
-        ("b  SL=0", "@b SL=0"),
+        ("b  SL 0", "@b SL 0"),
     ],
 )
 async def test_an_address_at_the_head_of_a_command_is_refused_with_the_right_spelling(both, line, right):
@@ -144,7 +144,7 @@ async def test_an_address_without_a_blank_behind_it_is_told_so(tmp_path, line):
         assert cell.written("l") == b""
 
 
-@pytest.mark.parametrize("line", ["PR P", "aS=0", "xMR 5", "bX 5", "b", "BX=5"])
+@pytest.mark.parametrize("line", ["PR P", "aS=0", "xMR 5", "bX 5", "b", "BX=5", "b R1", "b P"])
 async def test_a_command_that_begins_like_an_address_is_sent_as_it_is(both, line):
     with contextlib.suppress(Refused):
         await both.run(line)

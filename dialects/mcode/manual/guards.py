@@ -106,6 +106,8 @@ def addressed(text: str, product: str) -> tuple[str, str] | None:
     line = bare(text)
     if (found := _NAMED.match(line)) is None or _read(line, product) is not None:
         return None
+    if found.end() > 1 and parsed(line) is not None:
+        return None  # `b R1` may set a variable of a program
     rest = line[found.end() :]
     statement = parsed(rest)
     known = statement is not None and lookup(statement.word, product) is not None
