@@ -141,8 +141,15 @@ def seen(data: bytes, besides: str) -> str:
     readable = sum(0x20 <= byte < 0x7F or byte in b"\t\r\n\x06\x15" for byte in data)
     if not data or (frames := spoken(data, besides)):
         return frames if data else ""
+    one = len(data) == 1
     if 2 * readable < len(data):
-        return f"{len(data)} bytes came, {readable or 'none'} of them readable: another baud rate?"
+        how = (
+            "1 byte came, and is not readable"
+            if one
+            else f"{len(data)} bytes came, {readable or 'none'} of them readable"
+        )
+        return f"{how}: another baud rate?"
     text = visible(data[:SHOWN].decode("latin-1").strip())
     repeated = "or an adapter that repeats what it sends (echo=local)"
-    return f"{len(data)} bytes came that are no reply ('{text}'): another language, {repeated}?"
+    came = "1 byte came that is no reply" if one else f"{len(data)} bytes came that are no reply"
+    return f"{came} ('{text}'): another language, {repeated}?"

@@ -332,9 +332,11 @@ class Conversation(Generic[T]):
 
     def _end(self, result: tuple[T, ...] = (), error: BaseException | None = None) -> None:
         if isinstance(error, NoAnswer):
-            error = explained(error, self._link, self._state.codec.family)
+            error = explained(
+                error, self._link, self._state.codec.family, "" if self._searching else self._state.address
+            )
         elif (error is None or isinstance(error, Refused)) and self._last is not None and not self._searching:
-            self._link.heard.replied()
+            self._link.heard.replied(self._state.address)
         self._outcome = Outcome(result, error, self._first, self._last)
         self._leave()
 

@@ -90,6 +90,8 @@ class Heard:
     def __init__(self) -> None:
         self.answered = False
         """A drive has replied."""
+        self.addresses: set[str] = set()
+        """The addresses of the drives that have replied."""
         self.came = b""
         self._written: list[bytes] = []
 
@@ -101,9 +103,10 @@ class Heard:
         if not self.answered and len(self._written) < MOST_HEARD:
             self._written.append(data)
 
-    def replied(self) -> None:
-        """Forget what came: from now on the line is known to work."""
+    def replied(self, address: str) -> None:
+        """Note a drive that has replied. Forget what came: from now on the line is known to work."""
         self.answered, self.came, self._written = True, b"", []
+        self.addresses.add(address)
 
     def foreign(self) -> bytes:
         """What came, without the repetition of what was written."""

@@ -264,7 +264,7 @@ class Roster:
     def found(self, state: DriveState) -> None:
         self.drives[state.address] = Drive(self.conversations, self, state)
         if state.product and not state.settings_unknown:
-            self.link.heard.replied()
+            self.link.heard.replied(state.address)
         self._follow()
 
     def settings_may_have_changed(self, drives: Iterable[Drive]) -> None:

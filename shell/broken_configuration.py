@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any, TypeVar
 
 from multidrop.dialects import Diagnostic
-from multidrop.dialects.files import split_lines, toml_keys, toml_names, toml_of
+from multidrop.dialects.files import split_lines, toml_keys, toml_names, toml_of, utf8_of
 
 WAY = "--no-config goes on without the file"
 _HEADER = re.compile(r"\s*\[\[?([^\]]*)\]")
@@ -115,6 +115,14 @@ def placed(message: str, text: str, where: str, hint: str = "") -> Diagnostic:
     key = re.match(r"(?:no key )?([\w.-]+)", message)
     line = line_of(text, key[1].rstrip(".").split(".")) if key else 0
     return Diagnostic(message, f"{where}:{line}" if line else where, hint)
+
+
+def placed_in_file(message: str, where: str) -> Diagnostic:
+    """The same with the text of that file, if it can be read."""
+    try:
+        return placed(message, utf8_of(where), where)
+    except Diagnostic:
+        return Diagnostic(message, where)
 
 
 def line_of(text: str, key: Sequence[str]) -> int:

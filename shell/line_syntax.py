@@ -84,7 +84,11 @@ def parse(line: str) -> TypedLine | None:
         if not target:
             raise Diagnostic("no address after the @", line, "valid: @ADDR TEXT or @BUS:ADDR TEXT")
         if not text:
-            raise Diagnostic(f"nothing to send to {target}", f"@{target}", f"/use {target} selects it")
+            raise Diagnostic(
+                f"nothing to send to {target}",
+                f"@{target}",
+                f"valid: @ADDR TEXT, with a blank between them; /use {target} selects it",
+            )
         if text.startswith("/"):
             raise Diagnostic(f"{text.split()[0]} is a verb and takes no @{target}", line, f"/help {text.split()[0]}")
         return DriveLine(text, bus, address or None, typed)

@@ -28,8 +28,9 @@ from textual.screen import Screen
 
 from multidrop.dialects import Diagnostic
 from multidrop.drives.events import Unsolicited
-from multidrop.shell.broken_configuration import placed
+from multidrop.shell.broken_configuration import placed, placed_in_file
 from multidrop.shell.configuration import DEFAULT_LOOK, Look, Settings, parse
+from multidrop.shell.connect.urls import wrong_urls
 from multidrop.shell.events import Failed, OnBus, Printed, SessionEvent, StateChanged
 from multidrop.shell.session import Session
 from multidrop.tui.actions import Actions, Parts
@@ -139,7 +140,8 @@ class MultidropApp(Dressed):
         self._set_actions()
         self.set_keymap(self.keymap.changed)
         self._troubles = [*map(str, session.settings.problems)]
-        self._troubles += [f"{look.where}: {trouble}" for trouble in [*self.keymap.troubles, *wrong_theme(look.theme)]]
+        wrong = [*self.keymap.troubles, *wrong_theme(look.theme)]
+        self._troubles += [str(placed_in_file(trouble, look.where)) for trouble in wrong]
 
     def _set_actions(self) -> None:
         """Make what keys, the palette and the session ask of the screen."""
@@ -455,9 +457,10 @@ def bindings() -> list[BindingType]:
 
 
 def look_troubles(found: Settings, text: str, where: str) -> list[Diagnostic]:
-    """What is wrong in a configuration that only the screen knows, keys and themes, and files that it names."""
+    """What is wrong in a configuration beyond its form: keys, themes, the URLs of connections, files that it names."""
     look = found.look
     troubles = [*keymap(bindings(), look.keys).troubles, *wrong_theme(look.theme), *found.mqtt.unreadable()]
+    troubles += wrong_urls(found.connections.values())
     return [placed(trouble, text, where) for trouble in troubles]
 
 

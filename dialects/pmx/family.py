@@ -38,6 +38,7 @@ GUARDS: Mapping[str, str] = {
 QUIET: Mapping[str, frozenset[str]] = {"SR": frozenset({"0", "2"}), "EO": frozenset({"0"}), "SL": frozenset({"0"})}
 """Values that stop a program, a motor or its correction: no address makes them a guarded command."""
 _NUMBER = re.compile(r"\A\s*@\d{2}", re.ASCII)
+_ADDRESSED = re.compile(r"\s*@?(\d{2})\s*(?=[A-Za-z])", re.ASCII)
 
 
 def guarded(text: str, address: str) -> Guard | None:
@@ -53,6 +54,13 @@ def guarded(text: str, address: str) -> Guard | None:
 def only_ends(text: str) -> bool:
     """Whether a command of motion can only end it: that ends a program (SR)."""
     return word_of(text.strip()) == "SR" and text.partition("=")[2].strip() in QUIET["SR"]
+
+
+def addressed(text: str, product: str) -> tuple[str, str] | None:
+    """Split a line into a device number and a command (`01PX`, as on the wire, with its @ or without)."""
+    found = _ADDRESSED.match(text)
+    rest = text[found.end() :] if found is not None else ""
+    return (found[1], rest) if found is not None and lookup(rest.upper()) is not None else None
 
 
 def word_of(text: str) -> str:
@@ -90,4 +98,5 @@ PMX = Family(
     values_at="multidrop.dialects.pmx.host.values:VALUES",
     units_at="multidrop.dialects.pmx.host.units:UNITS",
     stop_bytes=STOP_BYTES,
+    addressed=addressed,
 )

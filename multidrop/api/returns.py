@@ -58,6 +58,8 @@ class Returns:
         self._tasks: dict[Bus, asyncio.Task[None]] = {}
         self._refused: set[tuple[Drive, str]] = set()
         """Parts that a drive refuses: each refusal may start a subroutine for errors in it."""
+        self._programs_read: set[Drive] = set()
+        """The drives that were asked, since their line is open, whether a program runs; of others that is a guess."""
         self._following = asyncio.get_running_loop().create_task(self._follow())
         self._leave = shell.subscribe(self._take, Lost, Changed)
 
@@ -94,6 +96,8 @@ class Returns:
                 if part.slow:
                     drive.settings[part.name] = facts, commands
                     found |= facts
+        if every:
+            self._programs_read.add(drive)
         return found
 
     def _known(self, drive: Drive) -> Known:
@@ -101,10 +105,18 @@ class Returns:
         parts = [name for name in parts if (drive, name) not in self._refused]
         current = all(name in drive.settings and drive.settings[name][1] == drive.commands for name in parts)
         settings = {k: value for name in parts for k, value in drive.settings[name][0].items()} if current else None
-        at, commands, _ = drive.resting
+        at, commands, places = drive.resting
         stale = any(drive.settings[name][1] != drive.commands for name in parts if name in drive.settings)
         commanded = drive.commands != commands or drive.started_at > at or stale
-        return Known(_identity(drive), drive.rested, settings, commanded, read=at > NEVER)
+        positions = drive.rested
+        if not commanded and not self._ran_program(drive):
+            positions = positions or places
+        return Known(_identity(drive), positions, settings, commanded, read=at > NEVER)
+
+    def _ran_program(self, drive: Drive) -> bool:
+        """Whether a drive has shown that a program runs; false where that is only a guess."""
+        runs = drive.running is not None and drive.running.runs
+        return runs or (drive.state.running and drive in self._programs_read)
 
     async def _follow(self) -> None:
         while True:
@@ -121,6 +133,7 @@ class Returns:
             return
         if isinstance(event.event, Lost) and bus not in self._lost:
             self._lost[bus] = {drive: self._known(drive) for drive in bus.all_drives}
+            self._programs_read.difference_update(bus.all_drives)
         elif isinstance(event.event, Changed) and bus in self._lost and bus.link.away is None and not self._busy(bus):
             self._tasks[bus] = asyncio.get_running_loop().create_task(self._compare(bus))
 

@@ -134,7 +134,7 @@ def _screen(urls: list[str], reconnect: bool = True, raw: bool = False, twin: bo
 
 def help_(chosen: argparse.Namespace) -> int:
     """Explain a word in the language that is named, or in the first that has it; name the others."""
-    from multidrop.dialects.families import DEFAULT, FAMILIES, languages
+    from multidrop.dialects.families import FAMILIES, languages
     from multidrop.shell.streams.stdout import write
     from multidrop.shell.verbs.session import explained, overview
 
@@ -144,7 +144,7 @@ def help_(chosen: argparse.Namespace) -> int:
         lines = language.describe_error(int(word[:9])) if _is_number(word) else language.describe(word)
     elif word:
         having = [each for each in languages() if _has(each, word)]
-        lines = explained(word, having[0] if having else FAMILIES[DEFAULT].language)
+        lines = explained(word, having[0] if having else None)
         others = {name: family.language for name, family in FAMILIES.items() if family.language in having[1:]}
         same = [name for name, each in others.items() if explained(word, each) == lines]
         lines = [

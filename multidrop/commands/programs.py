@@ -14,11 +14,9 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 from multidrop.dialects import Diagnostic
-from multidrop.dialects.families import program_language_of
-from multidrop.dialects.files import program_text_of
 from multidrop.dialects.program_files import errors
 from multidrop.dialects.text import counted
-from multidrop.shell.programs.checking import Checked, examine, rewrite
+from multidrop.shell.programs.checking import Checked, examine, rewrite, to_run
 from multidrop.shell.streams.stdout import fail, reader_left, shortened, write
 
 if TYPE_CHECKING:
@@ -104,12 +102,13 @@ def _test(file: str, chosen: argparse.Namespace, given: DriveSpec | None, severa
     from multidrop.simulator.program_run import Debugging
 
     began = time.perf_counter()
-    programs = PROGRAMS[chosen.language or program_language_of(file)]
     head = {"file": file} if several else {}
     debugging = Debugging(chosen.trace, chosen.breaks, chosen.watch)
     failed = False
     try:
-        loaded = programs.read(program_text_of(file), file)(given or programs.drive)
+        text, language = to_run(file, chosen.language or "")
+        programs = PROGRAMS[language]
+        loaded = programs.read(text, file)(given or programs.drive)
         if several and not chosen.json:
             write(sys.stdout, f"{file}:")
         for event in loaded.run(chosen.run, chosen.until, debugging):

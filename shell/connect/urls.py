@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import PurePath
 from typing import Any
@@ -99,6 +99,15 @@ def parse(text: str, saved: Mapping[str, SavedConnection] | None = None) -> Conn
             hint = "write it without the password; for ssh, set up a key with ssh-copy-id"
             raise Diagnostic("no URL here has a password", url_without_secrets(text), hint) from None
         raise Diagnostic(problem.message, without_secrets(problem.where), problem.hint) from None
+
+
+def wrong_urls(connections: Iterable[SavedConnection]) -> Iterator[str]:
+    """What is wrong with the URLs of saved connections, each with its key."""
+    for each in connections:
+        try:
+            parse(each.url)
+        except Diagnostic as problem:
+            yield f"connections.{each.name}.url: {problem}"
 
 
 def _anchored(connection: Connection, folder: str) -> Connection:

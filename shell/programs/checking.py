@@ -104,13 +104,26 @@ def ending_of(product: str) -> str:
     return known[(names or list(known))[0]].endings[0]
 
 
-def _other_language(text: str, language: str) -> Problem | None:
-    """Report that a text is a correct program of another language; None if it is not."""
+def _other_language(text: str, language: str, verb: str = "check it with") -> Problem | None:
+    """Report that a text is a correct program of another language; None if it is not. `verb`: what to do as well."""
     if not (name := correct_in(text, language)):
         return None
     known = program_languages()
-    hint = f"name it {' or '.join(known[name].endings)}, or check it with --language {name}"
+    hint = f"name it {' or '.join(known[name].endings)}, or {verb} --language {name}"
     return Problem(1, 1, f"this is {known[name].title}, not {known[language].title}", hint)
+
+
+def to_run(file: str, language: str = "") -> tuple[str, str]:
+    """Return the text of a program file that is to be run, and its language: as given, else by its name.
+
+    Raises Diagnostic if it cannot be read, or is a program of another language than its name says.
+    """
+    text = program_text_of(file)
+    spoken = language or program_language_of(file)
+    if not language and errors(program_languages()[spoken].language.check(text)):
+        other = _other_language(text, spoken, "give")
+        refuse([other] if other is not None else [], file)
+    return text, spoken
 
 
 def rewrite(checked: Checked) -> None:

@@ -17,9 +17,8 @@ from pathlib import Path
 from random import Random
 
 from multidrop.dialects import Diagnostic
-from multidrop.dialects.families import program_language_of
-from multidrop.dialects.files import program_text_of
 from multidrop.shell import configuration
+from multidrop.shell.programs.checking import to_run
 from multidrop.shell.sweeps.trial import Case, Job, Result, bench, version
 from multidrop.shell.sweeps.variation import (
     DRIVE,
@@ -153,8 +152,7 @@ class Plan:
 
 def make(asked: Asked) -> Plan:
     """Read the files and check everything, before anything runs. Raises Diagnostic."""
-    language = asked.language or program_language_of(asked.file)
-    program = program_text_of(asked.file)
+    program, language = to_run(asked.file, asked.language)
     default = PROGRAMS[language].drive
     allow = configuration.load().allowed if asked.cell else ()
     bare = Placed("", "", default, {"personality": default.personality, "name": default.name})

@@ -8,7 +8,7 @@ import re
 from typing import NamedTuple
 
 from multidrop.dialects import Diagnostic, Stopped
-from multidrop.dialects.families import DEFAULT, FAMILIES, languages
+from multidrop.dialects.families import DEFAULT, FAMILIES, languages, program_languages
 from multidrop.dialects.family import Language
 from multidrop.dialects.motions import Outcome
 from multidrop.shell import configuration, stop_report, waits
@@ -290,9 +290,16 @@ def described(name: str, language: Language | None = None, product: str = "") ->
     if name.startswith("/") and name in VERBS:
         verb = VERBS[name]
         return [*verb.described(), *["Needs the screen, which multidrop tui shows."] * (verb.fits in ON_SCREEN)]
+    files = program_languages().items()
+    stored = {key: lines for key, each in files if (lines := each.editing.describe(name, product))}
+    also = f"/{name.lower()}"
+    more = [f"also: the verb {also}; help {also} explains it"] * (also in VERBS or also in SCRIPT_VERBS)
     for each in [language] if language else languages():
         if each.knows(name):
-            return each.describe(name, product)
+            return [*each.describe(name, product), *more]
+    for key, lines in stored.items():
+        if language is FAMILIES[key].language:
+            return [*lines, *more]
     if f"/{name}" in VERBS:
         return described(f"/{name}")
     word = name.lower() if name.startswith("/") else f"/{name.lower()}"
@@ -303,7 +310,9 @@ def described(name: str, language: Language | None = None, product: str = "") ->
             f"{meaning[0].upper()}{meaning[1:]}.",
             "In scripts only: multidrop run SCRIPT, or /play of a macro.",
         ]
-    if language and (others := [key for key, family in FAMILIES.items() if family.language.knows(name)]):
+    if language is None and stored:
+        return [*next(iter(stored.values()))]
+    if language and (others := [key for key, each in FAMILIES.items() if key in stored or each.language.knows(name)]):
         raise Diagnostic(
             f"this drive has no command {name}", "/help", f"multidrop help {name} --dialect {others[0]} explains it"
         )

@@ -19,7 +19,7 @@ from multidrop.simulator.lexium.device import MCodeDevice
 from multidrop.simulator.lexium.state.program_memory import Program
 from multidrop.simulator.world import World
 
-SETUPS = frozenset({"IS", "LS", "OS", "PF", "PW", "TA", "TC", "TI", "TM", "TP", "TR", "TT"}) | {
+SETUPS = frozenset({"DN", "IS", "LS", "MU", "OS", "PF", "PW", "TA", "TC", "TI", "TM", "TP", "TR", "TT"}) | {
     f"S{n}" for n in (*range(1, 6), *range(7, 14))
 }
 JOINS = frozenset({"LB", "CL"})

@@ -12,7 +12,7 @@ from multidrop import AsyncSession, DriveError, Lost, Timeout, TransportLost, Un
 from multidrop.api.returns import Returns
 from multidrop.drives.events import Traffic
 from multidrop.shell.events import OnBus
-from tests.support.cell_session import bus, drive, pmx
+from tests.support.cell_session import bus, drive, party, pmx
 
 pytestmark = pytest.mark.virtual
 IS = 'set = { EM = 1, IS = ["1,1,0"] }'
@@ -139,6 +139,33 @@ async def test_a_drive_that_got_no_command_and_was_not_read_yet_is_moved(
         await shop.a.move(5)
         await shop.a.wait()
         assert await shop.a.position() == 5
+
+
+@pytest.mark.parametrize("asked", [False, True])
+@pytest.mark.parametrize("restarted", [False, True])
+async def test_a_drive_whose_program_was_not_asked_for_yet_is_not_said_to_have_run_one(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, restarted: bool, asked: bool
+) -> None:
+    async def positions_only(returns: Returns, drive: Any) -> None:
+        if not drive.strict:
+            drive.strict = True
+            await drive.motion()
+            if asked:
+                await returns._settings(drive, every=True)
+
+    monkeypatch.setattr(Returns, "note", positions_only)
+    # With a checksum, a program is taken to run until the drive is asked.
+    (tmp_path / "cell.toml").write_text(bus("line", party("a"), party("b", "identity = { position = 300 }"), baud=0))
+    async with connect_async(f"sim:{tmp_path / 'cell.toml'}", reconnect=True) as session:
+        shop = Shop(session, "b")
+        await asyncio.sleep(1)
+        await shop.lose(*["power b off", "power b on"] * restarted)
+        await session.drive("a").move(5)
+        if restarted:
+            with pytest.raises(Unreferenced, match="position 300 before its line was lost, 0 now"):
+                await shop.a.move(5)
+        else:
+            await shop.a.move(5)
 
 
 async def test_a_drive_that_was_commanded_and_not_read_is_not_known_to_be_as_it_was(

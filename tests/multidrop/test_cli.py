@@ -152,6 +152,10 @@ def test_the_version_says_which_extras_are_installed(monkeypatch):
         (["EX", "--dialect", "pmx"], "E: encoder's position", ""),
         (["5"], "status 5: the EEPROM is locked", ""),
         (["/plot"], "/plot ", ""),
+        (["ja"], "JA: Jump\n", "  use        in programs only"),
+        (["DJNZ", "--dialect", "tmcl"], "DJNZ: Count a user variable down", "  use        in programs only"),
+        (["wait"], "WAITX: ", "also: the verb /wait; help /wait explains it"),
+        (["STOP"], "STOP: ", "also: the verb /stop; help /stop explains it"),
         ([], "Stop and end:\n", ""),
     ],
 )

@@ -60,6 +60,8 @@ def test_what_does_not_count_is_shown_as_the_default(file, capsys):
         ("[keys]\npalete = '^G'\n", ":2: keys.palete: no such function"),
         ("[screen]\ntheme = 'pink'\n", ":2: screen.theme: no theme pink"),
         ("[screen]\ncolour = 'pink'\n", ":2: no key screen.colour"),
+        ("[connections.a]\nurl = '/dev/ttyX?bau=9600'\n", ":2: connections.a.url: /dev/ttyX?bau=9600: no key bau"),
+        ("[connections.a]\nunits = {}\nurl = 'tcp://'\n", ":3: connections.a.url: tcp://: tcp: needs //HOST:PORT"),
         ("[screen\n", "multidrop.toml"),
     ],
 )

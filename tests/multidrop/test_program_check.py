@@ -247,6 +247,9 @@ LATER = "a drive refuses it when it executes it"
         ("PF=20,1", "LMDCM", "error 21"),
         ("TT=70000,Ga\nTE=8", "LMDCM", "error 21"),
         ("S1=99,0,0", "MDI", "error 8"),
+        ("DN=b", "LMDCM", "error 21"),
+        ('DN="bc"', "LMDOM", "error 21"),
+        ("MU=1,7", "LMDCM", "error 21"),
         ("LS=0,500,1\nLS=1,100,1", "LMDCM", "after the set-ups before it (error 21"),
         ("IS=1,1,0\nIS=2,1,0", "LMDCM", "after the set-ups before it (error 6"),
     ],
@@ -269,6 +272,8 @@ def test_a_set_up_in_a_program_is_checked_as_one_outside_of_it(
         "IS=1,1,0\nIS=1,0,0\nIS=2,1,0",
         "LS=1,100,1\nLS=0,-100,1",
         "TR=100,0,5\nTE=16",
+        'DN="b"',
+        "MU=2,1",
     ],
 )
 def test_nothing_is_said_of_a_set_up_that_the_drive_may_take(check: Check, lines: str) -> None:

@@ -14,7 +14,7 @@ from multidrop.shell.events import By, Entered, Failed, Notified, OnBus, Output,
 from multidrop.shell.scripts.executor import play
 from multidrop.shell.streams.stdout import report
 from multidrop.transports import TransportLost
-from tests.support.cell_session import ETHERNET, CellSession, bus, drive, party
+from tests.support.cell_session import ETHERNET, CellSession, bus, drive, party, pmx
 
 pytestmark = pytest.mark.virtual
 
@@ -103,6 +103,8 @@ async def test_a_line_goes_where_it_says(both, line, bus, sent):
         ("*SL 0", "@* SL 0"),
         ("^MA 0", "@^ MA 0"),
         ("@* bMR 5", "@b MR 5"),
+        ("b MR 10000", "@b MR 10000"),
+        ("b  SL 0", "@b SL 0"),
     ],
 )
 async def test_an_address_at_the_head_of_a_command_is_refused_with_the_right_spelling(both, line, right):
@@ -121,7 +123,28 @@ async def test_the_name_of_a_drive_that_is_alone_is_no_part_of_its_commands(tmp_
         assert cell.written("alone") == b""
 
 
-@pytest.mark.parametrize("line", ["PR P", "aS=0", "xMR 5", "bX 5", "b", "BX=5"])
+@pytest.mark.parametrize(
+    ("line", "right"),
+    [("01PX", "@01 PX"), ("01X1000", "@01 X1000"), ("00 STOPX", "@00 STOPX"), ("@00 01EX=1", "@01 EX=1")],
+)
+async def test_a_number_at_the_head_of_a_command_of_a_controller_is_refused_likewise(tmp_path, line, right):
+    async with Press(tmp_path, bus("p", pmx("00"), pmx("01"))) as cell:
+        with pytest.raises(Inexpressible, match=re.escape(f"is not a command: write {right}; nothing was sent")):
+            await cell.run(line)
+        assert cell.written("p") == b""
+
+
+@pytest.mark.parametrize("line", ["@01PX", "@bMR 5", "@2GAP 1, 0", "@01X1000"])
+async def test_an_address_without_a_blank_behind_it_is_told_so(tmp_path, line):
+    module = 'personality = "TMCM"\nname = "2"'
+    cells = {"@0": bus("l", pmx("00"), pmx("01")), "@b": bus("l", party("a"), party("b")), "@2": bus("l", module)}
+    async with Press(tmp_path, cells[line[:2]]) as cell:
+        with pytest.raises((Inexpressible, Diagnostic), match="blank"):
+            await cell.run(line)
+        assert cell.written("l") == b""
+
+
+@pytest.mark.parametrize("line", ["PR P", "aS=0", "xMR 5", "bX 5", "b", "BX=5", "b R1", "b P"])
 async def test_a_command_that_begins_like_an_address_is_sent_as_it_is(both, line):
     with contextlib.suppress(Refused):
         await both.run(line)

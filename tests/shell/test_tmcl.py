@@ -9,6 +9,7 @@ import pytest
 
 from multidrop.dialects import DriveError, Inexpressible, NoAnswer, Refused, Stopped
 from multidrop.dialects.families import TABLE
+from multidrop.dialects.tmcl.manual import instructions
 from multidrop.drives.events import Sample, Unsolicited
 from multidrop.drives.stop_forms import stop_forms
 from multidrop.shell.connect.urls import parse as parse_url
@@ -98,6 +99,8 @@ async def test_help_and_completion_are_those_of_the_module(session):
     await say(session, "@1 MST 0")
     assert (await say(session, "/help ROL"))[0].startswith("ROL: Rotate left")
     assert (await say(session, "/help 4"))[0].startswith("status 4: invalid value")
+    for word, row in instructions.WORDS.items():
+        assert (await say(session, f"/help {word}"))[0] == f"{word}: {row.title}"
     assert "MVP" in [each.text for each in complete(session, "MV")]
     assert "maximum positioning velocity" in hint(session, "SAP 4")
 

@@ -128,6 +128,18 @@ def test_an_error_is_below_the_state_and_its_number_is_not_invented() -> None:
     assert "✗ lim+" in text(narrow_rows(view(readout((0.0, 5, 0), conditions=wrong), 0.1), 80))
 
 
+def test_an_error_that_polls_report_as_well_is_shown_once_and_not_only_as_an_old_one() -> None:
+    limit = replace(FACTS, error=128, error_text="plus limit error")
+    made = readout((0.0, 5, 0), conditions=limit)
+    made.take(Sample(0.1, "a", 5, 0, trouble="plus limit error"))
+    assert text(drive_rows(view(made, 0.2), 50, 20)).count("plus limit error") == 1
+    made.take(Sample(9.0, "a", 5, 0, trouble="plus limit error"))
+    rows = drive_rows(view(made, 9.0), 50, 20)
+    assert rows[1] == ((" ✗ plus limit error", "error"),) and "(old)" in text(rows)
+    made.take(Sample(9.1, "a", 5, 0, trouble="stalled"))
+    assert "✗ stalled" in text(drive_rows(view(made, 9.1), 50, 20))
+
+
 def test_old_conditions_are_dim_and_say_their_age() -> None:
     made = readout(*CRUISE)
     rows = drive_rows(view(made, 9.0), 50, 20)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -102,14 +104,16 @@ async def test_a_key_that_was_set_works_and_is_shown() -> None:
 
 
 @pytest.mark.tui
-async def test_a_wrong_setting_is_said_at_the_start() -> None:
+async def test_a_wrong_setting_is_said_at_the_start(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("multidrop.toml").write_text('[screen]\ntheme = "no-such"\nsigns = "ascii"\n[keys]\nnothing = "^D"\n')
     look = Look("no-such", "ascii", keys={"nothing": "^D"}, where="multidrop.toml")
     app = MultidropApp(demo_session(), (), FakeAssist(), look=look)
     async with app.run_test(size=(120, 24)) as pilot:
         await settle(pilot)
         shown = app.main.page("press").plain
-        assert "multidrop.toml: keys.nothing: no such function" in shown
-        assert "multidrop.toml: screen.theme: no theme no-such" in shown
+        assert "multidrop.toml:5: keys.nothing: no such function" in shown
+        assert "multidrop.toml:2: screen.theme: no theme no-such" in shown
         assert app.signs.font is Signs.ASCII
 
 

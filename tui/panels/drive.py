@@ -351,11 +351,11 @@ def axis_rows(glance: Glance, axis: Readout, now: float, width: int) -> list[Row
 
 
 def _troubles(axis: Readout, now: float) -> list[Span]:
-    """The trouble that polls report, and the error with its text."""
-    found: list[Span] = [(f"✗ {axis.trouble}", "error")] if axis.trouble else []
-    if axis.conditions is not None and axis.conditions.error:
-        found.append(error_span(axis.conditions, axis.aged(now)))
-    return found
+    """The trouble that polls report, and the error with its text, which may say the same."""
+    known = axis.conditions if axis.conditions is not None and axis.conditions.error else None
+    same = known is not None and known.error_text == axis.trouble and not axis.aged(now)
+    found: list[Span] = [(f"✗ {axis.trouble}", "error")] if axis.trouble and not same else []
+    return [*found, error_span(known, axis.aged(now))] if known is not None else found
 
 
 def unit_of(axis: Readout, otherwise: str) -> str:

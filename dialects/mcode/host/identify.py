@@ -177,13 +177,15 @@ def _likely(names: Sequence[str], hints: Hints) -> Procedure[list[MCodeState]]:
 
 def _no_reply(hints: Hints, party: bool | None) -> str:
     names = ", ".join(hints.drives)
-    tried = f"none of the drives {names} replies" if names else "no drive replies"
+    several = f"none of the drives {names} replies"
+    tried = several if len(hints.drives) > 1 else f"{names} does not reply" if names else "no drive replies"
     forms = [] if party else ["outside of party mode"]
     guesses = ", ".join(dict.fromkeys((*_tried(hints), *_last_names(hints), UNNAMED)))
-    forms += [] if names else [f"as {guesses} in party mode"]
-    how = f" (MCode {' and '.join(forms)} was tried)" if forms else ""
+    forms += ["in party mode"] if names else [f"as {guesses} in party mode"]
+    how = f" (MCode {' and '.join(forms)} was tried)" if len(forms) > 1 else ""
     advice = ", party=0 where it is alone and not in party mode" if party and hints.party is None else ""
-    return f"{tried}{how}; drives=a,b,... names those of a party line{advice}; {SEARCH}"
+    named = "drives=NAMES names others" if names else "drives=a,b,... names those of a party line"
+    return f"{tried}{how}; {named}{advice}; {SEARCH}"
 
 
 def _by_name_first(hints: Hints) -> Procedure[MCodeState | None]:

@@ -44,7 +44,7 @@ VELOCITIES = frozenset({"SL", "JE"})
 _WORD = re.compile(r"\s*([A-Za-z]{2})(?![A-Za-z0-9])\s*=?\s*(.*)", re.DOTALL)
 _ANY = re.compile("|".join((*AT_ONCE, *SETTINGS, r"\\c")), re.IGNORECASE)
 _RESET = re.compile(r"(?<!\\)(?:\\\\)*\\c")
-_NAMED = re.compile(r"([!-~])(?=[A-Za-z])")
+_NAMED = re.compile(r"([!-~])[ \t]*(?=[A-Za-z])")
 
 
 def find(text: str, *, address: str, party: bool, product: str, starts: Callable[[str], bool]) -> Guard | None:
@@ -106,7 +106,9 @@ def addressed(text: str, product: str) -> tuple[str, str] | None:
     line = bare(text)
     if (found := _NAMED.match(line)) is None or _read(line, product) is not None:
         return None
-    rest = line[1:]
+    if found.end() > 1 and parsed(line) is not None:
+        return None  # `b R1` may set a variable of a program
+    rest = line[found.end() :]
     statement = parsed(rest)
     known = statement is not None and lookup(statement.word, product) is not None
     return (found[1], rest) if known else None
@@ -148,7 +150,7 @@ def _head(line: str, product: str) -> tuple[str, str, int | str]:
     if (found := _read(line, product)) is not None:
         return "", *found
     if (named := _NAMED.match(line)) is not None:
-        return named[1], *(_read(line[1:], product) or ("", ""))
+        return named[1], *(_read(line[named.end() :], product) or ("", ""))
     return "", "", ""
 
 

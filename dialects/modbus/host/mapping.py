@@ -126,11 +126,14 @@ def _parameter(argument: Argument | None) -> str:
 
 
 def write(register: Register, value: int) -> bytes:
-    """Write a value into its registers, whatever its range. Raises Inexpressible where it does not fit."""
-    low, high = INT32 if register.count == 2 else (-0x8000, 0xFFFF)
+    """Write a value into its registers, whatever its range. Raises Inexpressible where it does not fit.
+
+    One register has no sign: -1 there is 65535, which HT and others accept.
+    """
+    low, high = INT32 if register.count == 2 else (0, 0xFFFF)
     if not low <= value <= high:
-        bits = 16 * register.count
-        raise Inexpressible(f"{value} does not fit into the {bits} bits of {register.name}; nothing was sent")
+        bits = f"{16 * register.count} bits of {register.name}{', which have no sign' if not low else ''}"
+        raise Inexpressible(f"{value} does not fit into the {bits}; nothing was sent")
     return pdu_codec().write_registers(register.address, framing.words_of(value, register.count))
 
 

@@ -12,7 +12,7 @@ from multidrop.dialects.certifying import Certifying, repaired
 from multidrop.dialects.codec import End, Kind, Priority, Procedure, Reply, Request
 from multidrop.dialects.errors import Inexpressible, NoAnswer, Refused, Stopped
 from multidrop.dialects.exchange import Exchange
-from multidrop.dialects.family import Hints, Motion, Referencing
+from multidrop.dialects.family import ADDRESSES, Hints, Motion, Referencing
 from multidrop.dialects.tmcl.host.codec import (
     FACTORY,
     LENGTH,
@@ -239,6 +239,8 @@ def parsed(state: TmclState, text: str) -> tuple[Request, Call]:
     try:
         call = commands.parse(text)
     except commands.LineError as error:
+        if state.address not in ("", *ADDRESSES):
+            number_of(state.address)  # in `@2GAP 1, 0` the address is what is wrong
         raise Inexpressible(f"'{text.strip()}': {error}; nothing was sent") from None
     return state.codec.request(state.address, text.strip(), call), call
 

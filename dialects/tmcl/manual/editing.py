@@ -87,13 +87,7 @@ def words(line: str, names: Container[str]) -> list[Word]:
 
 
 def describe(word: str, product: str) -> list[str]:
-    row = instructions.WORDS.get(word.upper())
-    if row is None:
-        return []
-    if help.knows(word):
-        return help.describe(word, product)
-    lines = [f"{row.word}: {row.title}", f"  syntax     {row.syntax}"]
-    return [*lines, "  note       it can start motion"] if row.moves else lines
+    return help.describe(word, product) if word.upper() in instructions.WORDS else []
 
 
 def typing(before: str) -> str:

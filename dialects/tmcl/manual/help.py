@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from multidrop.dialects.errors import Diagnostic
+from multidrop.dialects.tmcl.manual import instructions
 from multidrop.dialects.tmcl.manual.commands import REFUSALS, WORDS, Command, Row
 from multidrop.dialects.tmcl.manual.modules import RELATIVE_FROM, Parameter, module_of
 
@@ -22,6 +23,8 @@ def knows(word: str) -> bool:
 
 def describe(word: str, product: str = "") -> list[str]:
     row = WORDS.get(word.strip().upper())
+    if row is None and (stored := instructions.WORDS.get(word.strip().upper())) is not None:
+        return _stored(stored)
     if row is None:
         raise Diagnostic(f"no command {word.strip()!r}", "", f"valid: {', '.join(WORDS)}")
     lines = [f"{row.word}: {row.title}", f"  syntax     {row.syntax}"]
@@ -37,6 +40,13 @@ def describe(word: str, product: str = "") -> list[str]:
             limits = f", {each.valid}" if each.writable else ""
             lines.append(f"  {number:>3}  {each.title}{unit}{limits}")
     return lines
+
+
+def _stored(row: instructions.Row) -> list[str]:
+    """Describe a word that only a program has."""
+    lines = [f"{row.word}: {row.title}", f"  syntax     {row.syntax}"]
+    lines += [f"  {each.name:<10} {each.hint.removeprefix('valid: ')}" for each in row.fields]
+    return [*lines, *["  note       it can start motion"] * row.moves, "  use        in programs only"]
 
 
 def describe_error(code: int, product: str = "") -> list[str]:

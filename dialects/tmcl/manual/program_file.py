@@ -270,6 +270,8 @@ def check(text: str, product: str = "") -> list[Problem]:
     marks = [each for n, line in enumerate(lines, 1) for each in check_comment(line, n, remark_at(line))]
     wrong = {each.line for each in unreadable}
     problems = [*unreadable, *(each for each in (*made.problems, *marks) if each.line not in wrong)]
+    if not made.lines and not errors(problems):  # as the backup of a module without one
+        problems.append(Problem(1, 1, "holds no program", "a download of it leaves the module without one", True))
     return in_order([*problems, *_warnings(made, {each.line for each in errors(problems)})])
 
 

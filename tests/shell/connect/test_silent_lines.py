@@ -9,6 +9,7 @@ from typing import Any
 import pytest
 
 from multidrop.dialects import DriveError
+from multidrop.dialects.families import seen
 from multidrop.dialects.state import Remembered
 from multidrop.shell.configuration import Settings
 from multidrop.shell.connect import opening
@@ -17,6 +18,7 @@ from multidrop.shell.connect.urls import parse
 from multidrop.shell.session import Session
 from multidrop.shell.state.port_state import PortState
 from tests.support.cases import for_each
+from tests.support.cell_session import CellSession, bus, drive, party, pmx
 from tests.support.talker import Talker
 
 pytestmark = pytest.mark.virtual
@@ -74,13 +76,53 @@ async def test_noise_is_told_from_text_and_from_our_own_bytes(tmp_path, monkeypa
 
 
 async def test_a_line_that_has_replied_is_not_doubted(tmp_path):
-    from tests.support.cell_session import CellSession, bus, party
-
     async with CellSession(tmp_path, bus("b", party("a"), party("c"))) as cell:
         cell.world("power c off")
         with pytest.raises(DriveError) as caught:
             await cell.session.run("@c PR P")
-        assert "A and B" not in str(caught.value)
+        assert "A and B" not in str(caught.value) and "so far" not in str(caught.value)
+
+
+MODULE = drive("TMCM", "1")
+
+
+@for_each(
+    "number, drives, line",
+    [
+        (1, [party("a")], "@b PR P"),
+        (2, [party("a")], "@b MR 100"),
+        (3, [pmx("00")], "@07 PX"),
+        (4, [MODULE], "@7 GAP 1, 0"),
+    ],
+)
+async def test_a_silent_drive_on_a_line_that_works_has_causes_of_its_own(tmp_path, number, drives, line):
+    folder = tmp_path / str(number)
+    folder.mkdir()
+    async with CellSession(folder, bus("b", *drives)) as cell:
+        with pytest.raises(DriveError) as caught:
+            await cell.session.run(line)
+    text = str(caught.value)
+    assert [each for each in ("its power", "its name or address", "its baud rate") if each not in text] == [], text
+    assert "A and B" not in text
+
+
+@for_each(
+    "url, lazy, says",
+    [
+        (f"{PORT}?drives=a", False, "a does not reply (MCode outside of party mode and in party mode was tried)"),
+        (f"{PORT}?party=1&drives=a", False, "a does not reply; drives=NAMES names others"),
+        (f"{PORT}?drives=a,b", False, "none of the drives a, b replies; drives=NAMES names others"),
+    ],
+)
+async def test_the_names_that_were_given_are_not_advised_again(tmp_path, monkeypatch, url, lazy, says):
+    text = await failure(tmp_path, monkeypatch, url, lazy, False)
+    assert text.startswith(says) and "drives=a,b," not in text, text
+
+
+async def test_one_byte_is_one(tmp_path, monkeypatch):
+    text = await failure(tmp_path, monkeypatch, f"{PORT}?dialect=pmx", False, False, says=b"x", every=1.5)
+    assert "1 byte came that is no reply ('x')" in text, text
+    assert seen(b"\xff", "mcode") == "1 byte came, and is not readable: another baud rate?"
 
 
 class Gateway(Talker):
