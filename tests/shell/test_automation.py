@@ -13,7 +13,7 @@ from multidrop.shell.scripts.executor import run_script
 from multidrop.transports import TransportLost
 from tests.support.cell_session import ETHERNET, CellSession, bus, party, pmx
 
-pytestmark = [pytest.mark.virtual, pytest.mark.slow]
+pytestmark = pytest.mark.virtual
 
 FLOOR = (
     bus("press", party("a"), party("b")),
@@ -57,6 +57,7 @@ async def shop(tmp_path):
         yield made
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("runs", [script, sent, macro])
 @pytest.mark.parametrize(
     ("ending", "failure"),

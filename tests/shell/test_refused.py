@@ -10,7 +10,7 @@ from multidrop.shell.prompt.terminal_input import run_lines
 from multidrop.transports import TransportLost
 from tests.support.cell_session import ETHERNET, CellSession, bus, drive, party, pmx
 
-pytestmark = [pytest.mark.virtual, pytest.mark.slow]
+pytestmark = pytest.mark.virtual
 
 SINGLE = 'personality = "LMDCM"'
 PROGRAM = ("PG 1", "LB G1", "SL 20000", "LB G2", "H 100", "BR G2", "E", "PG")
@@ -46,6 +46,7 @@ REFUSED = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("line", REFUSED.values(), ids=REFUSED)
 @pytest.mark.parametrize("em", [0, 1, 2, 3])
 @pytest.mark.parametrize("ck", [0, 1])
@@ -75,6 +76,7 @@ async def test_a_refused_line_ends_no_program(personality, tmp_path):
         assert shop.printed()[-1] == "1" and stops(shop) == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "line", ["RC=200", "/register 0x67 =70000", "/register 0x67 =200", "VM=0", "STATUS", "PR ER,XX"]
 )
@@ -103,6 +105,7 @@ async def test_an_accepted_move_and_then_a_typo_stops_that_drive_alone_by_its_ow
         assert [text for text in shop.warned() if "stopped" in text] == ["stopped a: velocity 0 was read from a"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("em", [0, 1, 2, 3])
 @pytest.mark.parametrize("ck", [0, 1, 2])
 async def test_the_stop_of_one_drive_leaves_the_line_as_it_was(em, ck, tmp_path):
@@ -193,6 +196,7 @@ async def test_a_drive_that_was_read_at_rest_since_needs_no_stop(tmp_path):
         assert stops(shop) == [] and b"aE" not in shop.written("press") and b"\x1b" not in shop.written("press")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("lines", [("TI 1,OO", "TE=1"), ("JE=1",)], ids=["trips", "an input that moves it"])
 async def test_a_drive_at_rest_that_may_move_again_is_stopped(lines, tmp_path):
     async with CellSession(tmp_path, press()) as shop:
@@ -239,6 +243,7 @@ RETURNS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("cell", "lines", "stop"), RETURNS.values(), ids=RETURNS)
 async def test_the_stop_that_a_loss_kept_from_a_drive_is_sent_once_the_line_is_back(cell, lines, stop, tmp_path):
     async with CellSession(tmp_path, cell, reconnect=True) as shop:
@@ -275,6 +280,7 @@ async def running(shop):
     return shop.printed()[-2:]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("line", ["STATUS", "X9", "HSPDX=-4", "@* STATUS"])
 async def test_a_refused_line_ends_no_program_of_a_controller(line, tmp_path):
     async with CellSession(tmp_path, bus("stages", pmx("00"), pmx("01"))) as shop:
@@ -322,6 +328,7 @@ async def test_a_refused_line_stops_no_module(line, tmp_path):
         assert shop.moving() == {"slide:1"} and stops(shop) == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("line", ["SAP 2, 0, 2000", "SAP 0, 0, 900000", "ROR 0, 500", "MVP ABS, 0, 90000"])
 async def test_what_a_module_accepted_is_stopped(line, tmp_path):
     async with CellSession(tmp_path, bus("slide", drive("TMCM"), drive("TMCM", "7"))) as shop:

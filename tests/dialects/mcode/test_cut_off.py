@@ -15,8 +15,6 @@ from tests.support.cases import for_each
 from tests.support.faults import disturb
 from tests.support.mcode_drives import MODES, Witness
 
-pytestmark = pytest.mark.slow
-
 MOVES_ON_ERROR = ("PG 1", "LB G1", "OE X1", "E", "LB X1", "SL 50000", "RT", "PG", "EX G1")
 TILDES = b"~" * 65
 
@@ -42,6 +40,7 @@ def found(desk, party, **hints):
     return desk.run(identify.identify(Hints(drives=drives, party=party or None, **hints)))
 
 
+@pytest.mark.slow
 @for_each("escape", range(4))
 @pytest.mark.parametrize(("em", "party", "check"), MODES)
 def test_half_a_line_of_our_own_overflows_between_stops(bench, em, party, check, escape):
@@ -64,6 +63,7 @@ def test_a_stop_stands_before_and_behind_what_overflows_and_no_end_of_a_line_bef
     assert second == b"\x1b\x05a\x05a\x1b\n\x1b\x05"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("em", "party", "check"), MODES)
 def test_on_a_clean_line_opening_raises_no_error_and_stops_nothing(bench, em, party, check):
     desk, device, _ = left(bench, em, party, check, program=MOVES_ON_ERROR)
@@ -73,6 +73,7 @@ def test_on_a_clean_line_opening_raises_no_error_and_stops_nothing(bench, em, pa
     assert not any(TILDES in data or b"\x1b" in data or b"\x05" in data for data in desk.written)
 
 
+@pytest.mark.slow
 @for_each("half", [b"MR 5", b"aMR 5", b"MA 51200", b"aSL 5", b"*MR 5"])
 @pytest.mark.parametrize(("em", "party", "check"), MODES)
 def test_half_a_line_of_somebody_elses_is_not_executed_either(bench, em, party, check, half):
@@ -98,6 +99,7 @@ def killed(bench, em=1, party=True, check=1):
     return desk, device, witness, Owed(em, name, *(OWED.product, OWED.version, OWED.part), f"0401{ord(name):05d}")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("half", [b"", b"aMR 51200"])
 @pytest.mark.parametrize(("em", "party", "check"), [mode for mode in MODES if mode[0]])
 def test_what_was_owed_is_put_back_and_said(bench, em, party, check, half):
