@@ -8,8 +8,10 @@ from multidrop.dialects.families import FAMILIES
 from multidrop.dialects.mcode.host.codec import MCode
 from multidrop.dialects.mcode.host.state import MCodeState
 from multidrop.dialects.mcode.manual.guards import AT_ONCE, NAMES, SETTINGS
+from multidrop.dialects.modbus.host.codec import Modbus, ModbusState
+from multidrop.dialects.modbus.manual.registers import REGISTERS
 
-FAMILY = FAMILIES["mcode"]
+FAMILY, MODBUS = FAMILIES["mcode"], FAMILIES["modbus"]
 PARTY, ALONE = MCodeState(MCode(party=True), "a"), MCodeState(MCode())
 EVERY = MCodeState(MCode(party=True), "*")
 QUEUED = MCodeState(MCode(party=True), "^")
@@ -60,8 +62,11 @@ def named(state, text):
 def test_every_form_of_a_guarded_line_is_guarded():
     assert set(GUARDED) == {*AT_ONCE, *SETTINGS, "PR"} == set(NAMES) - {"*"}
     for name, texts in GUARDED.items():
-        for text in texts:
+        for text in (*texts, *map(str.lower, texts)):
             assert named(PARTY, text) == name, text
+            assert FAMILY.guards.word_of(text) == name, text
+            over = MODBUS.guards.find(ModbusState(Modbus()), text)
+            assert (over.name if over else "") == (name if name in REGISTERS else ""), text
 
 
 def test_what_a_line_does_is_said_with_the_line():
