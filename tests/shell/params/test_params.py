@@ -16,7 +16,7 @@ from multidrop.shell.params.file import read
 from multidrop.shell.session import Session
 from multidrop.transports import TransportLost
 
-pytestmark = [pytest.mark.virtual, pytest.mark.slow]
+pytestmark = pytest.mark.virtual
 
 CELL = """
 [[bus]]
@@ -191,6 +191,7 @@ async def test_program_mode_is_refused(session):
         await say(session, "/params restore kept.toml b")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("text", "said"),
     [
@@ -291,6 +292,7 @@ async def test_a_value_that_is_not_what_was_sent_is_a_failure(session, tmp_path)
         await say(session, "/params restore kept.toml b")
 
 
+@pytest.mark.slow
 async def test_every_family_goes_into_a_file_and_back(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     session = await opened(tmp_path, OTHERS)
