@@ -125,8 +125,9 @@ def test_a_line_to_all_that_can_start_a_drive_is_guarded():
         "FOO",
         "CA 1",
     ):
-        assert named(EVERY, text) == named(QUEUED, text) == "*", text
-        assert named(PARTY, text) == "", text
+        for form in (text, text.lower()):
+            assert named(EVERY, form) == named(QUEUED, form) == "*", form
+            assert named(PARTY, form) == "", form
     assert named(EVERY, "CP") == "CP" and named(QUEUED, "AS=3") == "AS"
 
 
@@ -140,12 +141,12 @@ def test_a_typed_name_counts_as_the_address_that_it_is_on_the_wire():
         "aMR 5": "",
         "aPY=0": "PY",
     }.items():
-        assert named(ALONE, text) == name, text
+        assert named(ALONE, text) == named(ALONE, text.lower()) == name, text
 
 
 def test_a_stop_to_all_is_never_guarded():
     for text in ("SL 0", "SL=0", "SL0", "sl 0 'stop", "SL -0", "E", "PS", "JE=0", "DE=0", "AS=0", "TQ 0", "PR P", "S"):
-        assert named(EVERY, text) == "", text
+        assert named(EVERY, text) == named(EVERY, text.lower()) == "", text
 
 
 @given(st.text(alphabet="CPFDASL=01\"', \t+a*\x1b\x00é", max_size=12))
