@@ -130,7 +130,7 @@ async def test_an_expectation_does_not_see_what_others_print_meanwhile(line, at,
     await shop.session.run(line)
     assert any("READY" in each for each in shop.printed())
     assert await checking == 's.txt:3: /expect "READY" 2: wanted "READY" within 2 s, seen nothing'
-    assert [each.printed for each in shop.results] == [("going",), (), ()]
+    assert [(each.drive, each.printed) for each in shop.results] == [("a", ("going",)), ("", ()), ("", ())]
 
 
 @pytest.mark.parametrize(
