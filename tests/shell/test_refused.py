@@ -317,6 +317,19 @@ async def test_a_program_of_a_controller_that_was_started_is_ended_and_named(tmp
         assert "program ended: 00" in shop.warned()
 
 
+@pytest.mark.parametrize("lines", [("SR0=1", "JY+"), ("JY+", "SR0=1")])
+async def test_a_program_and_a_motion_of_one_automation_are_both_ended_in_any_order(lines, tmp_path):
+    async with CellSession(tmp_path, bus("stages", pmx("00"), pmx("01"))) as shop:
+        await programs(shop)
+        await typed(shop.session, "@stages:00 SR0=0", "@stages:00 SR1=0", "@stages:00 ABORT")
+        shop.events.clear()
+        with pytest.raises(Refused, match="STATUS"):
+            await sent(shop.session, *(f"@stages:00 {line}" for line in lines), "/sleep 1", "@stages:00 STATUS")
+        await asyncio.sleep(1)
+        assert shop.moving() == set() and await running(shop) == ["0", "0"]
+        assert b"SR0=0" in shop.written("stages") and "program ended: 00" in shop.warned()
+
+
 @pytest.mark.parametrize("line", ["SAP 4, 0, -99999999", "NONSENSE", "SAP 200, 0, 1", "GAP 250, 0"])
 async def test_a_refused_line_stops_no_module(line, tmp_path):
     async with CellSession(tmp_path, bus("slide", drive("TMCM"), drive("TMCM", "7"))) as shop:
