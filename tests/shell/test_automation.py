@@ -134,10 +134,11 @@ async def test_a_program_counts_when_it_is_executed_and_not_when_it_is_stored(tm
     with pytest.raises(Refused):
         await script(shop.session, *store, "@press:a PR XX")
     assert shop.moving() == {"press:b"}
-    with pytest.raises(Refused):
-        await script(shop.session, "@press:a EX G1", "/sleep 1", "@press:a PR XX")
-    assert shop.moving() == {"press:b"}
-    assert shop.warned()[-2].startswith("stopped press:a: ") and shop.warned()[-1] == "program ended: press:a"
+    for line in ("@press:a EX G1", f"/download {tmp_path / 'p.mxt'} press:a --run G1"):
+        with pytest.raises(Refused):
+            await script(shop.session, line, "/sleep 1", "@press:a PR XX")
+        assert shop.moving() == {"press:b"}
+        assert shop.warned()[-2].startswith("stopped press:a: ") and shop.warned()[-1] == "program ended: press:a"
 
 
 async def test_what_could_not_be_reached_is_named(shop):
