@@ -59,7 +59,12 @@ WHAT = {
         {"JO": Started(None, False, True), "SLX=1": Started(frozenset("x"), False, True)},
     ),
     Tmcl(): (
-        {"129, 0, 0, 0": ANYTHING, "MVP COORD, 0, 5": MOTION, "RFS START, 2": Started(frozenset("2"), False, False)},
+        {
+            "129 0, 0, 0": ANYTHING,
+            "200 0, 0, 0": ANYTHING,
+            "MVP COORD, 0, 5": MOTION,
+            "RFS START, 2": Started(frozenset("2"), False, False),
+        },
     ),
 }
 """What a stop of an early end must end: axes, a program, and what moves the drive again after it was at rest."""
