@@ -266,6 +266,17 @@ async def test_an_interruption_stops_what_every_automation_started(shop):
     assert shop.moving() == {"gantry:d"} and len(shop.session.automations.interrupted) == 3
 
 
+async def test_what_is_started_again_after_an_interruption_is_stopped_by_the_next_one(shop):
+    async with shop.session.automations.run():
+        for _ in range(2):
+            await shop.session.run(GO["press:a"])
+            assert shop.moving() == {"press:a"}
+            shop.session.interrupt()
+            await asyncio.sleep(2.0)
+            assert shop.moving() == set()
+        shop.session.automations.leave()
+
+
 async def test_an_operators_lines_go_on_beside_a_macro_that_fails(shop):
     asked = [asyncio.create_task(shop.session.run(f"@gantry:d PR {n}")) for n in range(20)]
     with pytest.raises(DriveError):
