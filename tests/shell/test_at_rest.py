@@ -15,6 +15,7 @@ from multidrop.dialects.motions import Outcome
 from multidrop.drives.drive import Drive, still
 from multidrop.drives.events import Sample
 from multidrop.drives.stopping import Fate
+from multidrop.shell.at_rest import at_rest_after_error, excused
 from multidrop.shell.events import OnBus
 from multidrop.shell.waits import standings, wait
 from tests.support.cell_session import CellSession, bus, party
@@ -105,6 +106,14 @@ async def test_silence_after_the_end_of_a_motion_confirms_no_rest(family, tmp_pa
             with pytest.raises(NoAnswer):
                 await still(drive)
         assert await still(drive)
+
+
+async def test_a_silent_drive_is_excused_from_no_stop(tmp_path):
+    async with CellSession(tmp_path, bus("press", party("a"))) as shop:
+        drive = shop.session.selected
+        for power, rests in (("on", True), ("off", False)):
+            shop.world(f"/sim power a {power}")
+            assert await excused(drive) is await at_rest_after_error(drive) is rests
 
 
 @pytest.mark.parametrize("family", FAMILY_NAMES)

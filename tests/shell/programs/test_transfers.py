@@ -89,6 +89,16 @@ async def test_a_program_is_started_after_it_was_verified(tmp_path: Path, shop: 
     assert shop.printed()[-1] == "100"
 
 
+async def test_a_changed_file_is_preceded_by_a_backup_of_what_the_drive_holds(
+    tmp_path: Path, shop: CellSession
+) -> None:
+    await load(shop, tmp_path)
+    (tmp_path / "p.mxt").write_text("PG 1\nLB G7\nE\nPG\n")
+    told = await load(shop, tmp_path, "--only-changed")
+    assert told.index("a: p.mxt downloaded, 4 lines") > 1 and told[1].startswith("backup: ")
+    assert "LB G1" in kept(tmp_path)[-1].read_text()
+
+
 @pytest.mark.slow
 async def test_what_the_drive_holds_already_is_not_sent_again(tmp_path: Path) -> None:
     text = f"VM=400000\nIS=1,0,0\n{FILE}"
