@@ -20,7 +20,7 @@ from multidrop.drives.line import Line, Write, merged
 from multidrop.drives.stop_forms import stop_forms
 from multidrop.simulator.serving.in_process import SimPipe
 from tests.drives.test_pmx import BYTE, Wire
-from tests.support.cell_session import drive
+from tests.support.cell_session import CellSession, bus, drive, party, pmx
 from tests.support.simulated_bus import SimulatedBus
 
 pytestmark = pytest.mark.virtual
@@ -318,6 +318,17 @@ async def test_two_stops_of_single_controllers_cut_each_other_off_neither_do_the
     assert {*first(wire, 0.0)} == {"01", "03"}
     assert wire.collisions == []
     await bus.close()
+
+
+async def test_a_stop_takes_back_the_rest_of_a_line_and_not_of_a_frame(tmp_path):
+    floor = {"press": party("a"), "stages": pmx("00"), "slide": drive("TMCM")}
+    async with CellSession(tmp_path, *(bus(name, each) for name, each in floor.items())) as shop:
+        dropped = {}
+        for name, each in shop.session.buses.items():
+            each.link.transport.discard = lambda whole=False, name=name: dropped.setdefault(name, whole) and 0
+            assert stop_forms(each.roster).framed is (name == "slide")
+        shop.session.stop()
+        assert dropped == {"press": False, "stages": False, "slide": True}
 
 
 async def test_modules_in_download_mode_do_not_wait_for_the_repetition_of_the_others():
