@@ -132,6 +132,28 @@ async def test_drives_are_polled_only_while_somebody_looks(desk):
     assert desk.events == []
 
 
+async def test_a_line_is_reserved_behind_the_poll_under_way_and_polled_on_where_that_is_given_up(desk):
+    desk.bus.telemetry.subscribe(("a", "b"), 0.0)
+    await until(lambda: {each.address for each in desk.events if isinstance(each, Sample)} == {"a", "b"})
+    given_up = asyncio.create_task(desk.bus.reserve())
+    await asyncio.sleep(0)
+    given_up.cancel()
+    with pytest.raises(asyncio.CancelledError):
+        await given_up
+    assert not desk.bus.link.reserved
+    await asyncio.sleep(1.0)
+    desk.events.clear()
+    await asyncio.sleep(1.0)
+    assert {each.address for each in desk.events if isinstance(each, Sample)} == {"a", "b"}
+    desk.events.clear()
+    async with asyncio.timeout(1.0):
+        await desk.bus.reserve()
+    assert len(desk.sent) <= 1 and desk.bus.link.reserved
+    desk.events.clear()
+    await asyncio.sleep(1.0)
+    assert desk.sent == []
+
+
 async def test_a_drive_that_is_renamed_is_found_under_its_new_name_only(desk):
     drive = desk.bus.drives["b"]
     await drive.send('DN="z"')
