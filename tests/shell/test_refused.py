@@ -5,6 +5,9 @@ import asyncio
 import pytest
 
 from multidrop.dialects import Diagnostic, DriveError, NoAnswer, Refused
+from multidrop.drives import stopping
+from multidrop.drives.stop_readings import read_activity
+from multidrop.drives.stopping import Fate
 from multidrop.shell.events import By
 from multidrop.shell.prompt.terminal_input import run_lines
 from multidrop.transports import TransportLost
@@ -315,6 +318,41 @@ async def test_a_program_of_a_controller_that_was_started_is_ended_and_named(tmp
             await sent(shop.session, "@stages:00 SR0=1", "/sleep 1", "@stages:00 STATUS")
         assert await running(shop) == ["0", "0"]
         assert "program ended: 00" in shop.warned()
+
+
+@pytest.mark.parametrize(
+    "lines",
+    [
+        ("@slide:1 ROR 0, 2000", "/sleep 2", "@slide:1 SAP 5, 0, 1000"),
+        ("@stages:00 JX+",),
+    ],
+)
+async def test_a_single_stop_is_confirmed_by_two_readings_of_rest_in_a_row(lines, tmp_path, monkeypatch):
+    readings = []
+
+    async def read(drive, axes):
+        found, why = await read_activity(drive, axes)
+        readings.append(found.speed)
+        return found, why
+
+    monkeypatch.setattr(stopping, "read_activity", read)
+    floor = bus("slide", drive("TMCM")), bus("stages", pmx("00"))
+    async with CellSession(tmp_path, *floor) as shop, shop.session.automations.run():
+        for line in (*lines, "/sleep 1"):
+            await shop.session.run(line)
+        shop.session.interrupt()
+        (halt,) = shop.session.automations.interrupted
+        seen = set()
+        for _ in range(500):
+            fate = halt.fate(halt.drives[0])
+            at_rest = readings[-2:] == [0, 0]
+            moving = bool(readings and readings[-1])
+            assert not (fate is Fate.STANDING and shop.moving())
+            assert fate is (Fate.STANDING if at_rest else Fate.MOVING if moving else Fate.SENT)
+            seen.add(fate)
+            await asyncio.sleep(0.01)
+        assert Fate.STANDING in seen and (Fate.MOVING in seen) is (len(lines) > 1)
+        shop.session.automations.leave()
 
 
 @pytest.mark.parametrize("lines", [("SR0=1", "JY+"), ("JY+", "SR0=1")])
