@@ -6,6 +6,7 @@ from typing import Any
 import pytest
 
 from multidrop.dialects import End, Stopped
+from multidrop.dialects.mcode.host.framing import sealed
 from multidrop.dialects.mcode.manual import program_file
 from multidrop.drives.events import Changed, Ended, Lost, Notice, Sample
 from multidrop.simulator.serving.in_process import SimPipe
@@ -35,6 +36,11 @@ async def opened(**more: Any) -> SimulatedBus:
     desk = await SimulatedBus(party("a"), party("b"), pipe=Deaf, timeout=0.5, **more).open("a", "b", checksum=1, em=1)
     desk.events.clear()
     return desk
+
+
+async def refused(work: asyncio.Task[Any]) -> None:
+    with pytest.raises(Stopped):
+        await work
 
 
 @pytest.fixture
@@ -152,6 +158,46 @@ async def test_a_line_is_reserved_behind_the_poll_under_way_and_polled_on_where_
     desk.events.clear()
     await asyncio.sleep(1.0)
     assert desk.sent == []
+
+
+async def test_the_line_knows_how_long_a_stop_leaves_and_what_it_cut_off(desk):
+    line, byte_time = desk.bus.line, 10 / 9600
+    await asyncio.sleep(1.0)
+    desk.bus.stop()
+    (stop,) = desk.sent
+    assert line.transmitted == pytest.approx(desk.bus.now() + len(stop) * byte_time)
+    assert not line.half_sent(desk.bus.now()), "no line was cut off"
+    await asyncio.sleep(3.0)
+    desk.events.clear()
+    moving = asyncio.create_task(desk.send("a", "MR 51200"))
+    await until(lambda: b"MR 51200" in desk.written)
+    desk.bus.stop()
+    stop = desk.sent[-1]
+    assert b"~" * 65 in stop and line.half_sent(desk.bus.now()), "until it has left whole"
+    assert line.transmitted == pytest.approx(desk.bus.now() + len(stop) * byte_time)
+    await refused(moving)
+    await asyncio.sleep(0.2)
+    assert not line.half_sent(desk.bus.now())
+
+
+async def test_what_a_stop_leaves_on_the_wire_is_no_print(desk):
+    for stops, heard in ((True, []), (False, ["~b"])):
+        await asyncio.sleep(5.0)
+        desk.events.clear()
+        if stops:
+            desk.bus.stop()
+        desk.bus.line.receive(sealed(b"~b") + b"\r\n", desk.bus.now())
+        desk.bus.link.advance()
+        await asyncio.sleep(0.1)
+        assert desk.heard == heard
+
+
+async def test_the_whole_stop_is_written_on_a_line_where_no_drive_is_asked(desk):
+    await desk.bus.reserve()
+    desk.events.clear()
+    desk.bus.stop()
+    await asyncio.sleep(1.0)
+    assert desk.written.startswith(b"\x1b") and desk.written.count(b"\x1b") > desk.sent[0].count(b"\x1b")
 
 
 async def test_a_drive_that_is_renamed_is_found_under_its_new_name_only(desk):
