@@ -106,6 +106,26 @@ async def test_a_stop_that_meets_the_loss_hides_no_reply_once_the_line_is_back()
     assert not desk.bus.line.overtaken
 
 
+@pytest.mark.parametrize("text", ["MR 51200", ""])
+async def test_a_line_that_a_loss_cut_off_is_made_harmless_and_stopped_before_anything_else(desk, text):
+    await asyncio.sleep(1.0)
+    if text:
+        moving = asyncio.create_task(desk.send("a", text))
+        await until(lambda: b"MR 51200" in desk.written)
+    desk.floor.command("/sim unplug w")
+    await until(lambda: desk.bus.lost)
+    if text:
+        with pytest.raises(TransportLost):
+            await moving
+    desk.floor.command("/sim plug w")
+    desk.events.clear()
+    desk.bus.resume(desk.pipe("sim:#w", desk.floor, "w", lambda: None))
+    if text:
+        assert desk.sent[0].startswith(b"\x1b") and b"~" * 65 in desk.sent[0]
+    else:
+        assert desk.sent == []
+
+
 async def test_a_lost_pipe_fails_all_that_waits_and_whatever_follows(desk):
     waiting = [asyncio.create_task(desk.send(address, "PR P")) for address in "aabb"]
     await asyncio.sleep(0.001)
