@@ -4,11 +4,16 @@ from __future__ import annotations
 
 import asyncio
 import socket
+import threading
 from collections.abc import AsyncIterator
 
 import pytest
 
 from multidrop.transports.pipe import DescriptorPipe
+from multidrop.transports.threaded import ThreadedPipe
+from tests.support.until import PATIENCE
+
+pytestmark = pytest.mark.fork
 
 ROR, MVP, GAP = bytes([1, 1] + [7] * 7), bytes([1, 4] + [8] * 7), bytes([1, 6] + [9] * 7)
 """Three frames of nine bytes."""
@@ -72,7 +77,7 @@ async def goes_on(end: Narrow, pipe: DescriptorPipe) -> bytes:
     return end.taken
 
 
-async def stop(pipe: DescriptorPipe, whole: bool, by: str) -> int:
+async def stop(pipe: DescriptorPipe | ThreadedPipe, whole: bool, by: str) -> int:
     """Write a stop in the loop, or from another thread; return the number of bytes that were dropped for it."""
     if by == "loop":
         dropped = pipe.discard(whole)
@@ -128,3 +133,47 @@ async def test_a_frame_that_was_cut_off_by_several_stops_leaves_once(wire: tuple
     dropped = [await stop(pipe, True, by) for by in ("thread", "loop", "thread")]
     assert await goes_on(end, pipe) == ROR + STOP + GAP
     assert dropped == [len(MVP), len(STOP), len(STOP)]
+
+
+class Gated:
+    """A blocking device that takes four bytes at a time. Each write waits until the gate is open."""
+
+    name, piece = "gated", 4
+
+    def __init__(self) -> None:
+        self.entered, self.open, self.taken = threading.Event(), threading.Event(), b""
+
+    def write(self, data: bytes) -> None:
+        self.entered.set()
+        assert self.open.wait(PATIENCE)
+        self.taken += data
+
+    def read(self) -> bytes | None:
+        return b""
+
+    def abort(self) -> int:
+        return 0
+
+    def cancel(self) -> None:
+        self.open.set()
+
+    def explain(self, error: OSError | None) -> str:
+        return str(error)
+
+    def close(self) -> None:
+        """Nothing is held."""
+
+
+@pytest.mark.parametrize("by", ["loop", "thread"])
+@pytest.mark.parametrize("first", [ROR, ROR[:4]])
+async def test_the_same_holds_where_a_thread_writes(first: bytes, by: str) -> None:
+    device = Gated()
+    pipe = ThreadedPipe(device)
+    for frame in (first, MVP, GAP):
+        pipe.write(frame)
+    assert await asyncio.to_thread(device.entered.wait, PATIENCE)
+    assert await stop(pipe, True, by) == len(MVP + GAP)
+    device.open.set()
+    pipe.write(GAP)
+    await pipe.close()
+    assert device.taken == first + STOP + GAP
