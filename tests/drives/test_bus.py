@@ -180,6 +180,19 @@ async def test_a_line_is_reserved_behind_the_poll_under_way_and_polled_on_where_
     assert desk.sent == []
 
 
+async def test_the_rate_of_polls_is_known_from_the_third_on_and_for_two_seconds(desk):
+    telemetry, rates = desk.bus.telemetry, []
+    desk.bus.watch(lambda event: rates.append(telemetry.rate("a")) if isinstance(event, Sample) else None)
+    polling = telemetry.subscribe(("a",), 0.25)
+    await until(lambda: len(rates) == 6)
+    assert rates[:2] == [0.0, 0.0] and rates[2:] == pytest.approx([4.0] * 4, rel=0.05)
+    polling.close()
+    await asyncio.sleep(1.0)
+    assert telemetry.rate("a") == pytest.approx(4.0, rel=0.05)
+    await asyncio.sleep(1.2)
+    assert telemetry.rate("a") == 0.0
+
+
 async def test_the_line_knows_how_long_a_stop_leaves_and_what_it_cut_off(desk):
     line, byte_time = desk.bus.line, 10 / 9600
     await asyncio.sleep(1.0)
