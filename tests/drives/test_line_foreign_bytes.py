@@ -340,6 +340,8 @@ def test_an_adapter_that_repeats_is_found_however_its_bytes_are_grouped(name, cu
     run = LineRun(line, 5.0, pieces)
     assert run.echoes == int(repeats)
     assert (line.inbox.echo is not None) is repeats
+    if name == "a print before":
+        assert run.strays == ["!"]
     if name != "a refusal":
         assert run.finished == [("PR P", End.DONE, ("5",))]
 
