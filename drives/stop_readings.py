@@ -61,6 +61,7 @@ async def read_activity(drive: Drive, axes: frozenset[str] | None) -> tuple[Acti
     for each in found:
         drive.link.publish(Sample(at, drive.address, each.position, each.velocity, each.axis, each.trouble, runs))
     speeds = zip(found, drive.seen.velocities, strict=True) if drive.seen is not None and not why else ()
-    speed = max((abs(each) for axis, each in speeds if axes is None or axis.axis in axes), default=0)
+    # The only axis of a drive has no name, whatever number its lines give it.
+    speed = max((abs(each) for axis, each in speeds if axes is None or not axis.axis or axis.axis in axes), default=0)
     places = "" if why else ", ".join(str(each.position) for each in found)
     return Activity(speed, bool(runs) and not why, places), why

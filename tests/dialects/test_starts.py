@@ -4,12 +4,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from multidrop.dialects import Started
 from multidrop.dialects.families import FAMILIES
 from multidrop.dialects.mcode.host.codec import MCode
 from multidrop.dialects.mcode.manual.table import MDRIVE, MNEMONICS
 from multidrop.dialects.modbus.host.codec import Modbus
 from multidrop.dialects.pmx.host.codec import Pmx
 from multidrop.dialects.pmx.manual.table import ROWS
+from multidrop.dialects.tmcl.host.codec import Tmcl
 from tests.support.cases import for_each
 
 STARTS = {
@@ -45,6 +47,46 @@ def test_what_can_start_something(codec, text):
 @for_each(("codec", "text"), [(d, text) for d, lines in STARTS_NOTHING.items() for text in lines])
 def test_what_starts_nothing(codec, text):
     assert not codec.starts_motion(text)
+
+
+MOTION, PROGRAM, ANYTHING = Started(None, False, False), Started(None, True, False), Started()
+WHAT = {
+    MCode(): ({"EX G1": PROGRAM, "ex g1": PROGRAM, "EX 1,2": PROGRAM, "hm 1": MOTION, "MR 5": MOTION, "SL 5": MOTION},),
+    Modbus(): ({"EX G1": PROGRAM, "ex g1": PROGRAM, "hi 2": MOTION, "MA 5": MOTION},),
+    Pmx(): (
+        {"SR0=1": PROGRAM, "SR1=3": PROGRAM, "GS3": PROGRAM, "I1:2": MOTION},
+        {"X5": Started(frozenset("x"), False, False), "X1Y2": Started(frozenset("xy"), False, False)},
+        {"JO": Started(None, False, True), "SLX=1": Started(frozenset("x"), False, True)},
+    ),
+    Tmcl(): (
+        {
+            "129 0, 0, 0": ANYTHING,
+            "200 0, 0, 0": ANYTHING,
+            "MVP COORD, 0, 5": MOTION,
+            "RFS START, 2": Started(frozenset("2"), False, False),
+        },
+    ),
+}
+"""What a stop of an early end must end: axes, a program, and what moves the drive again after it was at rest."""
+
+
+@for_each(
+    ("codec", "text", "what"),
+    [
+        *((codec, text, what) for codec, tables in WHAT.items() for each in tables for text, what in each.items()),
+        *((codec, text, ANYTHING) for codec in WHAT for text in ("XX", "foo 1")),
+        *((codec, text, ANYTHING) for codec in (MCode(), Modbus()) for text in ("JE=1", "TE=1", "PM=1")),
+    ],
+)
+def test_what_a_line_starts(codec, text, what):
+    assert codec.started(text) == what
+
+
+@given(*[st.builds(Started, st.sampled_from([None, frozenset("x"), frozenset("y")]), *[st.booleans()] * 2)] * 2)
+def test_two_lines_have_started_what_either_has(one, two):
+    both = one | two
+    assert (both.program, both.lasts) == (one.program or two.program, one.lasts or two.lasts)
+    assert both.axes == (None if None in (one.axes, two.axes) else one.axes | two.axes)
 
 
 @for_each(

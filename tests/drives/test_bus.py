@@ -6,6 +6,7 @@ from typing import Any
 import pytest
 
 from multidrop.dialects import End, Stopped
+from multidrop.dialects.mcode.host.framing import sealed
 from multidrop.dialects.mcode.manual import program_file
 from multidrop.drives.events import Changed, Ended, Lost, Notice, Sample
 from multidrop.simulator.serving.in_process import SimPipe
@@ -35,6 +36,11 @@ async def opened(**more: Any) -> SimulatedBus:
     desk = await SimulatedBus(party("a"), party("b"), pipe=Deaf, timeout=0.5, **more).open("a", "b", checksum=1, em=1)
     desk.events.clear()
     return desk
+
+
+async def refused(work: asyncio.Task[Any]) -> None:
+    with pytest.raises(Stopped):
+        await work
 
 
 @pytest.fixture
@@ -100,6 +106,26 @@ async def test_a_stop_that_meets_the_loss_hides_no_reply_once_the_line_is_back()
     assert not desk.bus.line.overtaken
 
 
+@pytest.mark.parametrize("text", ["MR 51200", ""])
+async def test_a_line_that_a_loss_cut_off_is_made_harmless_and_stopped_before_anything_else(desk, text):
+    await asyncio.sleep(1.0)
+    if text:
+        moving = asyncio.create_task(desk.send("a", text))
+        await until(lambda: b"MR 51200" in desk.written)
+    desk.floor.command("/sim unplug w")
+    await until(lambda: desk.bus.lost)
+    if text:
+        with pytest.raises(TransportLost):
+            await moving
+    desk.floor.command("/sim plug w")
+    desk.events.clear()
+    desk.bus.resume(desk.pipe("sim:#w", desk.floor, "w", lambda: None))
+    if text:
+        assert desk.sent[0].startswith(b"\x1b") and b"~" * 65 in desk.sent[0]
+    else:
+        assert desk.sent == []
+
+
 async def test_a_lost_pipe_fails_all_that_waits_and_whatever_follows(desk):
     waiting = [asyncio.create_task(desk.send(address, "PR P")) for address in "aabb"]
     await asyncio.sleep(0.001)
@@ -130,6 +156,81 @@ async def test_drives_are_polled_only_while_somebody_looks(desk):
     desk.events.clear()
     await asyncio.sleep(2)
     assert desk.events == []
+
+
+async def test_a_line_is_reserved_behind_the_poll_under_way_and_polled_on_where_that_is_given_up(desk):
+    desk.bus.telemetry.subscribe(("a", "b"), 0.0)
+    await until(lambda: {each.address for each in desk.events if isinstance(each, Sample)} == {"a", "b"})
+    given_up = asyncio.create_task(desk.bus.reserve())
+    await asyncio.sleep(0)
+    given_up.cancel()
+    with pytest.raises(asyncio.CancelledError):
+        await given_up
+    assert not desk.bus.link.reserved
+    await asyncio.sleep(1.0)
+    desk.events.clear()
+    await asyncio.sleep(1.0)
+    assert {each.address for each in desk.events if isinstance(each, Sample)} == {"a", "b"}
+    desk.events.clear()
+    async with asyncio.timeout(1.0):
+        await desk.bus.reserve()
+    assert len(desk.sent) <= 1 and desk.bus.link.reserved
+    desk.events.clear()
+    await asyncio.sleep(1.0)
+    assert desk.sent == []
+
+
+async def test_the_rate_of_polls_is_known_from_the_third_on_and_for_two_seconds(desk):
+    telemetry, rates = desk.bus.telemetry, []
+    desk.bus.watch(lambda event: rates.append(telemetry.rate("a")) if isinstance(event, Sample) else None)
+    polling = telemetry.subscribe(("a",), 0.25)
+    await until(lambda: len(rates) == 6)
+    assert rates[:2] == [0.0, 0.0] and rates[2:] == pytest.approx([4.0] * 4, rel=0.05)
+    polling.close()
+    await asyncio.sleep(1.0)
+    assert telemetry.rate("a") == pytest.approx(4.0, rel=0.05)
+    await asyncio.sleep(1.2)
+    assert telemetry.rate("a") == 0.0
+
+
+async def test_the_line_knows_how_long_a_stop_leaves_and_what_it_cut_off(desk):
+    line, byte_time = desk.bus.line, 10 / 9600
+    await asyncio.sleep(1.0)
+    desk.bus.stop()
+    (stop,) = desk.sent
+    assert line.transmitted == pytest.approx(desk.bus.now() + len(stop) * byte_time)
+    assert not line.half_sent(desk.bus.now()), "no line was cut off"
+    await asyncio.sleep(3.0)
+    desk.events.clear()
+    moving = asyncio.create_task(desk.send("a", "MR 51200"))
+    await until(lambda: b"MR 51200" in desk.written)
+    desk.bus.stop()
+    stop = desk.sent[-1]
+    assert b"~" * 65 in stop and line.half_sent(desk.bus.now()), "until it has left whole"
+    assert line.transmitted == pytest.approx(desk.bus.now() + len(stop) * byte_time)
+    await refused(moving)
+    await asyncio.sleep(0.2)
+    assert not line.half_sent(desk.bus.now())
+
+
+async def test_what_a_stop_leaves_on_the_wire_is_no_print(desk):
+    for stops, heard in ((True, []), (False, ["~b"])):
+        await asyncio.sleep(5.0)
+        desk.events.clear()
+        if stops:
+            desk.bus.stop()
+        desk.bus.line.receive(sealed(b"~b") + b"\r\n", desk.bus.now())
+        desk.bus.link.advance()
+        await asyncio.sleep(0.1)
+        assert desk.heard == heard
+
+
+async def test_the_whole_stop_is_written_on_a_line_where_no_drive_is_asked(desk):
+    await desk.bus.reserve()
+    desk.events.clear()
+    desk.bus.stop()
+    await asyncio.sleep(1.0)
+    assert desk.written.startswith(b"\x1b") and desk.written.count(b"\x1b") > desk.sent[0].count(b"\x1b")
 
 
 async def test_a_drive_that_is_renamed_is_found_under_its_new_name_only(desk):

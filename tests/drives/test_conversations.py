@@ -114,6 +114,22 @@ async def test_what_follows_a_stop_restores_and_asks_and_moves_nothing(after, se
     assert (after in desk.sent) is sent
 
 
+async def test_each_stop_of_one_drive_ends_what_it_has_begun_or_waits_for_and_nothing_of_another_drive():
+    desk, other = Desk(), DriveState(CODEC)
+    for _ in range(2):
+        desk.sent.clear()
+        runs = [desk.run("PR P", "PR V"), desk.run("PR A")]
+        beside = asyncio.ensure_future(desk.conversations.run(prints(("PR D", "PR I")), other))
+        await asyncio.sleep(REPLY_AFTER / 2)
+        desk.conversations.stop([desk.state])
+        under_way, waiting = await asyncio.gather(*runs, return_exceptions=True)
+        assert isinstance(under_way, Stopped) and "stopped; 'PR V' was not sent" in str(under_way)
+        assert isinstance(waiting, Stopped) and "stopped before it was sent" in str(waiting)
+        assert await beside == "5"
+        assert desk.sent == ["PR P", "PR D", "PR I"]
+    assert await desk.run("PR A") == "5"
+
+
 async def test_thousands_of_conversations_that_wait_end_with_a_stop_and_none_is_sent():
     desk = Desk()
     runs = [desk.run("PR P") for _ in range(3000)]

@@ -20,8 +20,6 @@ from multidrop.drives.line import Finished, Line, Write
 from tests.support.cases import for_each
 from tests.support.procedure import ProcedureRunner
 
-pytestmark = pytest.mark.slow
-
 HELD = {"a": "7", "b": "5"}
 MODES = [(em, check) for em in (1, 2) for check in (0, 1)]
 PRINTS = ["PR R1", 'PR "v",R1', "PR R1;", 'PR "so far away from home and in steps of the motor it is ",R1']
@@ -133,6 +131,7 @@ def right(two: Two, text: str) -> bool:
     return two.result == own(text) or isinstance(two.result, NoAnswer)
 
 
+@pytest.mark.slow
 @for_each("signs", [False, True])
 @pytest.mark.parametrize("text", PRINTS)
 @pytest.mark.parametrize(("em", "check"), MODES)
@@ -156,6 +155,7 @@ def test_a_late_answer_is_never_the_value_of_another_drive(em, check, text, sign
         assert two.result == own(text)
 
 
+@pytest.mark.slow
 @pytest.mark.wide
 @pytest.mark.parametrize("text", PRINTS)
 @pytest.mark.parametrize(("em", "check"), MODES)
@@ -174,6 +174,7 @@ def test_nor_where_the_two_are_cut_anywhere_into_three(em, check, text):
             assert right(two, text), (stream, first, second)
 
 
+@pytest.mark.slow
 @given(
     mode=st.sampled_from(MODES),
     text=st.sampled_from(PRINTS),
@@ -413,6 +414,7 @@ def test_what_came_before_the_mark_of_another_drive_may_be_the_reply_that_is_owe
     assert ended[-1].lines == ("303", "?Q01001", "?Q03001")
 
 
+@pytest.mark.slow
 @pytest.mark.wide
 @pytest.mark.parametrize("checksum", [0, 1, 2])
 @pytest.mark.parametrize("em", [0, 1, 2, 3])

@@ -110,15 +110,27 @@ def test_lines_that_nobody_asked_for_are_handed_on():
     assert line.events(1.05) == [Unsolicited(1.05, ("Log",))]
 
 
-def test_the_check_byte_of_a_line_in_two_parts_covers_both():
-    """On a busy machine the parts of a line may come a while apart: the second one was called damaged."""
-    line, data = Line(MCode(em=1, checksum=1)), sealed(b"noise noise") + b"\r\n"
-    shown = []
-    for at, part in ((0.0, data[:8]), (1.0, data[8:]), (2.0, data)):
+NOISE, OTHER = sealed(b"noise noise") + b"\r\n", sealed(b"other") + b"\r\n"
+
+
+@pytest.mark.parametrize(
+    ("parts", "lines"),
+    [
+        ((NOISE[:8], NOISE[8:], NOISE), ["noise no", "ise", "noise noise"]),
+        ((NOISE[:4], NOISE[4:8], NOISE[8:], OTHER), ["nois", "e no", "ise", "other"]),
+        ((NOISE[:8], OTHER, NOISE), ["noise no", "other", "noise noise"]),
+        ((NOISE[:8], NOISE[8:], NOISE[8:]), ["noise no", "ise", NOISE[8:-2].decode("latin-1")]),
+        ((b"x" * 60, b"y" * 200, NOISE), ["x" * 60, "y" * 200, "noise noise"]),
+    ],
+)
+def test_the_check_byte_of_a_line_in_parts_covers_all_of_them_and_nothing_else(parts, lines):
+    """On a busy machine the parts of a line may come a while apart: the last one was called damaged."""
+    line, shown = Line(MCode(em=1, checksum=1)), list[str]()
+    for at, part in enumerate(parts):
         line.receive(part, at)
         for now in (at, at + 0.2):
             shown += [text for event in line.events(now) if isinstance(event, Unsolicited) for text in event.lines]
-    assert shown == ["noise no", "ise", "noise noise"]
+    assert shown == lines
 
 
 def test_a_stop_fails_what_is_queued_and_in_flight_and_is_repeated_once_it_is_quiet():

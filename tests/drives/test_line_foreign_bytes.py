@@ -340,8 +340,42 @@ def test_an_adapter_that_repeats_is_found_however_its_bytes_are_grouped(name, cu
     run = LineRun(line, 5.0, pieces)
     assert run.echoes == int(repeats)
     assert (line.inbox.echo is not None) is repeats
+    if name == "a print before":
+        assert run.strays == ["!"]
     if name != "a refusal":
         assert run.finished == [("PR P", End.DONE, ("5",))]
+
+
+@pytest.mark.parametrize("em", range(4))
+@pytest.mark.parametrize(("kind", "end"), [(Kind.PRINT, End.TIMEOUT), (Kind.QUIET, End.SILENT)])
+def test_where_no_drive_replies_an_adapters_repetition_is_no_reply_and_is_known_from_then_on(em, kind, end):
+    codec = MCode(em=em)
+    line = Line(codec)
+    for text in ("PR P", "PR V"):
+        line.ask(request(text, codec, kind=kind))
+    run = LineRun(line, 9.0, {0.01: OWN})
+    (_, _, first, lines), _ = run.ended
+    assert (first, lines, run.echoes) == (End.SILENT if em == 2 else end, (), 1)
+    line.ask(request("PR P", codec))
+    reply = {0: b"PR P\r\n5\r\n>", 1: b"\r\n5\r\n", 2: b"5\r\n", 3: b"PR P\r\n5\r\n"}[em]
+    again = LineRun(line, 30.0, {20.01: OWN + reply}, 20.0)
+    assert again.finished == [("PR P", End.DONE, ("5",))]
+
+
+@pytest.mark.parametrize("came", [b"\r\n12\r\n", b"\r\n12\xff"])
+def test_what_comes_for_a_request_that_another_threads_stop_overtook_is_not_its_reply(came):
+    line = Line(QUIETLY)
+    line.ask(request("PR P"))
+    LineRun(line, 0.05)
+    line.overtaken = True
+    assert LineRun(line, 4.0, {0.1: came}, 0.05).finished == [("PR P", End.TIMEOUT, ())]
+
+
+def test_a_print_that_comes_before_a_reply_is_a_print_from_its_time_on():
+    line = Line(PARTY)
+    line.ask(request('PR P,"~a"', PARTY, "a", expect=r"(-?\d+)~a"))
+    run = LineRun(line, 2.0, {0.1: b"p=1\r\n", 0.2: b"\r\n5~a\r\n"})
+    assert run.strays == ["p=1"] and 0.1 <= line.printed_at <= 0.2
 
 
 def test_after_many_requests_nothing_is_taken_for_an_adapters_repetition():

@@ -7,20 +7,22 @@ over no stop and writes nothing meanwhile.
 import asyncio
 from itertools import pairwise
 from random import Random
+from types import SimpleNamespace
 
 import pytest
 
 from multidrop.dialects import Hints, StopPiece
 from multidrop.dialects.mcode.host.codec import MCode
-from multidrop.dialects.pmx.host.codec import GAP
+from multidrop.dialects.pmx.host.codec import GAP, Pmx
 from multidrop.drives import pacing
 from multidrop.drives.bus import Bus
 from multidrop.drives.events import Traffic
-from multidrop.drives.line import Line, Write, merged
-from multidrop.drives.stop_forms import stop_forms
+from multidrop.drives.line import PAUSE, Line, Write, merged
+from multidrop.drives.stop_ahead import StopAhead
+from multidrop.drives.stop_forms import StopForms, stop_forms
 from multidrop.simulator.serving.in_process import SimPipe
 from tests.drives.test_pmx import BYTE, Wire
-from tests.support.cell_session import drive
+from tests.support.cell_session import CellSession, bus, drive, party, pmx
 from tests.support.simulated_bus import SimulatedBus
 
 pytestmark = pytest.mark.virtual
@@ -318,6 +320,87 @@ async def test_two_stops_of_single_controllers_cut_each_other_off_neither_do_the
     assert {*first(wire, 0.0)} == {"01", "03"}
     assert wire.collisions == []
     await bus.close()
+
+
+class Counted:
+    """A transport of which `waiting` bytes have not left."""
+
+    preemptible, waiting = True, 0
+
+    def __init__(self):
+        self.out = []
+
+    def preempt(self, whole, make):
+        self.out.append(make(0))
+        return True
+
+    def follow(self, make, key=False):
+        data = make(self.waiting)
+        self.out += [data] if data else []
+        return data is not None
+
+
+def ahead_of(wire, now, gap=0.02):
+    """A stop in the pieces A, B and C, and its repetition; the time in which a piece leaves and its reply comes."""
+    forms = StopForms(
+        *(b"A\r", b"A\r", (StopPiece(b"B\r", gap), StopPiece(b"C\r", gap), StopPiece(b"A\r", 2 * PAUSE))),
+        *(b"", False),
+        gap=gap,
+    )
+    line = Line(Pmx(), baud=9600)
+    link = SimpleNamespace(now=now, line=line, transport=wire, name="w", call_soon=lambda work: None)
+    return StopAhead(link, lambda: forms, lambda: None), gap + 4 * line.byte_time
+
+
+async def test_a_key_moves_the_stop_on_once_all_bytes_have_left_and_their_replies_have_come():
+    now, wire = [1.0], Counted()
+    ahead, clear = ahead_of(wire, lambda: now[0])
+
+    def pressed(after):
+        wire.out.clear()
+        now[0] += after
+        ahead.press()
+        return wire.out
+
+    assert pressed(0.0) == [b"A\r"]
+    assert pressed(clear / 2) == []
+    wire.waiting = 1
+    assert pressed(clear) == [], "bytes wait"
+    wire.waiting = 0
+    assert pressed(0.0) == [b"B\r"]
+    assert pressed(clear * 0.99) == []
+    assert pressed(clear * 0.01 + 1e-9) == [b"C\r"]
+
+
+async def test_a_stop_begins_again_once_each_piece_has_had_its_turn_and_the_last_reply_has_come():
+    wire = Counted()
+    ahead, clear = ahead_of(wire, asyncio.get_running_loop().time)
+    ahead.press()
+    while wire.out[-1:] != [b"C\r"]:
+        await asyncio.sleep(0.001)
+    assert wire.out == [b"A\r", b"B\r", b"C\r"]
+    ahead.press()
+    assert wire.out[3:] == [], "its reply is on its way"
+
+    other = Counted()
+    ahead, clear = ahead_of(other, asyncio.get_running_loop().time)
+    ahead.press()
+    while other.out[-1:] != [b"C\r"]:
+        await asyncio.sleep(0.001)
+    await asyncio.sleep(clear)
+    ahead.press()
+    assert other.out[3:] == [b"A\r"]
+
+
+async def test_a_stop_takes_back_the_rest_of_a_line_and_not_of_a_frame(tmp_path):
+    floor = {"press": party("a"), "stages": pmx("00"), "slide": drive("TMCM")}
+    async with CellSession(tmp_path, *(bus(name, each) for name, each in floor.items())) as shop:
+        dropped = {}
+        for name, each in shop.session.buses.items():
+            each.link.transport.discard = lambda whole=False, name=name: dropped.setdefault(name, whole) and 0
+            assert stop_forms(each.roster).framed is (name == "slide")
+        shop.session.stop()
+        assert dropped == {"press": False, "stages": False, "slide": True}
 
 
 async def test_modules_in_download_mode_do_not_wait_for_the_repetition_of_the_others():

@@ -3,19 +3,21 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Iterator
+from collections.abc import Container, Iterator
 from dataclasses import replace
 from typing import Any
 
 import pytest
 
-from multidrop.dialects import Motion, Priority
+from multidrop.dialects import Motion, NoAnswer, Priority
 from multidrop.dialects.families import FAMILIES
-from multidrop.drives.drive import Drive
+from multidrop.dialects.motions import Outcome
+from multidrop.drives.drive import Drive, still
 from multidrop.drives.events import Sample
 from multidrop.drives.stopping import Fate
+from multidrop.shell.at_rest import at_rest_after_error, excused
 from multidrop.shell.events import OnBus
-from multidrop.shell.waits import standings
+from multidrop.shell.waits import standings, wait
 from tests.support.cell_session import CellSession, bus, party
 
 pytestmark = pytest.mark.virtual
@@ -28,10 +30,13 @@ MODULE = 'personality = "TMCM"'
 
 
 class Moving:
-    """A drive of any family that moves until ENDS; its readings of velocity by these numbers are a false zero."""
+    """A drive of any family that moves until ENDS; its readings of velocity by these numbers are a false zero.
 
-    def __init__(self, monkeypatch: pytest.MonkeyPatch, family: str, *false: int) -> None:
-        self.false = set(false)
+    Those of `lost` get no reply.
+    """
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch, family: str, *false: int, lost: Container[int] = ()) -> None:
+        self.false, self.lost = set(false), lost
         self.read = 0
         own = replace(
             FAMILIES[family],
@@ -44,6 +49,8 @@ class Moving:
 
     def _velocity(self) -> int:
         self.read += 1
+        if self.read in self.lost:
+            raise NoAnswer("a does not reply")
         return SPEED if asyncio.get_running_loop().time() < ENDS and self.read not in self.false else 0
 
     def _motion(self, state: Any, priority: Priority) -> Iterator[Any]:
@@ -66,6 +73,47 @@ async def test_one_false_zero_ends_no_wait(family, false, tmp_path, monkeypatch)
         Moving(monkeypatch, family, false)
         await shop.session.run("/wait stopped 20")
         assert asyncio.get_running_loop().time() >= ENDS
+
+
+@pytest.mark.parametrize("family", FAMILY_NAMES)
+@pytest.mark.parametrize("lost", [1, 2, 3])
+async def test_a_lost_reading_is_no_rest(family, lost, tmp_path, monkeypatch):
+    async with CellSession(tmp_path, bus("press", party("a"))) as shop:
+        drive, now = shop.session.selected, asyncio.get_running_loop().time
+        for line in ("/wait stopped 20", "/wait idle 20"):
+            Moving(monkeypatch, family, lost=[lost])
+            with pytest.raises(NoAnswer):
+                await shop.session.run(line)
+            assert now() < ENDS
+        Moving(monkeypatch, family, lost=[lost])
+        watch = await wait(shop.session, 20, idle=False, ended=True)
+        assert [each.outcome for each in watch.endings[drive]] == [Outcome.UNKNOWN]
+
+
+@pytest.mark.parametrize("family", FAMILY_NAMES)
+async def test_silence_after_the_end_of_a_motion_confirms_no_rest(family, tmp_path, monkeypatch):
+    async with CellSession(tmp_path, bus("press", party("a"))) as shop:
+        drive = shop.session.selected
+        await asyncio.sleep(ENDS)
+        moving = Moving(monkeypatch, family, lost=range(100))
+        halt = shop.session.buses["press"].stop()
+        await asyncio.sleep(2.0)
+        assert halt.fate(drive) is Fate.NOT_KNOWN
+        (found,) = await standings(shop.session, [drive])
+        assert found.text == "a not known (a does not reply)"
+        moving.read, moving.lost = 0, [1, 3]
+        for _ in range(2):  # the first reading is lost, then the second one
+            with pytest.raises(NoAnswer):
+                await still(drive)
+        assert await still(drive)
+
+
+async def test_a_silent_drive_is_excused_from_no_stop(tmp_path):
+    async with CellSession(tmp_path, bus("press", party("a"))) as shop:
+        drive = shop.session.selected
+        for power, rests in (("on", True), ("off", False)):
+            shop.world(f"/sim power a {power}")
+            assert await excused(drive) is await at_rest_after_error(drive) is rests
 
 
 @pytest.mark.parametrize("family", FAMILY_NAMES)

@@ -13,7 +13,7 @@ from multidrop.shell.scripts.executor import run_script
 from multidrop.transports import TransportLost
 from tests.support.cell_session import ETHERNET, CellSession, bus, party, pmx
 
-pytestmark = [pytest.mark.virtual, pytest.mark.slow]
+pytestmark = pytest.mark.virtual
 
 FLOOR = (
     bus("press", party("a"), party("b")),
@@ -57,6 +57,7 @@ async def shop(tmp_path):
         yield made
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("runs", [script, sent, macro])
 @pytest.mark.parametrize(
     ("ending", "failure"),
@@ -133,10 +134,11 @@ async def test_a_program_counts_when_it_is_executed_and_not_when_it_is_stored(tm
     with pytest.raises(Refused):
         await script(shop.session, *store, "@press:a PR XX")
     assert shop.moving() == {"press:b"}
-    with pytest.raises(Refused):
-        await script(shop.session, "@press:a EX G1", "/sleep 1", "@press:a PR XX")
-    assert shop.moving() == {"press:b"}
-    assert shop.warned()[-2].startswith("stopped press:a: ") and shop.warned()[-1] == "program ended: press:a"
+    for line in ("@press:a EX G1", f"/download {tmp_path / 'p.mxt'} press:a --run G1"):
+        with pytest.raises(Refused):
+            await script(shop.session, line, "/sleep 1", "@press:a PR XX")
+        assert shop.moving() == {"press:b"}
+        assert shop.warned()[-2].startswith("stopped press:a: ") and shop.warned()[-1] == "program ended: press:a"
 
 
 async def test_what_could_not_be_reached_is_named(shop):
@@ -198,6 +200,81 @@ async def test_an_interruption_is_written_at_once_and_stops_what_was_started_alo
         await running
     await asyncio.sleep(2.0)
     assert shop.moving() == {"gantry:d"} and len(shop.session.automations.interrupted) == 2 and not shop.session.latched
+
+
+class Out(BaseException):
+    """As KeyboardInterrupt or SystemExit, which no `except Exception` takes."""
+
+
+@pytest.mark.parametrize("runs", [script, sent, macro])
+async def test_a_cancelled_automation_stops_what_it_started_alone_before_its_canceller_goes_on(runs, shop):
+    await shop.session.run(GO["gantry:d"])
+    running = asyncio.create_task(runs(shop.session, GO["press:a"], GO["gantry:c"], "/sleep 100"))
+    await asyncio.sleep(1.0)
+    shop.events.clear()
+    running.cancel()
+    with pytest.raises(asyncio.CancelledError):
+        await running
+    assert shop.written("press").startswith(b"aE\xda\n") and shop.written("gantry").startswith(b"c\x1b\n")
+    await asyncio.sleep(2.0)
+    assert shop.moving() == {"gantry:d"} and not shop.session.latched
+
+
+async def test_an_automation_that_is_left_in_any_way_stops_what_it_started(shop):
+    async def started():
+        async with shop.session.automations.run("the test"):
+            async with shop.session.automations.run("a part of it"):
+                await shop.session.run(GO["press:a"])
+            yield
+
+    lines = started()
+    await anext(lines)
+    await lines.aclose()
+    await asyncio.sleep(2.0)
+    assert shop.moving() == set()
+    with pytest.raises(Out):
+        async with shop.session.automations.run():
+            await shop.session.run(GO["press:b"])
+            raise Out
+    assert shop.moving() == set()
+
+
+async def test_a_cancellation_while_a_drive_at_rest_is_read_once_more_stops_that_too(shop):
+    running = asyncio.create_task(
+        sent(shop.session, "@press:b MR 100", "/wait @press:b P=100", "/wait stopped", GO["gantry:c"], "@press:a XX 1")
+    )
+    while "XX" not in shop.written("press").decode("latin-1"):
+        await asyncio.sleep(0.01)
+    shop.world("/sim power b off")
+    await asyncio.sleep(0.5)
+    assert shop.written("gantry").count(b"c\x1b\n") and b"bE" not in shop.written("press")
+    running.cancel()
+    with pytest.raises(asyncio.CancelledError):
+        await running
+    assert b"bE" in shop.written("press")
+
+
+async def test_an_interruption_stops_what_every_automation_started(shop):
+    each = {"press:a": script, "gantry:c": sent, "stages:00": macro}
+    running = [asyncio.create_task(runs(shop.session, GO[name], "/sleep 100")) for name, runs in each.items()]
+    await shop.session.run(GO["gantry:d"])
+    await asyncio.sleep(1.0)
+    assert shop.moving() == {*each, "gantry:d"}
+    shop.session.interrupt()
+    await asyncio.gather(*running, return_exceptions=True)
+    await asyncio.sleep(2.0)
+    assert shop.moving() == {"gantry:d"} and len(shop.session.automations.interrupted) == 3
+
+
+async def test_what_is_started_again_after_an_interruption_is_stopped_by_the_next_one(shop):
+    async with shop.session.automations.run():
+        for _ in range(2):
+            await shop.session.run(GO["press:a"])
+            assert shop.moving() == {"press:a"}
+            shop.session.interrupt()
+            await asyncio.sleep(2.0)
+            assert shop.moving() == set()
+        shop.session.automations.leave()
 
 
 async def test_an_operators_lines_go_on_beside_a_macro_that_fails(shop):

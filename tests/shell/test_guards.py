@@ -122,10 +122,12 @@ async def test_the_configuration_takes_guards_away_and_adds_words(shop):
     await shop.session.run("@a CP")
     await shop.session.run("@* P=0")
     await shop.session.run("@* MR 0")
-    with pytest.raises(Diagnostic, match=r"'S' is sent: \[guards\] also has S; nothing was sent"):
-        await shop.session.run("@a S")
-    with pytest.raises(Diagnostic, match="'FD' erases all"):
-        await shop.session.run("@a FD")
+    for line in ("S", "s"):
+        with pytest.raises(Diagnostic, match=rf"'{line}' is sent: \[guards\] also has S; nothing was sent"):
+            await shop.session.run(f"@a {line}")
+    for line in ("FD", "fd"):
+        with pytest.raises(Diagnostic, match=f"'{line}' erases all"):
+            await shop.session.run(f"@a {line}")
 
 
 @pytest.mark.parametrize(

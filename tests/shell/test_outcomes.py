@@ -5,13 +5,16 @@ from __future__ import annotations
 import asyncio
 from collections.abc import AsyncIterator, Sequence
 from contextlib import asynccontextmanager
+from dataclasses import replace
 from itertools import product
 from pathlib import Path
 
 import pytest
 
-from multidrop.dialects import DriveError
+from multidrop.dialects import DriveError, NoAnswer, Procedure, Refused
 from multidrop.dialects.errors import MotionFailed
+from multidrop.dialects.motions import Ending
+from multidrop.shell import motions
 from multidrop.shell.events import Failed, Notified, Output
 from multidrop.shell.scripts.executor import run_script
 from multidrop.shell.scripts.reading import WrongScript, read_script
@@ -154,6 +157,22 @@ async def test_a_line_that_ends_motion_is_never_held_back(tmp_path: Path) -> Non
 
 
 # What is no failure
+
+
+@pytest.mark.parametrize("error", [NoAnswer("a does not reply"), Refused("a refused it")])
+async def test_a_motion_whose_end_cannot_be_read_is_a_failure(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, error: DriveError
+) -> None:
+    def unread(*_: object) -> Procedure[Ending | None]:
+        raise error
+        yield
+
+    async with on(tmp_path) as session:
+        own = replace(session.drive().family.motions, judge=unread)
+        monkeypatch.setattr(motions, "_motions", lambda drive: own)
+        failure = await failed(session, "MR 100", "/wait stopped", "R1=777")
+        assert (failure.outcome, failure.reason) == ("unknown", f"its end could not be read ({error})")
+        assert await value(session, "R1") == 0
 
 
 async def test_a_move_replaced_by_the_same_script_is_no_failure(tmp_path: Path) -> None:

@@ -22,8 +22,6 @@ from tests.shell.test_outcomes import ENCODER, failed, noted, sent, value
 from tests.support.cell_session import bus, drive
 from tests.support.until import PATIENCE
 
-pytestmark = pytest.mark.slow
-
 STALLS = "[bus.drive.world]\nstall_at = 20000"
 LIMIT = "[bus.drive.world]\nlimit_plus = 30000"
 
@@ -59,6 +57,7 @@ async def test_a_stall_fails_the_wait_and_the_next_line_is_not_sent(tmp_path: Pa
         assert not any("old error" in each or "refused" in each for each in noted(session))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("wait", ["/wait stopped", "/wait idle", "/wait P=90000"])
 async def test_a_limit_fails_every_wait(tmp_path: Path, wait: str) -> None:
     async with at_limit(tmp_path) as session:
@@ -82,6 +81,7 @@ async def test_a_move_through_raw_registers_is_judged_too(tmp_path: Path) -> Non
         assert await value(session, "R1") == 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("personality", ["LMDCE", "LMDOE"])
 async def test_moves_that_end_well_do_not_fail(tmp_path: Path, personality: str) -> None:
     async with on(tmp_path, personality=personality) as session:
@@ -119,6 +119,7 @@ async def test_a_stall_that_nobody_waits_for_is_among_the_conditions(tmp_path: P
         watch.close()
 
 
+@pytest.mark.slow
 async def test_a_program_that_an_input_starts_may_end_a_slew(tmp_path: Path) -> None:
     program = "program_text = '''\nPG 1\nSL 0\nE\nPG\n'''"
     async with on(tmp_path, program, "[bus.drive.world]\ninputs = [[2.5, 2, 0]]") as session:

@@ -246,6 +246,16 @@ async def test_a_restart_ends_the_script_at_its_next_line_and_is_an_outcome(tmp_
         assert await ran(session, tmp_path, "SL 3000", *CYCLE, "/wait ended", "/print {outcome}") == ["power"]
 
 
+async def test_a_wait_for_what_someone_else_moved_fails_by_a_restart_too(tmp_path: Path) -> None:
+    cell = bus("press", drive("LMDCM", "a", CK=0, **SLOW), baud=0)
+    async with session_on(tmp_path, cell) as session:
+        await typed(session, "MR 3000", "/sleep 0.1")
+        asyncio.get_running_loop().call_later(0.2, session.drive().motions.restarted)
+        failure = await failed(session, "/wait stopped", "R1=777")
+        assert (failure.outcome, failure.reason) == ("power", "it was restarted")
+        assert await value(session, "R1") == 0
+
+
 # Lines that clear a sign
 
 

@@ -6,7 +6,7 @@ import pytest
 
 from multidrop.dialects import Diagnostic, Stopped
 from multidrop.shell.configuration import Settings
-from multidrop.shell.prompt.terminal_input import PAUSE, Answer
+from multidrop.shell.prompt.terminal_input import PAUSE, Answer, at_keyboard
 from multidrop.shell.session import Session
 
 pytestmark = pytest.mark.virtual
@@ -58,6 +58,56 @@ async def test_nobody_there_is_no_and_agreed_asks_nobody(made):
     person, session.questions.agreed = Person(session), True
     await session.questions.confirm(WHAT)
     assert person.asked == []
+
+
+async def test_each_question_of_a_session_has_its_own_answer(made):
+    session = made()
+    person, questions = Person(session), session.questions
+    for answer in (True, False, True, False, True):
+        person.answers.put_nowait(answer)
+    asked = (*(questions.confirm(WHAT, where) for where in "aab"), questions.agrees("again"), questions.agrees("again"))
+    found = await asyncio.gather(*asked, return_exceptions=True)
+    assert [type(each) for each in found[:3]] == [type(None), Diagnostic, type(None)]
+    assert found[3:] == [False, True]
+    assert person.asked == [f"a: {WHAT}", f"a: {WHAT}", f"b: {WHAT}", "again", "again"]
+    assert not (questions.agreed or questions.beyond)
+
+
+class Keys:
+    """A keyboard. What is pressed waits until it is taken, or forgotten."""
+
+    def __init__(self):
+        self.waiting, self.listener = [], lambda: None
+
+    def press(self, key):
+        self.waiting.append(key)
+        self.listener()
+
+    def forget(self):
+        self.waiting.clear()
+
+    def take(self):
+        taken, self.waiting = self.waiting, []
+        return taken
+
+    def listen(self, listener):
+        before, self.listener = self.listener, listener
+        return before
+
+
+async def test_keys_from_before_a_question_and_behind_the_answer_to_another_one_do_not_answer_it(capsys):
+    keys, found = Keys(), []
+    for early, key in (("", "y"), ("y", "n"), ("yy", "\r"), ("n", "Y")):
+        for each in early:
+            keys.press(each)
+        asking = asyncio.create_task(at_keyboard(keys, "FD erases the drive"))
+        await asyncio.sleep(2 * PAUSE)
+        assert not asking.done()
+        keys.press(key)
+        keys.press("y")
+        found.append(await asking)
+    assert found == [True, False, False, True]
+    assert keys.waiting == [] and capsys.readouterr().err.count("FD erases the drive") == 4
 
 
 async def test_a_stop_ends_the_open_question_and_those_that_wait(made):

@@ -5,12 +5,15 @@ import asyncio
 import pytest
 
 from multidrop.dialects import Diagnostic, DriveError, NoAnswer, Refused
+from multidrop.drives import stopping
+from multidrop.drives.stop_readings import read_activity
+from multidrop.drives.stopping import Fate
 from multidrop.shell.events import By
 from multidrop.shell.prompt.terminal_input import run_lines
 from multidrop.transports import TransportLost
 from tests.support.cell_session import ETHERNET, CellSession, bus, drive, party, pmx
 
-pytestmark = [pytest.mark.virtual, pytest.mark.slow]
+pytestmark = pytest.mark.virtual
 
 SINGLE = 'personality = "LMDCM"'
 PROGRAM = ("PG 1", "LB G1", "SL 20000", "LB G2", "H 100", "BR G2", "E", "PG")
@@ -46,6 +49,7 @@ REFUSED = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("line", REFUSED.values(), ids=REFUSED)
 @pytest.mark.parametrize("em", [0, 1, 2, 3])
 @pytest.mark.parametrize("ck", [0, 1])
@@ -75,6 +79,7 @@ async def test_a_refused_line_ends_no_program(personality, tmp_path):
         assert shop.printed()[-1] == "1" and stops(shop) == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "line", ["RC=200", "/register 0x67 =70000", "/register 0x67 =200", "VM=0", "STATUS", "PR ER,XX"]
 )
@@ -103,6 +108,7 @@ async def test_an_accepted_move_and_then_a_typo_stops_that_drive_alone_by_its_ow
         assert [text for text in shop.warned() if "stopped" in text] == ["stopped a: velocity 0 was read from a"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("em", [0, 1, 2, 3])
 @pytest.mark.parametrize("ck", [0, 1, 2])
 async def test_the_stop_of_one_drive_leaves_the_line_as_it_was(em, ck, tmp_path):
@@ -193,6 +199,7 @@ async def test_a_drive_that_was_read_at_rest_since_needs_no_stop(tmp_path):
         assert stops(shop) == [] and b"aE" not in shop.written("press") and b"\x1b" not in shop.written("press")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("lines", [("TI 1,OO", "TE=1"), ("JE=1",)], ids=["trips", "an input that moves it"])
 async def test_a_drive_at_rest_that_may_move_again_is_stopped(lines, tmp_path):
     async with CellSession(tmp_path, press()) as shop:
@@ -239,6 +246,7 @@ RETURNS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("cell", "lines", "stop"), RETURNS.values(), ids=RETURNS)
 async def test_the_stop_that_a_loss_kept_from_a_drive_is_sent_once_the_line_is_back(cell, lines, stop, tmp_path):
     async with CellSession(tmp_path, cell, reconnect=True) as shop:
@@ -275,6 +283,7 @@ async def running(shop):
     return shop.printed()[-2:]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("line", ["STATUS", "X9", "HSPDX=-4", "@* STATUS"])
 async def test_a_refused_line_ends_no_program_of_a_controller(line, tmp_path):
     async with CellSession(tmp_path, bus("stages", pmx("00"), pmx("01"))) as shop:
@@ -311,6 +320,54 @@ async def test_a_program_of_a_controller_that_was_started_is_ended_and_named(tmp
         assert "program ended: 00" in shop.warned()
 
 
+@pytest.mark.parametrize(
+    "lines",
+    [
+        ("@slide:1 ROR 0, 2000", "/sleep 2", "@slide:1 SAP 5, 0, 1000"),
+        ("@stages:00 JX+",),
+    ],
+)
+async def test_a_single_stop_is_confirmed_by_two_readings_of_rest_in_a_row(lines, tmp_path, monkeypatch):
+    readings = []
+
+    async def read(drive, axes):
+        found, why = await read_activity(drive, axes)
+        readings.append(found.speed)
+        return found, why
+
+    monkeypatch.setattr(stopping, "read_activity", read)
+    floor = bus("slide", drive("TMCM")), bus("stages", pmx("00"))
+    async with CellSession(tmp_path, *floor) as shop, shop.session.automations.run():
+        for line in (*lines, "/sleep 1"):
+            await shop.session.run(line)
+        shop.session.interrupt()
+        (halt,) = shop.session.automations.interrupted
+        seen = set()
+        for _ in range(500):
+            fate = halt.fate(halt.drives[0])
+            at_rest = readings[-2:] == [0, 0]
+            moving = bool(readings and readings[-1])
+            assert not (fate is Fate.STANDING and shop.moving())
+            assert fate is (Fate.STANDING if at_rest else Fate.MOVING if moving else Fate.SENT)
+            seen.add(fate)
+            await asyncio.sleep(0.01)
+        assert Fate.STANDING in seen and (Fate.MOVING in seen) is (len(lines) > 1)
+        shop.session.automations.leave()
+
+
+@pytest.mark.parametrize("lines", [("SR0=1", "JY+"), ("JY+", "SR0=1")])
+async def test_a_program_and_a_motion_of_one_automation_are_both_ended_in_any_order(lines, tmp_path):
+    async with CellSession(tmp_path, bus("stages", pmx("00"), pmx("01"))) as shop:
+        await programs(shop)
+        await typed(shop.session, "@stages:00 SR0=0", "@stages:00 SR1=0", "@stages:00 ABORT")
+        shop.events.clear()
+        with pytest.raises(Refused, match="STATUS"):
+            await sent(shop.session, *(f"@stages:00 {line}" for line in lines), "/sleep 1", "@stages:00 STATUS")
+        await asyncio.sleep(1)
+        assert shop.moving() == set() and await running(shop) == ["0", "0"]
+        assert b"SR0=0" in shop.written("stages") and "program ended: 00" in shop.warned()
+
+
 @pytest.mark.parametrize("line", ["SAP 4, 0, -99999999", "NONSENSE", "SAP 200, 0, 1", "GAP 250, 0"])
 async def test_a_refused_line_stops_no_module(line, tmp_path):
     async with CellSession(tmp_path, bus("slide", drive("TMCM"), drive("TMCM", "7"))) as shop:
@@ -322,6 +379,7 @@ async def test_a_refused_line_stops_no_module(line, tmp_path):
         assert shop.moving() == {"slide:1"} and stops(shop) == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("line", ["SAP 2, 0, 2000", "SAP 0, 0, 900000", "ROR 0, 500", "MVP ABS, 0, 90000"])
 async def test_what_a_module_accepted_is_stopped(line, tmp_path):
     async with CellSession(tmp_path, bus("slide", drive("TMCM"), drive("TMCM", "7"))) as shop:

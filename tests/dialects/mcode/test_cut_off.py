@@ -4,18 +4,19 @@ from dataclasses import replace
 
 import pytest
 
-from multidrop.dialects import Hints, Owed
+from multidrop.dialects import End, Hints, Owed, Reply
 from multidrop.dialects.mcode.family import MCODE
 from multidrop.dialects.mcode.host import identify
 from multidrop.dialects.mcode.host.codec import MCode
+from multidrop.dialects.mcode.host.operations import put_back_found
+from multidrop.dialects.mcode.host.state import MCodeState
 from multidrop.dialects.mcode.manual import program_file
 from multidrop.simulator.cell.spec import Faults
 from multidrop.transports import TransportLost
 from tests.support.cases import for_each
 from tests.support.faults import disturb
 from tests.support.mcode_drives import MODES, Witness
-
-pytestmark = pytest.mark.slow
+from tests.support.procedure import ProcedureRunner
 
 MOVES_ON_ERROR = ("PG 1", "LB G1", "OE X1", "E", "LB X1", "SL 50000", "RT", "PG", "EX G1")
 TILDES = b"~" * 65
@@ -42,6 +43,7 @@ def found(desk, party, **hints):
     return desk.run(identify.identify(Hints(drives=drives, party=party or None, **hints)))
 
 
+@pytest.mark.slow
 @for_each("escape", range(4))
 @pytest.mark.parametrize(("em", "party", "check"), MODES)
 def test_half_a_line_of_our_own_overflows_between_stops(bench, em, party, check, escape):
@@ -64,6 +66,7 @@ def test_a_stop_stands_before_and_behind_what_overflows_and_no_end_of_a_line_bef
     assert second == b"\x1b\x05a\x05a\x1b\n\x1b\x05"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("em", "party", "check"), MODES)
 def test_on_a_clean_line_opening_raises_no_error_and_stops_nothing(bench, em, party, check):
     desk, device, _ = left(bench, em, party, check, program=MOVES_ON_ERROR)
@@ -73,6 +76,7 @@ def test_on_a_clean_line_opening_raises_no_error_and_stops_nothing(bench, em, pa
     assert not any(TILDES in data or b"\x1b" in data or b"\x05" in data for data in desk.written)
 
 
+@pytest.mark.slow
 @for_each("half", [b"MR 5", b"aMR 5", b"MA 51200", b"aSL 5", b"*MR 5"])
 @pytest.mark.parametrize(("em", "party", "check"), MODES)
 def test_half_a_line_of_somebody_elses_is_not_executed_either(bench, em, party, check, half):
@@ -98,6 +102,7 @@ def killed(bench, em=1, party=True, check=1):
     return desk, device, witness, Owed(em, name, *(OWED.product, OWED.version, OWED.part), f"0401{ord(name):05d}")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("half", [b"", b"aMR 51200"])
 @pytest.mark.parametrize(("em", "party", "check"), [mode for mode in MODES if mode[0]])
 def test_what_was_owed_is_put_back_and_said(bench, em, party, check, half):
@@ -121,6 +126,7 @@ def test_what_was_owed_is_put_back_and_said(bench, em, party, check, half):
         Owed(1, "a", OWED.product, "LMDCM 5.0", OWED.part),
         Owed(1, "a", OWED.product, OWED.version, "LMDCM572"),
         Owed(1, "a", OWED.product, OWED.version, OWED.part, "040100098"),
+        Owed(1, "a", OWED.product, OWED.version, OWED.part),
     ],
 )
 def test_nothing_is_put_back_in_another_drive(bench, other):
@@ -128,6 +134,29 @@ def test_nothing_is_put_back_in_another_drive(bench, other):
     [state] = found(desk, True, owed=(other,))
     assert (device.programming, device.memory.echo_mode, state.restore) == (None, 0, None)
     assert not any(b"EM=" in data for data in desk.written)
+
+
+@pytest.mark.parametrize(
+    ("owed", "printed", "put_back"),
+    [
+        (OWED, OWED.serial, True),
+        (OWED, "040100098", False),
+        (OWED, "", False),
+        (replace(OWED, serial=""), "", True),
+        (replace(OWED, serial="", version="LMDCM 5.0"), "", False),
+        (replace(OWED, serial="", part="LMDCM572"), "", False),
+    ],
+)
+def test_a_drive_whose_serial_number_was_not_read_yet_is_asked_for_it(owed, printed, put_back):
+    state = MCodeState(MCode(party=True, checksum=1), "a")
+    state.named("a")
+    state.identified(OWED.product, OWED.version, OWED.part)
+    procedure, sent = ProcedureRunner(put_back_found(state, [owed])), list[str]()
+    while procedure.request is not None and "EM=1" not in sent:
+        sent.append(procedure.request.text)
+        answer = {"PR SN": printed, "PR ER": "36"}.get(sent[-1].partition(",")[0], "0")
+        procedure.answer(Reply((f"{answer}~a",)) if answer else Reply((), end=End.REFUSED))
+    assert ("EM=1" in sent) is put_back
 
 
 def test_a_version_that_noise_had_changed_keeps_nothing_from_the_drive_with_the_serial_number(bench):

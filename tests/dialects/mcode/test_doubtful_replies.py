@@ -14,6 +14,7 @@ from multidrop.simulator.cell.spec import Faults
 from tests.support.cases import for_each
 from tests.support.faults import disturb
 from tests.support.mcode_drives import MODES, Desk
+from tests.support.procedure import ProcedureRunner
 
 ACK, NAK = b"\x06", b"\x15"
 
@@ -22,6 +23,55 @@ def answer(em, check, data, text="MR 51200", party=False):
     codec = MCode(em=em, checksum=check, party=party)
     request = codec.request("a" if party else "", text)
     return codec.decode(request, data) or codec.on_quiet(request, data)
+
+
+NAKED, CLEAR = Reply((), end=End.NAK), Reply(("0~a",))
+
+
+@pytest.mark.parametrize(
+    ("readings", "repeats"),
+    [
+        ([CLEAR], True),
+        ([NAKED, CLEAR], True),
+        ([replace(CLEAR, surplus=True)], False),
+        ([replace(CLEAR, doubtful=True)], False),
+        ([replace(NAKED, surplus=True), CLEAR], False),
+        ([replace(NAKED, doubtful=True), NAKED, CLEAR], False),
+        ([Reply((), end=End.TIMEOUT)], False),
+        ([NAKED] * 4, False),
+        ([replace(NAKED, detail="among a program's prints")], False),
+    ],
+)
+@pytest.mark.parametrize("text", ["MR 51200", "EX G1", "R1=5"])
+def test_a_line_is_repeated_after_a_nak_only_if_no_ack_came_before_its_error_was_read_as_none(readings, repeats, text):
+    state = MCodeState(MCode(em=1, party=True, checksum=1), "a")
+    procedure = ProcedureRunner(MCODE.perform(state, text))
+    assert procedure.request.text == text
+    procedure.answer(NAKED)
+    *before, last = readings
+    for each in before:
+        assert procedure.request.text == 'PR ER,"~a"'
+        procedure.answer(each)
+    if repeats:
+        procedure.answer(last)
+        assert procedure.request.text == text
+    else:
+        with pytest.raises(NoAnswer, match="it was sent once"):
+            procedure.answer(last)
+
+
+def test_a_nak_or_an_ack_that_may_be_another_drives_proves_nothing():
+    for text in ("MR 51200", "R1=5"):
+        state = MCodeState(MCode(em=1, party=True, checksum=1), "a")
+        procedure = ProcedureRunner(MCODE.perform(state, text))
+        with pytest.raises(NoAnswer, match="it was sent once"):
+            procedure.answer(replace(NAKED, doubtful=True))
+        assert state.reply_pending
+        for doubtful, asks in ((False, False), (True, True)):
+            state = MCodeState(MCode(em=1, party=True, checksum=1), "a")
+            procedure = ProcedureRunner(MCODE.perform(state, text))
+            procedure.answer(Reply((), acknowledged=True, doubtful=doubtful))
+            assert (procedure.request is not None and procedure.request.text.startswith("PR EF")) is asks
 
 
 @pytest.mark.parametrize(

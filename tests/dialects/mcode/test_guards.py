@@ -8,8 +8,10 @@ from multidrop.dialects.families import FAMILIES
 from multidrop.dialects.mcode.host.codec import MCode
 from multidrop.dialects.mcode.host.state import MCodeState
 from multidrop.dialects.mcode.manual.guards import AT_ONCE, NAMES, SETTINGS
+from multidrop.dialects.modbus.host.codec import Modbus, ModbusState
+from multidrop.dialects.modbus.manual.registers import REGISTERS
 
-FAMILY = FAMILIES["mcode"]
+FAMILY, MODBUS = FAMILIES["mcode"], FAMILIES["modbus"]
 PARTY, ALONE = MCodeState(MCode(party=True), "a"), MCodeState(MCode())
 EVERY = MCodeState(MCode(party=True), "*")
 QUEUED = MCodeState(MCode(party=True), "^")
@@ -60,8 +62,11 @@ def named(state, text):
 def test_every_form_of_a_guarded_line_is_guarded():
     assert set(GUARDED) == {*AT_ONCE, *SETTINGS, "PR"} == set(NAMES) - {"*"}
     for name, texts in GUARDED.items():
-        for text in texts:
+        for text in (*texts, *map(str.lower, texts)):
             assert named(PARTY, text) == name, text
+            assert FAMILY.guards.word_of(text) == name, text
+            over = MODBUS.guards.find(ModbusState(Modbus()), text)
+            assert (over.name if over else "") == (name if name in REGISTERS else ""), text
 
 
 def test_what_a_line_does_is_said_with_the_line():
@@ -120,8 +125,9 @@ def test_a_line_to_all_that_can_start_a_drive_is_guarded():
         "FOO",
         "CA 1",
     ):
-        assert named(EVERY, text) == named(QUEUED, text) == "*", text
-        assert named(PARTY, text) == "", text
+        for form in (text, text.lower()):
+            assert named(EVERY, form) == named(QUEUED, form) == "*", form
+            assert named(PARTY, form) == "", form
     assert named(EVERY, "CP") == "CP" and named(QUEUED, "AS=3") == "AS"
 
 
@@ -135,12 +141,12 @@ def test_a_typed_name_counts_as_the_address_that_it_is_on_the_wire():
         "aMR 5": "",
         "aPY=0": "PY",
     }.items():
-        assert named(ALONE, text) == name, text
+        assert named(ALONE, text) == named(ALONE, text.lower()) == name, text
 
 
 def test_a_stop_to_all_is_never_guarded():
     for text in ("SL 0", "SL=0", "SL0", "sl 0 'stop", "SL -0", "E", "PS", "JE=0", "DE=0", "AS=0", "TQ 0", "PR P", "S"):
-        assert named(EVERY, text) == "", text
+        assert named(EVERY, text) == named(EVERY, text.lower()) == "", text
 
 
 @given(st.text(alphabet="CPFDASL=01\"', \t+a*\x1b\x00é", max_size=12))

@@ -1,5 +1,7 @@
 """Conversations with simulated drives in memory: refusals seen in every mode, nothing sent twice, program mode."""
 
+import re
+
 import pytest
 
 from multidrop.dialects import DriveState, End, Kind, NoAnswer, Owed, Priority, Refused, Reply, Stopped
@@ -293,6 +295,26 @@ def test_typed_program_mode_stores_lines_and_asks_nothing_in_between(bench, em, 
     desk.type(state, "EX G1")
     desk.wait(0.5)
     assert desk.type(state, "PR R1") == ("1",)
+
+
+@pytest.mark.parametrize("text", ["MR 5", "PR P", "EM=1", "R1=5"])
+@pytest.mark.parametrize(
+    ("party", "signs", "shown"),
+    [(True, False, "~a{}"), (True, True, '~{}"a"'), (False, False, "~{}")],
+)
+def test_no_line_follows_a_lost_reply_without_a_mark_and_each_mark_is_another(text, party, signs, shown):
+    state = MCodeState(MCode(em=1, party=party), "a" if party else "!")
+    state.signature_seen(signs)
+    state.reply_outstanding()
+    marks = [ProcedureRunner(MCODE.perform(state, text)).request for _ in range(3)]
+    assert [each.text.startswith('PR "~') for each in marks] == [True] * 3
+    late = [shown.format(number) for number in (1, 2, 3)]
+    assert [[re.fullmatch(each.expect, line) is not None for line in late] for each in marks] == [
+        [True, False, False],
+        [False, True, False],
+        [False, False, True],
+    ]
+    assert not any(re.fullmatch(each.expect, line) for each in marks for line in ("0", '0"a"', "5~a", ""))
 
 
 def test_a_refused_line_in_program_mode_is_told_and_not_stored(bench):

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from multidrop.dialects import Diagnostic, End, Hints, Inexpressible, NoAnswer, Priority, Refused
+from multidrop.dialects import Diagnostic, End, Hints, Inexpressible, NoAnswer, Priority, Refused, Reply
 from multidrop.dialects.codec import copy_with
 from multidrop.dialects.pmx.family import PMX
 from multidrop.dialects.pmx.host.codec import Pmx, PmxState
@@ -189,6 +189,15 @@ def test_silence_is_told_and_the_next_line_waits_for_a_mark():
         type_("X1000", far, known)
     assert type_("PX", far, known) == ("10",)
     assert far.sent == [b"@00X1000\r", b"@00Q00001\r", b"@00PX\r"] and not known.reply_pending
+
+
+def test_after_a_damaged_reply_too_the_next_line_waits_for_a_mark():
+    known, far = PmxState(Pmx(), "00"), Far()
+    procedure = ProcedureRunner(PMX.perform(known, "X1000"))
+    with pytest.raises(NoAnswer, match="it may have been executed and was not sent again"):
+        procedure.answer(Reply((), end=End.DAMAGED))
+    assert type_("PX", far, known) == ("10",)
+    assert far.sent == [b"@00Q00001\r", b"@00PX\r"]
 
 
 def test_each_mark_is_another():

@@ -21,7 +21,8 @@ def test_what_is_kept_and_what_changes_the_address_is_guarded():
         "DN=2ED07": "DN",
         "DB=2": "DB",
     }.items():
-        assert named(ONE, text) == named(EVERY, text) == name, text
+        for form in (text, text.lower()):
+            assert named(ONE, form) == named(EVERY, form) == FAMILY.guards.word_of(form.strip()) == name, form
     for text in ("DN", "DB", "X1000", "SR0=1", "HSPD=1000", "STOP", "SA0=5", "nonsense"):
         assert named(ONE, text) == "", text
 

@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from multidrop.dialects.codec import Priority
 from multidrop.dialects.errors import Diagnostic, Inexpressible, NoAnswer, Refused, Stopped
 from multidrop.dialects.family import Hints
+from multidrop.dialects.state import Owed
 from multidrop.dialects.tmcl.family import TMCL
 from multidrop.dialects.tmcl.host.codec import Tmcl
 from multidrop.dialects.tmcl.manual.commands import Call, Command, Status
@@ -19,8 +20,6 @@ from multidrop.simulator.tmcl.module import Refused as Lacking
 from tests.conftest import Bench
 from tests.support.cases import for_each
 from tests.support.faults import disturb
-
-pytestmark = pytest.mark.slow
 
 MODULE = {"personality": "TMCM"}
 
@@ -170,6 +169,7 @@ def test_what_was_lost_is_not_sent_again_and_the_next_value_is_its_own(shop, sta
     assert shop.count(Command.ROR) == 1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("delay", [1.05, 1.2, 1.5, 2.0, 3.0])
 @pytest.mark.parametrize("second", ["GAP 4, 0", "GGP 66, 0", "GAP 3, 0"])
 def test_a_late_reply_is_never_the_next_ones(delay, second, shop, state):
@@ -186,6 +186,7 @@ def test_a_late_reply_is_never_the_next_ones(delay, second, shop, state):
     assert shop.type(state, second) == right
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("text", ["GAP 4, 0", "GGP 76, 0", "RFS STATUS, 0", "136 1, 0, 0", "135 0, 0, 0"])
 @pytest.mark.parametrize("delay", [None, 1.1])
 def test_a_read_whose_reply_was_lost_is_asked_once_more_after_a_mark(delay, text, shop, state):
@@ -280,6 +281,7 @@ def test_a_new_address_is_told(shop, state):
     assert "factory settings" in state.remarks[0]
 
 
+@pytest.mark.slow
 @settings(max_examples=25)
 @given(st.lists(st.sampled_from([None, 0.0, 0.02, 1.1, 2.5]), max_size=12), st.integers(0, 3))
 def test_whatever_is_late_a_value_is_right_or_not_given(delays, start):
@@ -376,6 +378,13 @@ def test_the_last_session_s_download_is_ended_before_anything_is_stored(shop):
     assert (program.storing, len(program.memory), again.programming, again.restore) == (False, 1, False, None)
 
 
+def test_a_module_that_is_owed_nothing_is_sent_no_end_of_a_download(shop):
+    (state,) = shop.open()
+    before = len(shop.written)
+    shop.run(TMCL.identify(Hints(drives=("1",), owed=(Owed(0, "7", state.product, state.version, ""),))))
+    assert not [data for data in shop.written[before:] if data[1] == Command.END_DOWNLOAD]
+
+
 def test_a_line_of_a_download_that_was_executed_is_said(shop, state):
     shop.type(state, "132 0, 0, 0")
     shop.devices["1"].program.storing = False  # by another host
@@ -407,6 +416,7 @@ def damaged(data, place, how):
     return data[:at] + middle + data[at + 1 :]
 
 
+@pytest.mark.slow
 @for_each("place", range(9))
 @pytest.mark.parametrize("how", ["lost", "doubled", "flipped"])
 @pytest.mark.parametrize(("way", "frame"), [("out", 0), ("out", 1), ("back", 0), ("back", 1)])
@@ -474,6 +484,7 @@ def test_a_resting_module_is_known_after_stops_that_wore_out_every_mark(stops):
     assert shop.run(TMCL.moving(state)) is False
 
 
+@pytest.mark.slow
 @settings(max_examples=25)
 @given(st.lists(st.sampled_from([0.02, 0.3, 1.1, 2.5]), min_size=3, max_size=9), st.integers(0, 3))
 def test_after_any_stops_a_value_is_right_or_not_given(delays, start):

@@ -32,7 +32,9 @@ ONE, EVERY = TmclState(Tmcl(), "1"), TmclState(Tmcl(), "*")
     ],
 )
 def test_a_guarded_line_has_a_reason(text, part):
-    assert part in FAMILY.guards.find(ONE, text).what
+    for form in (text, text.lower()):
+        assert part in FAMILY.guards.find(ONE, form).what
+        assert FAMILY.guards.word_of(form) == FAMILY.guards.word_of(form.upper())
 
 
 @pytest.mark.parametrize(
@@ -46,6 +48,6 @@ def test_other_lines_have_none(text):
 
 def test_a_line_to_all_that_can_start_is_guarded_and_a_stop_is_not():
     for text in ("ROR 0, 1000", "MVP ABS, 0, 0", "SAP 2, 0, 5", "RFS START, 0"):
-        assert FAMILY.guards.find(EVERY, text).name == "*", text
+        assert FAMILY.guards.find(EVERY, text).name == FAMILY.guards.find(EVERY, text.lower()).name == "*", text
     for text in ("ROR 0, 0", "ROL 0, 0", "MST 0", "RFS STOP, 0", "GAP 1, 0"):
         assert FAMILY.guards.find(EVERY, text) is None, text

@@ -7,8 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from multidrop.dialects import Diagnostic
+from multidrop.dialects import Diagnostic, DriveError, NoAnswer, Refused
 from multidrop.dialects.families import FAMILIES
+from multidrop.drives.drive import Drive
 from multidrop.shell.events import ProgramRead, ProgramSeen, SettingsRead
 from tests.support.cell_session import CellSession, bus, party, pmx
 
@@ -116,6 +117,26 @@ async def test_settings_that_are_reset_are_a_sign_where_the_position_is_none(tmp
         (said,) = cell.restarts()
         assert "VM 100000 before, 768000 now" in said and "position 0 before, 0 now" in said
         assert cell.unreferenced("b") == {""}
+
+
+@pytest.mark.parametrize(("failure", "missing"), [(NoAnswer("no reply"), True), (Refused("refused"), False)])
+async def test_a_drive_that_falls_silent_again_before_it_was_looked_at_is_looked_at_later(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, failure: DriveError, missing: bool
+) -> None:
+    async def unread(*_: object) -> None:
+        raise failure
+
+    async with CellSession(tmp_path, bus(LINE, party("b"))) as cell:
+        line = cell.session.buses[LINE]
+        drive = line.drives["b"]
+        with monkeypatch.context() as patched:
+            patched.setattr(Drive, "motion", unread)
+            line.roster.restarts.replied_again(drive, "sign-on")
+            await asyncio.sleep(5)
+        assert (drive.missing, drive.state.unreferenced, cell.warned()) == (missing, frozenset(), [])
+        line.roster.restarts.replied_again(drive, "sign-on")
+        await asyncio.sleep(5)
+        assert drive.state.unreferenced == {""} and "b was restarted (sign-on; position 0 now)" in cell.warned()[0]
 
 
 @pytest.mark.parametrize("commands", [[], ["@b MA 51200"], ["@b MA 51200", "@b VM=100000"]])

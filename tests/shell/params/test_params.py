@@ -16,7 +16,7 @@ from multidrop.shell.params.file import read
 from multidrop.shell.session import Session
 from multidrop.transports import TransportLost
 
-pytestmark = [pytest.mark.virtual, pytest.mark.slow]
+pytestmark = pytest.mark.virtual
 
 CELL = """
 [[bus]]
@@ -191,6 +191,7 @@ async def test_program_mode_is_refused(session):
         await say(session, "/params restore kept.toml b")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("text", "said"),
     [
@@ -282,15 +283,29 @@ async def test_power_off_ends_a_restore(session, tmp_path):
     await _interrupted(session, tmp_path, lambda: session.cells["press"].command("/sim power b off"))
 
 
-async def test_a_value_that_is_not_what_was_sent_is_a_failure(session, tmp_path):
-    (tmp_path / "kept.toml").write_text("[parameters]\nRC = 33\n")
-    one = device(session)
-    execute = one.execute
-    one.execute = lambda text, now: execute(text.replace("RC=33", "RC=44"), now)
-    with pytest.raises(DriveError, match="RC is 44, not 33; nothing was saved"):
-        await say(session, "/params restore kept.toml b")
+@pytest.mark.parametrize("save", ["", " --save"])
+@pytest.mark.parametrize(
+    ("taken", "says"),
+    [("RC=44", "RC is 44, not 33; nothing was saved"), ("RC=9999", "b refused 'RC=33'")],
+)
+async def test_a_value_that_is_not_what_was_sent_is_a_failure_and_is_not_saved(session, tmp_path, taken, says, save):
+    (tmp_path / "kept.toml").write_text("[parameters]\nRC = 33\nVM = 512000\n")
+    one, executed = device(session), []
+    execute, before = one.execute, one.memory.values["RC"]
+
+    def noisy(text, now):
+        executed.append(text)
+        return execute(text.replace("RC=33", taken), now)
+
+    one.execute = noisy
+    with pytest.raises(DriveError, match=says):
+        await say(session, f"/params restore kept.toml b{save}")
+    assert "RC=33" in executed and "S" not in executed
+    one.reset(one.now)
+    assert one.memory.values["RC"] == before
 
 
+@pytest.mark.slow
 async def test_every_family_goes_into_a_file_and_back(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     session = await opened(tmp_path, OTHERS)

@@ -13,7 +13,7 @@ from multidrop.shell.state.backups import write_backup
 from tests.support.cell_session import CellSession, bus, pmx
 from tests.support.transfers import FILE, LISTED, LONG, SLOW, kept, load, shop_with
 
-pytestmark = [pytest.mark.virtual, pytest.mark.slow]
+pytestmark = pytest.mark.virtual
 
 
 async def test_a_download_says_what_it_has_done(tmp_path: Path, shop: CellSession) -> None:
@@ -89,6 +89,17 @@ async def test_a_program_is_started_after_it_was_verified(tmp_path: Path, shop: 
     assert shop.printed()[-1] == "100"
 
 
+async def test_a_changed_file_is_preceded_by_a_backup_of_what_the_drive_holds(
+    tmp_path: Path, shop: CellSession
+) -> None:
+    await load(shop, tmp_path)
+    (tmp_path / "p.mxt").write_text("PG 1\nLB G7\nE\nPG\n")
+    told = await load(shop, tmp_path, "--only-changed")
+    assert told.index("a: p.mxt downloaded, 4 lines") > 1 and told[1].startswith("backup: ")
+    assert "LB G1" in kept(tmp_path)[-1].read_text()
+
+
+@pytest.mark.slow
 async def test_what_the_drive_holds_already_is_not_sent_again(tmp_path: Path) -> None:
     text = f"VM=400000\nIS=1,0,0\n{FILE}"
     async with shop_with(tmp_path, text) as shop:
@@ -108,6 +119,7 @@ async def test_what_the_drive_holds_already_is_not_sent_again(tmp_path: Path) ->
             assert len(await load(shop, tmp_path, "--only-changed")) > 1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("personality", ["LMDOM", "LMM", "MDI", "MDIE", "MDIX"])
 async def test_every_product_takes_an_edited_file_again_and_again(tmp_path: Path, personality: str) -> None:
     drive = f'personality = "{personality}"\nname = "a"\nparty = true'
@@ -139,6 +151,7 @@ async def test_remarks_and_layout_come_back_with_the_present_values(tmp_path: Pa
     assert (tmp_path / "changed.mxt").read_text().splitlines()[2:-2] == ["PG 1", "LB G1", "MR 100", "R1=5"]
 
 
+@pytest.mark.slow
 async def test_progress_ends_with_each_part(tmp_path: Path) -> None:
     async with shop_with(tmp_path, LONG, SLOW) as shop:
         await load(shop, tmp_path)
@@ -177,6 +190,7 @@ async def test_a_held_program_that_runs_is_ended_before_it_is_executed_again(tmp
 PMX_FILE = "; ten times\nPRG 0\n  V1=1   ; from one\n  WHILE V1<1000\n    V1=V1*10\n  ENDWHILE\nEND\n"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("usb", [False, True])
 async def test_a_controller_has_the_same_options_as_far_as_its_words_go(tmp_path: Path, usb: bool) -> None:
     here, who = ("", "pmx") if usb else ("07", "07")

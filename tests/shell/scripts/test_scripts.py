@@ -120,6 +120,19 @@ async def test_an_expectation_sees_what_comes_by_itself_and_not_the_scripts_own_
     assert shop.results[-2].printed == ("READY",)
 
 
+@pytest.mark.parametrize("at", [0.5, 1.5])
+@pytest.mark.parametrize("line", ['@b PR "READY"', "/play ready", "/play print"])
+async def test_an_expectation_does_not_see_what_others_print_meanwhile(line, at, shop):
+    shop.session.macros.save(Macro("ready", (Step(0.0, '@b PR "READY"'),)))
+    shop.session.macros.save(Macro("print", (Step(0.0, "/print READY"),)))
+    checking = asyncio.create_task(shop.failure('@a PR "going"\n/sleep 1\n/expect "READY" 2', CheckFailed))
+    await asyncio.sleep(at)
+    await shop.session.run(line)
+    assert any("READY" in each for each in shop.printed())
+    assert await checking == 's.txt:3: /expect "READY" 2: wanted "READY" within 2 s, seen nothing'
+    assert [(each.drive, each.printed) for each in shop.results] == [("a", ("going",)), ("", ()), ("", ())]
+
+
 @pytest.mark.parametrize(
     ("text", "said"),
     [
