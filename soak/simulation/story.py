@@ -24,6 +24,8 @@ from soak.simulation.acts.meetings import HELD_UP, MEETINGS
 from soak.simulation.acts.operators import OPERATORS
 from soak.simulation.acts.quitting import QUITTING
 from soak.simulation.acts.strangers import STRANGER
+from soak.simulation.acts.workshop_desk import DESK
+from soak.simulation.acts.workshop_ends import ENDS
 from soak.simulation.acts_kill import files, kill, power_cut
 from soak.simulation.bounds import sample
 from soak.simulation.cut_ins import drawn_aim
@@ -166,16 +168,22 @@ AFTER = CREW + LAST
 """The number of the first step of the acts that end it."""
 AT_LAST = (*AFTER_CREWS, *QUITTING, STRANGER)
 """Those acts, each once."""
+WORKSHOP = (*DESK, *ENDS)
+WORKSHOPS, FIRST_JOB, JOBS = 0.5, 300, 4
+"""How many seeds end with jobs of a workshop, the number of the first step with one, and how many there are."""
 
 
 def whole(seed: int, steps: int) -> tuple[int, ...]:
-    """The steps of a whole story: so many, and those of the crews, if it ends with them."""
+    """The steps of a whole story: so many, those of the crews, and those of a workshop, if it ends with them."""
     crews = range(CREW, AFTER + len(AT_LAST)) if Random(f"{seed} crews").random() < AT_ONCE else ()
-    return (*range(steps), *crews)
+    jobs = range(FIRST_JOB, FIRST_JOB + JOBS) if Random(f"{seed} workshop").random() < WORKSHOPS else ()
+    return (*range(steps), *crews, *jobs)
 
 
 def _drawn(world: World, step: int, rng: Random) -> Act:
     """Draw the act of a step."""
+    if step >= FIRST_JOB:
+        return rng.choices(WORKSHOP, [each.weight for each in WORKSHOP])[0]
     if step >= AFTER:
         return AT_LAST[step - AFTER]
     if step >= CREW:

@@ -1,0 +1,168 @@
+"""Jobs of the workshop that end early: programs and motions of automation, stops of watchers, motions that fail."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable
+from random import Random
+from types import SimpleNamespace
+from typing import TYPE_CHECKING, Any
+from unittest import mock
+
+from multidrop.simulator.cell.spec import Faults
+from soak.simulation.act import Act
+from soak.simulation.acts.watching import STOPPED_TOO
+from soak.simulation.told import NEAR, SHORT
+from soak.simulation.workshop import LINE, SETTLED, Workshop, at_work, workshop
+
+if TYPE_CHECKING:
+    from soak.simulation.world import World
+
+PARTY = ("a", "b", "c")
+BY_HAND = "SL 5000"
+"""What a person has started on a drive beside the automation."""
+STARTS = ("EX G1", "EX G1", "SL 40000", "MR 90000000", "MA 90000000")
+WRONG = ("VM=-1", "STATUS", "PR STATUS", "MA 1,2,3,4", "EX Z9")
+"""Lines that a drive refuses."""
+PROGRAM = "PG 1\nLB G1\nMR {steps}\nH\nH {pause}\nBR G1\nE\nPG\n"
+"""A program that moves its drive again and again, with pauses."""
+CANCEL, INTERRUPT = "cancel", "interrupt"
+CLAMP = 41_000_000
+
+
+def _with_program(rng: Random, world: World) -> str:
+    """The table of a drive with such a program."""
+    folder = world.folder / f"workshop{world.step}"
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / "g1.mxt").write_text(PROGRAM.format(steps=rng.choice((2000, 90000)), pause=rng.choice((20, 2000))))
+    return 'program = "g1.mxt"'
+
+
+def _automation(shop: Workshop) -> Callable[[list[str]], Any]:
+    return shop.rng.choice((shop.script, shop.macro))
+
+
+async def early_end(world: World, rng: Random) -> None:
+    """Let automation start a program or a motion, and end early, beside a drive that a person has started."""
+    async with workshop(world, rng, "mcode", PARTY, a=_with_program(rng, world)) as shop:
+        beside = rng.random() < 0.7
+        if beside:
+            await shop.type(f"@b {BY_HAND}")
+        start = rng.choice(STARTS)
+        ending = rng.choice((CANCEL, INTERRUPT, "@a VM=-1", "@c VM=-1", "/assert 1 == 2", '/wait "nothing" 0.5'))
+        lines = [f"@a {start}", f"/sleep {rng.random() * 2:.2f}", ending if ending[0] in "@/" else "/sleep 30"]
+        work = shop.start(_automation(shop)(lines))
+        if ending in (CANCEL, INTERRUPT):
+            await asyncio.sleep(0.3 + rng.random() * 2)
+            work.cancel() if ending == CANCEL else shop.session.interrupt()
+        why = await work
+        await asyncio.sleep(SETTLED)
+        words = f"{start!r} of an automation that ended early ({ending}: {why})"
+        shop.fact("automation", not (shop.moves("a") or shop.device("a").running), f"{words}: a goes on")
+        if beside and ending != INTERRUPT:
+            too = any(STOPPED_TOO in text for _, text in shop.said)
+            shop.fact("automation", shop.moves("b") or too, f"{words}: b was started by hand, and was stopped")
+
+
+async def spared(world: World, rng: Random) -> None:
+    """Start a drive by hand; then automation on its line reads, sets values, is refused, and ends early."""
+    async with workshop(world, rng, "mcode", PARTY) as shop:
+        await shop.type(f"@b {BY_HAND}")
+        drive = rng.choice(("b", "b", "a"))
+        lines = rng.sample((f"@{drive} R2=7", f"@{drive} PR P", f"@{drive} R3=8"), rng.randrange(0, 3))
+        wrong = rng.choice(WRONG)
+        lines.append(rng.choice((f"@{drive} {wrong}", f"@{drive} {wrong}", "/assert 1 == 2")))
+        why = await _automation(shop)(lines)
+        await asyncio.sleep(SETTLED)
+        shop.fact("spared", shop.moves("b"), f"{lines} ended early ({why}), and b, started by hand, was stopped")
+
+
+class _Gate:
+    """In place of the socket to which watchers connect: keeps what it would call."""
+
+    made: Any = None
+
+    def __init__(self, folder: object, loop: object, calls: Any) -> None:
+        self.calls, self.path = calls, folder
+        self.watchers: list[Any] = []
+        _Gate.made = self
+
+    def close(self) -> None:
+        """Do nothing."""
+
+
+async def watched(world: World, rng: Random) -> None:
+    """Share the screen; a watcher presses the stop key while automation moves a drive; then more of it begins."""
+    from multidrop.tui import sharing
+
+    async with workshop(world, rng, "mcode", PARTY[:2]) as shop:
+        session = shop.session
+        app: Any = SimpleNamespace(
+            session=session, stop_ahead=session.stop_ahead, presenter=SimpleNamespace(watchers=[])
+        )
+        with mock.patch.object(sharing, "Gate", _Gate):
+            feed = sharing.Feed(app, shop.folder)
+        calls = _Gate.made.calls
+        running = shop.start(_automation(shop)(["@a SL 40000", "/sleep 30"])) if rng.random() < 0.7 else None
+        await asyncio.sleep(0.5 + rng.random() * 2)
+        calls.stop_ahead()
+        calls.stop("eve")
+        await asyncio.sleep(SETTLED)
+        shop.fact("automation", running is None or running.done(), "a watcher's stop: automation goes on")
+        shop.fact("stopped", not shop.moves("a"), "a watcher's stop: a moves")
+        value = CLAMP + world.step
+        why = await _automation(shop)([f"@b R2={value}"])
+        done = f"R2={value}" in shop.executed("b")
+        shop.fact("latched", why and not done, f"automation that began after a watcher's stop was executed ({why})")
+        await shop.type("/resume")
+        why = await _automation(shop)([f"@b R2={value + 1}"])
+        shop.fact("lost", why or f"R2={value + 1}" in shop.executed("b"), "automation after /resume was not executed")
+        feed.close()
+
+
+KINDS = ("limit", "limit", "stall", "stall", "other", "other", "silent", "silent", "nothing")
+SETTINGS = {"limit": ("IS=1,2,0",), "stall": ("EE=1", "VM=8000", "A=40000", "D=40000", "MT=50")}
+WAITS = ("/wait stopped 20", "/wait idle 20", "/wait @a P={goal} 20")
+SILENT = Faults(delay=(0.5, 1.5))
+"""Replies come later than the time-out."""
+
+
+async def failing(world: World, rng: Random) -> None:
+    """Move a drive in automation, and let the motion fail, or its replies be late; then comes the clamp."""
+    async with workshop(world, rng, "mcode", PARTY[:2], timeout=0.4) as shop:
+        kind, device = rng.choice(KINDS), shop.device("a")
+        goal = (20_000 if kind == "stall" else 2_000_000) + world.step
+        clamp = f"R2={CLAMP + world.step}"
+        wait = rng.choice(WAITS).format(goal=goal)
+        settings = [f"@a {each}" for each in SETTINGS.get(kind, ())]
+        lines = [*settings, "@a P=0", f"@a MA {goal}", wait, f"@{rng.choice('ab')} {clamp}"]
+        wires = shop.floor.floor.wires
+
+        def fail() -> None:
+            if kind == "limit":
+                shop.floor.command(f"/sim input {LINE}:a 1 0")
+            elif kind == "stall":
+                device.world.hold(True)
+            elif kind == "other":
+                shop.witnesses["a"].unwatched("SL 0", shop.floor.now())
+                wires[LINE].look_again()
+            elif kind == "silent":
+                wires[LINE].disturb(SILENT)
+                world.loop.call_later(1 + rng.random() * 3, wires[LINE].disturb, Faults())
+
+        world.loop.call_later(1.0 + rng.random() * 1.5, fail)
+        why = await _automation(shop)(lines)
+        await asyncio.sleep(2.0)
+        at = shop.position("a")
+        done, there = clamp in (*shop.executed("a"), *shop.executed("b")), abs(at - goal) <= NEAR
+        words = f"{kind}, {wait!r}: a is at {at} of {goal}, and {clamp!r} was {'' if done else 'not '}executed ({why})"
+        shop.fact("outcome", there or not done, words)
+        shop.fact("outcome", done or not there or not SHORT.search(why), words)
+
+
+ENDS = (
+    Act("workshop, early end", 3, at_work(early_end)),
+    Act("workshop, spared", 1.5, at_work(spared)),
+    Act("workshop, stop of a watcher", 1, at_work(watched)),
+    Act("workshop, failing motion", 2, at_work(failing)),
+)
