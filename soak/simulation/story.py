@@ -169,21 +169,26 @@ AFTER = CREW + LAST
 AT_LAST = (*AFTER_CREWS, *QUITTING, STRANGER)
 """Those acts, each once."""
 WORKSHOP = (*DESK, *ENDS)
-WORKSHOPS, FIRST_JOB, JOBS = 0.5, 300, 4
-"""How many seeds end with jobs of a workshop, the number of the first step with one, and how many there are."""
+FIRST_JOB, JOBS = 300, 2
+"""The number of the first step with a job of a workshop, and how many there are: each story ends with them."""
 
 
 def whole(seed: int, steps: int) -> tuple[int, ...]:
-    """The steps of a whole story: so many, those of the crews, and those of a workshop, if it ends with them."""
+    """The steps of a whole story: so many, those of the crews in some seeds, and those of a workshop."""
     crews = range(CREW, AFTER + len(AT_LAST)) if Random(f"{seed} crews").random() < AT_ONCE else ()
-    jobs = range(FIRST_JOB, FIRST_JOB + JOBS) if Random(f"{seed} workshop").random() < WORKSHOPS else ()
-    return (*range(steps), *crews, *jobs)
+    return (*range(steps), *crews, *range(FIRST_JOB, FIRST_JOB + JOBS))
+
+
+def _job(seed: int, step: int) -> Act:
+    """The job of a step: twenty seeds have each as often as it weighs, twice."""
+    jobs = [each for each in WORKSHOP for _ in range(int(each.weight))]
+    return jobs[(seed * JOBS + step - FIRST_JOB) % len(jobs)]
 
 
 def _drawn(world: World, step: int, rng: Random) -> Act:
     """Draw the act of a step."""
     if step >= FIRST_JOB:
-        return rng.choices(WORKSHOP, [each.weight for each in WORKSHOP])[0]
+        return _job(world.seed, step)
     if step >= AFTER:
         return AT_LAST[step - AFTER]
     if step >= CREW:

@@ -8,7 +8,8 @@ from pathlib import Path
 from random import Random
 from typing import TYPE_CHECKING, Any
 
-from multidrop.shell.events import Printed
+from multidrop.drives.events import Sample
+from multidrop.shell.events import OnBus, Printed
 from multidrop.simulator.cell.spec import Faults
 from soak.simulation.act import Act
 from soak.simulation.acts.phrases import PHRASES
@@ -213,18 +214,31 @@ async def units(world: World, rng: Random) -> None:
         drive, session = names[0], shop.session
         truth = _Truth(shop, drive)
         own = session.bus(LINE).drives[drive]
-        poll = session.bus(LINE).telemetry.subscribe([drive], 0.2) if rng.random() < 0.5 else None
+        poll = session.bus(LINE).telemetry.subscribe([drive], 0.02) if rng.random() < 0.7 else None
+        _watch_scale(shop, own, truth)
         for _ in range(rng.randrange(2, 5)):
             change, back = rng.choice(WORDS[language])
             for line in (change, rng.choice((back, f"/units {drive}", change))):
                 if line[0] != "/":
-                    await (shop.script([f"@{drive} {line}"]) if rng.random() < 0.3 else shop.type(f"@{drive} {line}"))
+                    where = rng.choice((f"@{drive}", f"@{drive}", f"@{LINE}:*")) if language == "mcode" else f"@{drive}"
+                    await (shop.script([f"{where} {line}"]) if rng.random() < 0.3 else shop.type(f"{where} {line}"))
                 else:
                     why = await shop.type(line)
                     truth.accepted = truth.accepted if why else truth.now
                 await _looked_at(shop, own, drive, truth, line)
         if poll is not None:
             poll.close()
+
+
+def _watch_scale(shop: Workshop, own: Any, truth: _Truth) -> None:
+    """Look with each sample of the drive how it would be shown: nothing else is on the line meanwhile."""
+
+    def sampled(event: object) -> None:
+        if isinstance(event, OnBus) and isinstance(event.event, Sample) and not truth.holds:
+            given = shop.session.units.given(own, event.event.axis, event.event.position)
+            shop.fact("units", given is None, f"{own.address} is at {event.event.position}, and is shown as {given}")
+
+    shop.session.subscribe(sampled)
 
 
 async def _looked_at(shop: Workshop, own: Any, drive: str, truth: _Truth, line: str) -> None:
@@ -274,11 +288,11 @@ def _sets(shop: Workshop, drive: str, value: int) -> None:
 
 
 DESK = (
-    Act("workshop, questions", 2, at_work(questions)),
+    Act("workshop, questions", 3, at_work(questions)),
     Act("workshop, downloads", 1, at_work(downloads)),
     Act("workshop, restores", 1, at_work(restores)),
-    Act("workshop, owed echo mode", 1, at_work(owed)),
+    Act("workshop, owed echo mode", 2, at_work(owed)),
     Act("workshop, /expect", 1, at_work(expected)),
-    Act("workshop, units", 2, at_work(units)),
-    Act("workshop, late replies", 1.5, at_work(late)),
+    Act("workshop, units", 3, at_work(units)),
+    Act("workshop, late replies", 2, at_work(late)),
 )
