@@ -178,6 +178,17 @@ class Workshop:
         """The lines that a drive has executed, without questions."""
         return self.witnesses[drive].executed
 
+    def before_execution(self, drive: str, note: Callable[[str], object]) -> None:
+        """Call something with each line that a drive is about to execute."""
+        device = self.device(drive)
+        execute = device.execute
+
+        def noted(text: Any, now: float, **how: Any) -> Any:
+            note(str(text).strip())
+            return execute(text, now, **how)
+
+        device.execute = noted
+
     def moves(self, drive: str) -> bool:
         """Whether a drive moves."""
         shadow = self.devices[drive].unit.shadow

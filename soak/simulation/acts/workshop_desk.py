@@ -125,14 +125,14 @@ async def owed(world: World, rng: Random) -> None:
     work = shop.start(shop.type(f"/download {shop.folder / 'p.mxt'} {LINE}:a"))
     while device.memory.values["EM"] != 0 and not work.done():
         await asyncio.sleep(0.001)
-    await asyncio.sleep(rng.random() ** 2 * 0.1)
+    await asyncio.sleep(rng.random() * 0.01)
     world.network.refuse(shop.host, 1e6)
     await asyncio.sleep(0.1)
     await shop.session.close()
     await asyncio.sleep(5.0)
     borrowed = device.memory.values["EM"] == 0
     host.refuses = 0.0
-    if borrowed and rng.random() < 0.7:
+    if borrowed and rng.random() < 0.9:
         other = Workshop(world, rng, "mcode", names, a=_serial(333), b=_serial(444))
         await shop.unplug()
         await other.serve()
@@ -162,10 +162,10 @@ async def expected(world: World, rng: Random) -> None:
         value, own = FIRST + world.step, rng.random() < 0.3
         shop.device("b").memory.values["R1"] = value
         mark = f"R2={value}"
-        ask = ["@b PR R1"] if own else ["@a PR R2"]
+        ask = ["/sleep 0.5", "@b PR R1"] if own else ["@a PR R2", f"/sleep {rng.random() * 2:.2f}"]
         work = shop.start(shop.script([*ask, f'/expect "{value}" 2', f"@a {mark}"]))
-        for _ in range(4):
-            await asyncio.sleep(rng.random() * 0.8)
+        for _ in range(8):
+            await asyncio.sleep(rng.random() * 0.4)
             await shop.type("@b PR R1")
         why = await work
         done = mark in shop.executed("a")
