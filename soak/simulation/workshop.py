@@ -39,6 +39,7 @@ PORT = 4001
 BAUD = 115200
 LINE = "w"
 """The name of the line in the session."""
+TRIES = 10
 SETTLED = 5.0
 """The time, s, after an early end in which its stops are confirmed."""
 LONGEST = 60.0
@@ -120,8 +121,16 @@ class Workshop:
         self.session.subscribe(self._heard)
 
     async def open(self) -> None:
-        """Open the line."""
-        await self.session.open(LINE, LINE)
+        """Open the line, again where a thread that is slow or a loop that is held up kept it from that."""
+        for left in reversed(range(TRIES)):
+            try:
+                await self.session.open(LINE, LINE)
+            except FAILURES:
+                if not left:
+                    raise
+                await asyncio.sleep(1.0)
+            else:
+                return
 
     async def _ask(self, question: str) -> bool:
         self.asked.append(question)
