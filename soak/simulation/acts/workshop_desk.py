@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import re
+from functools import partial
 from pathlib import Path
 from random import Random
 from typing import TYPE_CHECKING, Any
@@ -287,12 +288,41 @@ def _sets(shop: Workshop, drive: str, value: int) -> None:
         witness.unwatched(f"V1={value}" if shop.language == "pmx" else Call(5, 195, 0, value), shop.floor.now())
 
 
+NAK = b"\x15"
+
+
+async def noisy(world: World, rng: Random) -> None:
+    """Let noise make a NAK before the drive's own ACK has come, which is late."""
+    names = NAMES["mcode"]
+    async with workshop(world, rng, "mcode", names) as shop:
+        wire = shop.floor.floor.wires[LINE]
+        for number in range(rng.randrange(2, 5)):
+            drive, text = rng.choice(names), f"R2={FIRST + world.step * 10 + number}"
+            if rng.random() < 0.7:
+                wire.disturb(Faults(delay=(0.01, 0.4)))
+                shop.before_execution(drive, partial(_nak, shop, text, 0.001 + rng.random() * 0.01))
+            why = await shop.type(f"@{drive} {text}")
+            wire.disturb(Faults())
+            await asyncio.sleep(0.5)
+            times = shop.executed(drive).count(text)
+            shop.fact("twice", times < 2, f"{text!r} was executed {times} times after a NAK and a late ACK ({why})")
+            shop.fact("lost", why or times, f"{text!r} was reported as done, and was not executed")
+
+
+def _nak(shop: Workshop, text: str, delay: float, executed: str) -> None:
+    """Let a NAK come, where a drive is about to execute a line."""
+    if executed == text:
+        for each in [*shop.floor._listeners[LINE]]:
+            shop.world.loop.call_later(delay, each.receive, NAK)
+
+
 DESK = (
     Act("workshop, questions", 3, at_work(questions)),
     Act("workshop, downloads", 1, at_work(downloads)),
     Act("workshop, restores", 1, at_work(restores)),
-    Act("workshop, owed echo mode", 2, at_work(owed)),
+    Act("workshop, owed echo mode", 1, at_work(owed)),
     Act("workshop, /expect", 1, at_work(expected)),
     Act("workshop, units", 3, at_work(units)),
+    Act("workshop, a NAK of noise", 1, at_work(noisy)),
     Act("workshop, late replies", 2, at_work(late)),
 )
