@@ -296,10 +296,10 @@ async def noisy(world: World, rng: Random) -> None:
     names = NAMES["mcode"]
     async with workshop(world, rng, "mcode", names) as shop:
         wire = shop.floor.floor.wires[LINE]
-        for number in range(rng.randrange(2, 5)):
+        for number in range(rng.randrange(3, 6)):
             drive, text = rng.choice(names), f"R2={FIRST + world.step * 10 + number}"
-            if rng.random() < 0.7:
-                wire.disturb(Faults(delay=(0.01, 0.4)))
+            if rng.random() < 0.9:
+                wire.disturb(Faults(delay=(0.16, 0.4)))
                 shop.before_execution(drive, partial(_nak, shop, text, 0.001 + rng.random() * 0.01))
             why = await shop.type(f"@{drive} {text}")
             wire.disturb(Faults())

@@ -126,14 +126,14 @@ async def watched(world: World, rng: Random) -> None:
         feed.close()
 
 
-KINDS = ("limit", "stall", "other", "nothing")
+KINDS = ("limit", "stall", "other")
 SETTINGS = {
     "silent": ("VM=400000",),
-    "limit": ("IS=1,2,0",),
-    "other": ("VM=2560000",),
-    "stall": ("EE=1", "VM=8000", "A=40000", "D=40000", "MT=50"),
+    "limit": ("EE=0", "VM=400000", "IS=1,2,0"),
+    "other": ("EE=0", "IS=1,0,0", "VM=2560000", "A=1000000", "D=1000000"),
+    "stall": ("EE=1", "IS=1,0,0", "VM=8000", "A=40000", "D=40000", "MT=50"),
 }
-WAITS = ("/wait stopped 40", "/wait idle 40", "/wait @a P={goal} 40", "/wait ended 40", "/wait ended 40")
+WAITS = ("/wait stopped 40", "/wait stopped 40", "/wait idle 40", "/wait @a P={goal} 40", "/wait ended 40")
 SILENT = Faults(delay=(0.5, 1.5))
 """Replies come later than the time-out."""
 
@@ -144,12 +144,14 @@ async def failing(world: World, rng: Random) -> None:
         moved: dict[str, bool] = {}
         for name in PARTY[:2]:
             shop.before_execution(name, lambda text: moved.setdefault(text, shop.moves("a")))
-        for number, kind in enumerate(("silent", rng.choice(KINDS))):
+        for number, kind in enumerate(("silent", *rng.sample(KINDS, 2))):
             goal = (20_000 if kind == "stall" else 2_000_000) + world.step
             clamp = f"R2={CLAMP + world.step * 10 + number}"
             wait = rng.choice(WAITS).format(goal=goal)
-            settings = [f"@a {each}" for each in SETTINGS.get(kind, ())]
+            settings = [f"@a {each}" for each in SETTINGS[kind]]
             lines = [*settings, "@a P=0", f"@a MA {goal}", wait, f"@{rng.choice('ab')} {clamp}"]
+            shop.floor.command(f"/sim input {LINE}:a 1 1")
+            shop.floor.command(f"/sim lock {LINE}:a off")
             failure = shop.start(_fail(shop, kind))
             why = await _automation(shop)(lines)
             await failure
@@ -174,7 +176,7 @@ async def _fail(shop: Workshop, kind: str) -> str:
     if kind == "limit":
         shop.floor.command(f"/sim input {LINE}:a 1 0")
     elif kind == "stall":
-        shop.device("a").world.hold(True)
+        shop.floor.command(f"/sim lock {LINE}:a on")
     elif kind == "other":
         shop.witnesses["a"].unwatched("SL 0", shop.floor.now())
         wire.look_again()
