@@ -25,7 +25,7 @@ from soak.simulation.acts.operators import OPERATORS
 from soak.simulation.acts.quitting import QUITTING
 from soak.simulation.acts.strangers import STRANGER
 from soak.simulation.acts.workshop_desk import DESK
-from soak.simulation.acts.workshop_ends import ENDS
+from soak.simulation.acts.workshop_ends import ENDS, PORT
 from soak.simulation.acts_kill import files, kill, power_cut
 from soak.simulation.bounds import sample
 from soak.simulation.cut_ins import drawn_aim
@@ -168,7 +168,7 @@ AFTER = CREW + LAST
 """The number of the first step of the acts that end it."""
 AT_LAST = (*AFTER_CREWS, *QUITTING, STRANGER)
 """Those acts, each once."""
-WORKSHOP = (*DESK, *ENDS)
+WORKSHOP = (*DESK, PORT, *ENDS)
 FIRST_JOB, JOBS = 300, 2
 """The number of the first step with a job of a workshop, and how many there are: each story ends with them."""
 

@@ -9,10 +9,12 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import errno
 import json
 from collections.abc import AsyncIterator, Callable, Coroutine, Sequence
 from contextlib import AsyncExitStack
 from contextvars import copy_context
+from functools import partial
 from random import Random
 from typing import TYPE_CHECKING, Any
 
@@ -176,6 +178,20 @@ class Workshop:
     def start(self, work: Coroutine[Any, Any, str]) -> asyncio.Task[str]:
         """Let something run beside."""
         return self.world.loop.create_task(work)
+
+    def takes(self, nothing: bool) -> None:
+        """Let the port of the session take nothing for a while, or every byte."""
+        for each in self.world.kernel.descriptors.values():
+            if not each.closed and getattr(each, "host", None) is self.world.network.host(self.host):
+                if nothing:
+                    each.taken = partial(self._full, each.fileno())
+                else:
+                    vars(each).pop("taken", None)
+
+    def _full(self, descriptor: int, data: object, room: int, busy: bool = True) -> int:
+        """In place of `Descriptor.taken`, where there is no room."""
+        self.world.loop.call_later(0.002, self.world.loop.writable, descriptor)
+        raise BlockingIOError(errno.EAGAIN, "no room")
 
     # What the drives did
 

@@ -134,6 +134,7 @@ SETTINGS = {
     "stall": ("EE=1", "IS=1,0,0", "VM=8000", "A=40000", "D=40000", "MT=50"),
 }
 WAITS = ("/wait stopped 40", "/wait stopped 40", "/wait idle 40", "/wait @a P={goal} 40", "/wait ended 40")
+RESTS = ("/wait stopped 40", "/wait idle 40", "/wait ended 40")
 SILENT = Faults(delay=(0.5, 1.5))
 """Replies come later than the time-out."""
 
@@ -147,7 +148,7 @@ async def failing(world: World, rng: Random) -> None:
         for number, kind in enumerate(("silent", *rng.sample(KINDS, 2))):
             goal = (20_000 if kind == "stall" else 2_000_000) + world.step
             clamp = f"R2={CLAMP + world.step * 10 + number}"
-            wait = rng.choice(WAITS).format(goal=goal)
+            wait = rng.choice(WAITS if kind != "silent" else RESTS).format(goal=goal)
             settings = [f"@a {each}" for each in SETTINGS[kind]]
             lines = [*settings, "@a P=0", f"@a MA {goal}", wait, f"@{rng.choice('ab')} {clamp}"]
             shop.floor.command(f"/sim input {LINE}:a 1 1")
@@ -187,9 +188,40 @@ async def _fail(shop: Workshop, kind: str) -> str:
     return kind
 
 
+ON_ITS_WAY = 0.05
+"""The longest time, s, in which a frame that has left is executed."""
+
+
+async def blocked(world: World, rng: Random) -> None:
+    """Type commands as the port takes nothing, and stop: what has not left by then never does."""
+    async with workshop(world, rng, "tmcl", ("1", "2")) as shop:
+        executed: dict[str, float] = {}
+        for name in shop.names:
+            shop.before_execution(name, lambda text: executed.setdefault(text, world.loop.now))
+        for _ in range(rng.randrange(2, 4)):
+            shop.takes(nothing=True)
+            value = 4_000_000 + world.step * 1000 + len(shop.said)
+            typed = {rng.choice(shop.names): f"SAP 194, 0, {value + number}" for number in range(3)}
+            work = [shop.start(shop.type(f"@{drive} {text}")) for drive, text in typed.items()]
+            await asyncio.sleep(rng.random() * 0.1)
+            stopped = world.loop.now
+            shop.session.stop_ahead()
+            shop.session.stop("Ctrl+X")
+            await asyncio.sleep(0.1 + rng.random() * 0.3)
+            shop.takes(nothing=False)
+            await asyncio.gather(*work)
+            await asyncio.sleep(2.0)
+            await shop.type("/resume")
+            for text in typed.values():
+                at = executed.get(text, 0.0)
+                words = f"{text!r}, typed before a stop at {stopped:.3f}, was executed at {at:.3f}"
+                shop.fact("after a stop", at < stopped + ON_ITS_WAY, words)
+
+
 ENDS = (
     Act("workshop, early end", 3, at_work(early_end)),
     Act("workshop, spared", 1, at_work(spared)),
     Act("workshop, stop of a watcher", 1, at_work(watched)),
     Act("workshop, failing motion", 2, at_work(failing)),
 )
+PORT = Act("workshop, a port that takes nothing", 1, at_work(blocked))
