@@ -164,7 +164,7 @@ async def expected(world: World, rng: Random) -> None:
             value = FIRST + world.step + own
             shop.device("b").memory.values["R1"] = value
             mark = f"R2={value}"
-            ask = ["/sleep 0.5", "@b PR R1"] if own else ["@a PR R2", f"/sleep {rng.random() * 2:.2f}"]
+            ask = ["/sleep 0.5", "@b PR R1"] if own else ["@a PR R2", f"/sleep {1 + rng.random():.2f}"]
             work = shop.start(shop.script([*ask, f'/expect "{value}" 2', f"@a {mark}"]))
             for _ in range(8):
                 await asyncio.sleep(rng.random() * 0.4)

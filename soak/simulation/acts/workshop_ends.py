@@ -128,7 +128,7 @@ async def watched(world: World, rng: Random) -> None:
 
 KINDS = ("limit", "stall", "other")
 SETTINGS = {
-    "silent": ("VM=400000",),
+    "silent": ("VM=200000",),
     "limit": ("EE=0", "VM=400000", "IS=1,2,0"),
     "other": ("EE=0", "IS=1,0,0", "VM=2560000", "A=1000000", "D=1000000"),
     "stall": ("EE=1", "IS=1,0,0", "VM=8000", "A=40000", "D=40000", "MT=50"),
@@ -150,7 +150,8 @@ async def failing(world: World, rng: Random) -> None:
             clamp = f"R2={CLAMP + world.step * 10 + number}"
             wait = rng.choice(WAITS if kind != "silent" else RESTS).format(goal=goal)
             settings = [f"@a {each}" for each in SETTINGS[kind]]
-            lines = [*settings, "@a P=0", f"@a MA {goal}", wait, f"@{rng.choice('ab')} {clamp}"]
+            pause = ["/sleep 4"] if kind == "silent" else []  # until the drives reply again, and before the target
+            lines = [*settings, "@a P=0", f"@a MA {goal}", wait, *pause, f"@{rng.choice('ab')} {clamp}"]
             shop.floor.command(f"/sim input {LINE}:a 1 1")
             shop.floor.command(f"/sim lock {LINE}:a off")
             failure = shop.start(_fail(shop, kind))
