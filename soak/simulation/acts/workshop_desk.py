@@ -160,8 +160,8 @@ async def owed(world: World, rng: Random) -> None:
 async def expected(world: World, rng: Random) -> None:
     """Let a script expect a text that only another person's line prints, and then one that its own line prints."""
     async with workshop(world, rng, "mcode", NAMES["mcode"]) as shop:
-        for own in (False, True):
-            value = FIRST + world.step + own
+        for number, own in enumerate((False, False, True)):
+            value = FIRST + world.step + number
             shop.device("b").memory.values["R1"] = value
             mark = f"R2={value}"
             ask = ["/sleep 0.5", "@b PR R1"] if own else ["@a PR R2", f"/sleep {1 + rng.random():.2f}"]
