@@ -11,11 +11,12 @@ import asyncio
 import contextlib
 import errno
 import json
-from collections.abc import AsyncIterator, Callable, Coroutine, Sequence
+from collections.abc import AsyncIterator, Callable, Coroutine, Mapping, Sequence
 from contextlib import AsyncExitStack
 from contextvars import copy_context
 from functools import partial
 from random import Random
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 from multidrop.dialects.units import scale
@@ -48,6 +49,7 @@ LONGEST = 60.0
 """The time, s, in which a job is over."""
 
 
+NO_MORE: Mapping[str, str] = MappingProxyType({})
 SAVES = ("STORE", "STAP")
 """Lines without a value that do more than ask."""
 ALSO = frozenset({"S"})
@@ -57,7 +59,9 @@ ALSO = frozenset({"S"})
 class Workshop:
     """A line of drives, and a person at it. `names`: its drives; `more`: further lines of their tables, by name."""
 
-    def __init__(self, world: World, rng: Random, language: str, names: Sequence[str], **more: str) -> None:
+    def __init__(
+        self, world: World, rng: Random, language: str, names: Sequence[str], more: Mapping[str, str] = NO_MORE
+    ) -> None:
         self.world, self.rng, self.language, self.names = world, rng, language, names
         self.folder = world.folder / f"workshop{world.step}"
         self.folder.mkdir(parents=True, exist_ok=True)
@@ -244,10 +248,10 @@ async def workshop(
     *,
     scales: str = "",
     timeout: float = 2.0,
-    **more: str,
+    more: Mapping[str, str] = NO_MORE,
 ) -> AsyncIterator[Workshop]:
     """A workshop whose line is open; see `Workshop`, `Workshop.sit_down`."""
-    shop = Workshop(world, rng, language, names, **more)
+    shop = Workshop(world, rng, language, names, more)
     await shop.serve()
     shop.sit_down(scales, timeout)
     try:

@@ -117,7 +117,7 @@ def _serial(number: int) -> str:
 async def owed(world: World, rng: Random) -> None:
     """Lose a line in a download; then other drives of its kind are on it; then the drive is back."""
     names = NAMES["mcode"]
-    shop = Workshop(world, rng, "mcode", names, a=_serial(111), b=_serial(222))
+    shop = Workshop(world, rng, "mcode", names, {"a": _serial(111), "b": _serial(222)})
     await shop.serve()
     shop.sit_down()
     await shop.open()
@@ -134,7 +134,7 @@ async def owed(world: World, rng: Random) -> None:
     borrowed = device.memory.values["EM"] == 0
     host.refuses = 0.0
     if borrowed and rng.random() < 0.9:
-        other = Workshop(world, rng, "mcode", names, a=_serial(333), b=_serial(444))
+        other = Workshop(world, rng, "mcode", names, {"a": _serial(333), "b": _serial(444)})
         await shop.unplug()
         await other.serve()
         other.device("a").memory.values["EM"] = 0

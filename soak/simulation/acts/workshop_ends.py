@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import json
 from collections.abc import Callable
 from random import Random
 from types import SimpleNamespace
@@ -49,7 +50,7 @@ ENDINGS = (CANCEL, CANCEL, INTERRUPT, "@a VM=-1", "@c VM=-1", "/assert 1 == 2", 
 
 async def early_end(world: World, rng: Random) -> None:
     """Let automation start programs and motions, and end early, beside a drive that a person has started."""
-    async with workshop(world, rng, "mcode", PARTY, a=_with_program(rng, world)) as shop:
+    async with workshop(world, rng, "mcode", PARTY, more={"a": _with_program(rng, world)}) as shop:
         if beside := rng.random() < 0.7:
             await shop.type(f"@b {BY_HAND}")
         for ending in rng.sample(ENDINGS, 3):
@@ -68,6 +69,36 @@ async def early_end(world: World, rng: Random) -> None:
             too = any(STOPPED_TOO in text or (ending == CANCEL and AGAIN in text) for _, text in shop.said)
             shop.fact("automation", shop.moves("b") or too or not beside, f"{words}: b was stopped")
             beside = beside and shop.moves("b")
+
+
+SHUTTLES = "".join(
+    f"PRG {number}\nWHILE 1=1\n{axis}900\nWAIT{axis}\nDELAY=300\n{axis}0\nWAIT{axis}\nENDWHILE\nEND\n"
+    for number, axis in enumerate("XY")
+)
+"""Two programs of a controller, each of which moves an axis."""
+
+
+async def controller(world: World, rng: Random) -> None:
+    """Let automation start a program of a controller, and end early, beside another that a person has started."""
+    more = {"01": f"program_text = {json.dumps(SHUTTLES)}"}
+    async with workshop(world, rng, "pmx", ("01", "02"), more=more) as shop:
+
+        def runs(number: int) -> bool:
+            return str(shop.witnesses["01"].unwatched(f"SASTAT{number}", shop.floor.now())) != "0"
+
+        await shop.type("@02 JX+")
+        for ending in rng.sample(("@01 JOYENA=1", "@02 JOYENA=1", "/assert 1 == 2", CANCEL), 2):
+            start = rng.choice(("SR0=1", "SR1=1", "JX+"))
+            lines = [f"@01 {start}", f"/sleep {rng.random():.2f}", ending if ending[0] in "@/" else "/sleep 30"]
+            work = shop.start(_automation(shop)(lines))
+            if ending == CANCEL:
+                await asyncio.sleep(0.3 + rng.random())
+                work.cancel()
+            why = await work
+            await asyncio.sleep(SETTLED)
+            words = f"{start!r} of an automation that ended early ({ending}: {why})"
+            shop.fact("automation", not (runs(0) or runs(1) or shop.moves("01")), f"{words}: 01 goes on")
+            shop.fact("automation", shop.moves("02"), f"{words}: 02, started by a person, was stopped")
 
 
 async def spared(world: World, rng: Random) -> None:
@@ -220,7 +251,8 @@ async def blocked(world: World, rng: Random) -> None:
 
 
 ENDS = (
-    Act("workshop, early end", 3, at_work(early_end)),
+    Act("workshop, early end", 2, at_work(early_end)),
+    Act("workshop, early end of a controller", 1, at_work(controller)),
     Act("workshop, spared", 1, at_work(spared)),
     Act("workshop, stop of a watcher", 1, at_work(watched)),
     Act("workshop, failing motion", 2, at_work(failing)),
