@@ -44,8 +44,8 @@ def _automation(shop: Workshop) -> Callable[[list[str]], Any]:
 
 
 AGAIN = "stop sent again"
-ENDINGS = (CANCEL, CANCEL, INTERRUPT, "@a VM=-1", "@c VM=-1", "/assert 1 == 2", '/wait "nothing" 0.5')
-"""What ends automation early."""
+ENDINGS = (INTERRUPT, "@a VM=-1", "@c VM=-1", "/assert 1 == 2", '/wait "nothing" 0.5')
+"""What ends automation early, besides the end of its task."""
 
 
 async def early_end(world: World, rng: Random) -> None:
@@ -53,7 +53,7 @@ async def early_end(world: World, rng: Random) -> None:
     async with workshop(world, rng, "mcode", PARTY, more={"a": _with_program(rng, world)}) as shop:
         if beside := rng.random() < 0.7:
             await shop.type(f"@b {BY_HAND}")
-        for ending in rng.sample(ENDINGS, 3):
+        for ending in (*rng.sample(ENDINGS, 2), CANCEL):
             start = rng.choice(STARTS)
             lines = [f"@a {start}", f"/sleep {rng.random() * 2:.2f}", ending if ending[0] in "@/" else "/sleep 30"]
             work = shop.start(_automation(shop)(lines))
@@ -87,8 +87,8 @@ async def controller(world: World, rng: Random) -> None:
             return str(shop.witnesses["01"].unwatched(f"SASTAT{number}", shop.floor.now())) != "0"
 
         await shop.type("@02 JX+")
-        for ending in rng.sample(("@01 JOYENA=1", "@02 JOYENA=1", "/assert 1 == 2", CANCEL), 2):
-            start = rng.choice(("SR0=1", "SR1=1", "JX+"))
+        for ending in rng.sample(("@01 JOYENA=1", "@02 JOYENA=1", "/assert 1 == 2", CANCEL), 4):
+            start = rng.choice(("SR0=1", "SR1=1", "SR1=1", "JX+"))
             lines = [f"@01 {start}", f"/sleep {rng.random():.2f}", ending if ending[0] in "@/" else "/sleep 30"]
             work = shop.start(_automation(shop)(lines))
             if ending == CANCEL:
