@@ -269,6 +269,7 @@ def at_work(job: Job) -> Callable[[World, Random], float]:
     """The act of a job, which the story does not wait for longer than it takes."""
 
     def act(world: World, rng: Random) -> float:
+        world.loop.late = 0.0  # nothing but the jobs is left of the story
         context = copy_context()
         context.run(WHO.set, "far")
         world.visits.append(context.run(lambda: world.loop.create_task(job(world, rng))))
