@@ -25,9 +25,13 @@ class Activity(NamedTuple):
         """Whether it neither moves nor runs a program, or nothing is known."""
         return not self.speed and not self.runs
 
-    def lessens(self, before: Activity | None) -> bool:
-        """Whether it slows down, as far as two readings show, and no program runs that can move it again."""
-        return not self.runs and (before is None or self.speed < before.speed)
+    def lessens(self, before: Activity | None, ends_after_motion: bool = False) -> bool:
+        """Whether it slows down, as far as two readings show, and no program runs that can move it again.
+
+        `ends_after_motion`: the stop ends a program only once its motion is over, so one may run until then.
+        """
+        goes_on = self.runs and not (ends_after_motion and self.speed)
+        return not goes_on and (before is None or self.speed < before.speed)
 
 
 NOTHING = Activity()

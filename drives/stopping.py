@@ -294,7 +294,7 @@ class Stopping:
                 if each.places and each.none and halt.fate(drive) is Fate.STANDING:
                     link.notify(f"{drive.shown}: stopped, velocity 0 at {each.places}")
             active = {drive: each for drive, each in found.items() if not each.none and not halt.started_since(drive)}
-            slow_down = all(each.lessens(before.get(drive)) for drive, each in active.items())
+            slow_down = all(each.lessens(before.get(drive), halt.single) for drive, each in active.items())
             before = found
             if halt.single and any(drive in halt.doubts for drive in found) and not link.lost:
                 self._repeat(halt)  # as the usual stop

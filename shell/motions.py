@@ -26,6 +26,8 @@ from multidrop.shell.workspace import Workspace
 T = TypeVar("T")
 OUTCOME: ContextVar[list[str] | None] = ContextVar("outcome", default=None)
 """Takes the word of a `/wait ended`, for the script whose line it is."""
+MISSES = 3
+"""Readings in a row without a reply after which nobody knows how a motion ended."""
 WORST = (
     Outcome.UNKNOWN,
     Outcome.POWER,
@@ -236,6 +238,8 @@ class Watch:
         self._errors: dict[Drive, int] = {}
         self._restarts = {each: each.motions.restarts for each in drives}
         self._silent: set[Drive] = set()
+        self._missed: dict[Drive, int] = {}
+        """How many readings in a row got no reply."""
         self.endings: dict[Drive, list[Ending]] = {}
         """How the motions of each drive ended that was judged."""
 
@@ -304,10 +308,20 @@ class Watch:
         """The drives that can still be asked."""
         return [each for each in self.drives if each not in self._silent]
 
+    def heard(self, drive: Drive) -> None:
+        """Take a reply of a drive."""
+        self._missed.pop(drive, None)
+
     def silent(self, drive: Drive, error: NoAnswer) -> None:
-        """Take it that the end of what moves a drive cannot be read. Raises the error, unless any ending will do."""
+        """Take a reading without a reply. Raises the error, unless any ending will do.
+
+        One lost reply is no ending, as the drive may move on. After `MISSES` in a row the ending is not known.
+        """
         if not self._accepts:
             raise error
+        self._missed[drive] = self._missed.get(drive, 0) + 1
+        if self._missed[drive] < MISSES:
+            return
         self._silent.add(drive)
         for course in self.own(drive):
             _judged(drive, course, Ending(Outcome.UNKNOWN, course.move.axis, reason=str(error)))

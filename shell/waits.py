@@ -148,7 +148,9 @@ async def _moving(workspace: Workspace, watch: Watch, idle: bool) -> Drive | Non
             except NoAnswer as error:
                 watch.silent(drive, error)
                 rests = False
+                moving = moving or (drive if drive in watch.left else None)
             else:
+                watch.heard(drive)
                 moving = moving if rests else moving or drive
             if not rests:
                 before.pop(drive, None)

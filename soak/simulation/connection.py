@@ -33,6 +33,8 @@ class Host:
     name: str
     refuses: float = 0.0
     dark: float = 0.0
+    spared: bool = False
+    """No fault of the climate meets it."""
 
 
 class End:
@@ -106,7 +108,7 @@ class End:
 
     def _pass(self, arrive: Callable[[], None], size: int) -> None:
         self._way.append((arrive, size))
-        self._arrives = max(self._arrives + 1e-7, self.network.loop.now + self.network.delay())
+        self._arrives = max(self._arrives + 1e-7, self.network.loop.now + self.network.delay(spared=self.host.spared))
         self.network.loop.call_at(self._arrives, self._deliver)
 
     def _deliver(self) -> None:

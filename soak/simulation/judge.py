@@ -221,7 +221,8 @@ def judged(world: World) -> Judgement:
     """Judge a history by every rule."""
     judgement = Judgement()
     for rule in RULES:
-        for found in rule.check(world):
+        wrong = (each.words for each in world.history.told.facts if each.rule == rule.name and not each.holds)
+        for found in (*wrong, *rule.check(world)):
             if isinstance(found, str):
                 judgement.breaches.append((rule, found))
             else:

@@ -60,9 +60,10 @@ class Network:
         """Whether a fault of this kind happens now."""
         return self.climate[kind] > 0 and self.climate.happens(kind, self.rng)
 
-    def delay(self, kind: str = "net late") -> float:
-        """The time that bytes are on their way, s."""
-        return 0.0002 + 0.0003 * self.rng.random() + (self.rng.random() ** 2 * LATER if self.drawn(kind) else 0.0)
+    def delay(self, kind: str = "net late", spared: bool = False) -> float:
+        """The time that bytes are on their way, s; to and from a host that is `spared` they are never late."""
+        prompt = 0.0002 + 0.0003 * self.rng.random()
+        return prompt + (self.rng.random() ** 2 * LATER if not spared and self.drawn(kind) else 0.0)
 
     # What happens to a host
 
@@ -99,11 +100,13 @@ class Network:
         if made.type == socket.SOCK_DGRAM:
             made.address, made.peer = ("10.0.0.9", self.number()), address
             return made.at(host)
-        await asyncio.sleep(self.delay() + (self.rng.random() * 3 if self.drawn("slow connect") else 0.0))
+        delay = self.delay(spared=host.spared)
+        await asyncio.sleep(delay + (self.rng.random() * 3 if not host.spared and self.drawn("slow connect") else 0.0))
         while host.dark > self.loop.now:
             await asyncio.sleep(host.dark - self.loop.now)
         listens = self._listening.get(address)
-        if listens is None or host.refuses > self.loop.now or self.drawn("refused"):
+        refused = not host.spared and self.drawn("refused")
+        if listens is None or host.refuses > self.loop.now or refused:
             raise error(errno.ECONNREFUSED)
         near, far = self._connection(host)
         made.connected(near, host)

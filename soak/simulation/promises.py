@@ -10,13 +10,18 @@ from math import inf
 from soak.simulation.history import Executed
 from soak.simulation.outcomes import ASTRAY, BARE_COMMAND, astray, became
 from soak.simulation.rule import Granted, Rule
-from soak.simulation.told import Guarded, Put, Run
+from soak.simulation.told import NEAR, SHORT, Guarded, Put, Run
 from soak.simulation.world import NUMBER, World
 
 PLACE = re.compile(r"(?:backup: |before is in )(\S+)")
 """What names a backup."""
 CLEARS = "CP"
 """What clears the programs of an MCode drive."""
+
+
+def _workshop(world: World) -> Iterator[str]:
+    """Only jobs of a workshop look for this: see `judge.judged`."""
+    return iter(())
 
 
 def _automation(world: World) -> Iterator[str]:
@@ -44,11 +49,6 @@ def _stranger(world: World) -> Iterator[str]:
             left[message] -= 1
             if left[message] < 0:
                 yield f"{message!r} at {at:.3f}, typed {strange.typed.count(message)} times"
-
-
-NEAR = 2
-"""How far from its target a drive may rest, in its own units."""
-SHORT = re.compile(r"stopped at -?\d+ of \d+")
 
 
 def _outcome(world: World) -> Iterator[str | Granted]:
@@ -181,6 +181,8 @@ PROMISES = (
         _outcome,
         (BARE_COMMAND,),
     ),
+    Rule("units", "Nothing is shown in units while the scale does not hold.", "0120", _workshop),
+    Rule("saved", "A restore saves only what it has read back.", "What a report means", _workshop),
     Rule(
         "automation",
         "Drives that automation moved are stopped at its early end, and no others.",

@@ -24,6 +24,8 @@ from soak.simulation.acts.meetings import HELD_UP, MEETINGS
 from soak.simulation.acts.operators import OPERATORS
 from soak.simulation.acts.quitting import QUITTING
 from soak.simulation.acts.strangers import STRANGER
+from soak.simulation.acts.workshop_desk import DESK
+from soak.simulation.acts.workshop_ends import ENDS, PORT
 from soak.simulation.acts_kill import files, kill, power_cut
 from soak.simulation.bounds import sample
 from soak.simulation.cut_ins import drawn_aim
@@ -166,16 +168,27 @@ AFTER = CREW + LAST
 """The number of the first step of the acts that end it."""
 AT_LAST = (*AFTER_CREWS, *QUITTING, STRANGER)
 """Those acts, each once."""
+WORKSHOP = (*DESK, PORT, *ENDS)
+FIRST_JOB, JOBS = 300, 2
+"""The number of the first step with a job of a workshop, and how many there are: each story ends with them."""
 
 
 def whole(seed: int, steps: int) -> tuple[int, ...]:
-    """The steps of a whole story: so many, and those of the crews, if it ends with them."""
+    """The steps of a whole story: so many, those of the crews in some seeds, and those of a workshop."""
     crews = range(CREW, AFTER + len(AT_LAST)) if Random(f"{seed} crews").random() < AT_ONCE else ()
-    return (*range(steps), *crews)
+    return (*range(steps), *crews, *range(FIRST_JOB, FIRST_JOB + JOBS))
+
+
+def _job(seed: int, step: int) -> Act:
+    """The job of a step: twenty seeds have each as often as it weighs, twice."""
+    jobs = [each for each in WORKSHOP for _ in range(int(each.weight))]
+    return jobs[(seed * JOBS + step - FIRST_JOB) % len(jobs)]
 
 
 def _drawn(world: World, step: int, rng: Random) -> Act:
     """Draw the act of a step."""
+    if step >= FIRST_JOB:
+        return _job(world.seed, step)
     if step >= AFTER:
         return AT_LAST[step - AFTER]
     if step >= CREW:

@@ -6,6 +6,7 @@ of a macro that plays several times, which `Told.repeated` has with the number o
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass, field
 from math import inf
 from typing import TYPE_CHECKING
@@ -13,6 +14,10 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from soak.simulation.history import Command
 
+NEAR = 2
+"""How far from its target a drive may rest, in its own units."""
+SHORT = re.compile(r"stopped at -?\d+ of \d+")
+"""The words for a motion that ended short of its target."""
 Line = tuple[str, str, str]
 """A line of drives, a drive on it, and a text."""
 
@@ -110,6 +115,15 @@ class Strange:
     """When the stop key was pressed."""
 
 
+@dataclass(frozen=True)
+class Fact:
+    """What a session promised of its drives, compared with what they did. `rule`: the rule of the judge for it."""
+
+    rule: str
+    words: str
+    holds: bool
+
+
 @dataclass
 class Told:
     """All of it, in its order."""
@@ -152,3 +166,5 @@ class Told:
     """Drives that the early end of what had started nothing has stopped."""
     stopped_too: list[str] = field(default_factory=list)
     """Drives that an early end stopped, although it had not moved them."""
+    facts: list[Fact] = field(default_factory=list)
+    """The comparisons of the workshops."""

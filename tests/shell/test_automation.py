@@ -141,6 +141,20 @@ async def test_a_program_counts_when_it_is_executed_and_not_when_it_is_stored(tm
         assert shop.warned()[-2].startswith("stopped press:a: ") and shop.warned()[-1] == "program ended: press:a"
 
 
+async def test_a_program_that_ends_only_after_its_motion_stops_no_other_drive(tmp_path, shop):
+    """A typed E waits for the motion of the program (5.1.35), so the drive reads BY=1 while it slows down."""
+    await shop.session.run(GO["press:b"])
+    (tmp_path / "p.mxt").write_text("PG 1\nLB G1\nMR 900000\nH\nBR G1\nE\nPG\n")
+    with pytest.raises(Refused):
+        await script(
+            shop.session,
+            f"/download {tmp_path / 'p.mxt'} press:a",
+            *("@press:a VM=300000", "@press:a D=300000", "@press:a EX G1", "/sleep 1.5", "@press:a PR XX"),
+        )
+    assert shop.moving() == {"press:b"} and not any("stop sent again" in text for text in shop.told())
+    assert shop.warned()[-2].startswith("stopped press:a: ") and shop.warned()[-1] == "program ended: press:a"
+
+
 async def test_what_could_not_be_reached_is_named(shop):
     with pytest.raises(TransportLost):
         async with shop.session.automations.run():

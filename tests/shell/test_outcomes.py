@@ -19,7 +19,9 @@ from multidrop.shell.events import Failed, Notified, Output
 from multidrop.shell.scripts.executor import run_script
 from multidrop.shell.scripts.reading import WrongScript, read_script
 from multidrop.shell.session import Session
+from multidrop.simulator.cell.spec import Faults
 from tests.support.cell_session import bus, party, session_on
+from tests.support.faults import disturb
 from tests.support.outcomes import failed, sent
 
 pytestmark = pytest.mark.virtual
@@ -283,6 +285,16 @@ async def test_a_lost_supply_is_an_outcome(tmp_path: Path) -> None:
     async with on(tmp_path) as session:
         lines = ("MA 9000000", "/sleep 0.3", "/sim power a off", *ENDED)
         assert await ran(session, tmp_path, *lines) == ["unknown"]
+
+
+async def test_a_reading_without_a_reply_is_no_ending(tmp_path: Path) -> None:
+    async with on(tmp_path, VM=20000) as session:
+        wire = next(iter(session.cells.values())).floor.wires["press"]
+        loop = asyncio.get_running_loop()
+        loop.call_later(1.0, disturb, wire, Faults(delay=(1.5, 1.5)))
+        loop.call_later(1.2, disturb, wire)
+        assert await ran(session, tmp_path, "MA 90000", *ENDED) == ["reached"]
+        assert await value(session, "P") == 90000
 
 
 @pytest.mark.parametrize("loop", ["/until P>=90000", "/while P<90000"])

@@ -14,8 +14,9 @@ from typing import Any
 import pytest
 
 from soak.languages import LANGUAGES
-from soak.simulation import living, shrinking, world
+from soak.simulation import living, shrinking, story, world
 from soak.simulation.__main__ import main
+from soak.simulation.act import Act
 from soak.simulation.climate import FAULTS
 from soak.simulation.history import Command, Damage, Executed, Held, History, Outcome, Shown
 from soak.simulation.judge import RULES, Judgement, broken
@@ -27,7 +28,8 @@ from soak.simulation.rule import Granted, Rule
 from soak.simulation.runs import STEPS, derived, lives, result, run
 from soak.simulation.seeds import DERIVED, FIXED
 from soak.simulation.shrinking import Life, shrunk
-from soak.simulation.story import AFTER, CREW, whole
+from soak.simulation.story import AFTER, CREW, FIRST_JOB, WORKSHOP, whole
+from soak.simulation.told import Fact
 from soak.simulation.trace import readable
 from tests.support.paths import ROOT
 from tests.support.until import PATIENCE
@@ -45,12 +47,39 @@ def test_the_rules_hold(seed: int) -> None:
 
 
 def test_the_acts_of_several_callers_follow_a_story_that_is_the_same_without_them() -> None:
-    seed = next(seed for seed in range(100) if len(whole(seed, 4)) > 4)
+    seed = next(seed for seed in range(100) if CREW in whole(seed, 4))
     histories = [lived(seed, steps, keep=True).history for steps in (whole(seed, 4), range(4))]
     with_crews, without = ([(*row, text.replace(each.folder, "~")) for *row, text in each.lines] for each in histories)
     first = next(at for at, (_, kind, text) in enumerate(with_crews) if kind == "step" and text.startswith(f"{CREW}: "))
     assert first > 20
     assert with_crews[:first] == without[:first]
+
+
+def test_the_jobs_of_a_workshop_follow_a_story_that_is_the_same_without_them() -> None:
+    seed = next(seed for seed in range(100) if FIRST_JOB in whole(seed, 4) and CREW not in whole(seed, 4))
+    told = [lived(seed, steps, keep=True).history.lines for steps in (whole(seed, 4), range(4))]
+    first = next(at for at, (_, _, text) in enumerate(told[0]) if text.startswith(f"{FIRST_JOB}: workshop, "))
+    rows = [[(kind, re.sub(r"simulate-\w+", "", text)) for _, kind, text in lines[:first]] for lines in told]
+    assert first > 20
+    assert rows[0] == rows[1]
+
+
+@pytest.mark.parametrize("job", WORKSHOP, ids=lambda job: job.name)
+def test_each_job_of_a_workshop_compares_and_what_a_session_promises_holds(
+    job: Act, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(story, "WORKSHOP", (job,))
+    world = lived(5, (FIRST_JOB,))
+    assert world.history.told.facts
+    assert broken(world) == []
+
+
+def test_what_a_job_found_breaks_its_rule() -> None:
+    world = lived(1, ())
+    assert not broken(world)
+    world.history.told.facts += [Fact("units", "shown in mm", False), Fact("asked", "asked once", True)]
+    [[rule, words]] = broken(world)
+    assert (rule.name, words) == ("units", "shown in mm")
 
 
 @pytest.mark.parametrize(

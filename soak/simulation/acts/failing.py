@@ -53,7 +53,7 @@ def failing(world: World, rng: Random) -> float:
         if kind == "limit":
             world.floor.command(f"/sim input {place.name}:{drive} 1 0")
         elif kind == "stall":
-            device.world.hold(True)
+            world.floor.command(f"/sim lock {place.name}:{drive} on")
 
     async def work() -> None:
         session = world.session
