@@ -173,7 +173,7 @@ def called(text: str, names: dict[str, Any], replies: Replies) -> Iterator[str]:
     except (DriveError, Diagnostic, *names.get("ERRORS", ())) as error:
         code = getattr(error, "code", None)
         sure = "" if getattr(error, "certain", True) else " uncertain"
-        yield f"! {type(error).__name__}{f' {code}' if code is not None else ''}{sure}: {error}"
+        yield f"! {type(error).__name__}{f' {code}' if code is not None else ''}{sure}: {str(error).translate({10: '|'})}"
     after = states(names)
     for name, now in after.items():
         if name in before and before[name] != now:
