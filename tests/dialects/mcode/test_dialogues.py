@@ -38,6 +38,7 @@ from multidrop.dialects.mcode.host.motions import MOTIONS
 from multidrop.dialects.mcode.host.state import MCodeState, Place, Unconfirmed
 from multidrop.dialects.mcode.host.units import UNITS
 from multidrop.dialects.mcode.host.values import PARAMETERS, VALUES
+from multidrop.dialects.mcode.manual import program_file
 from multidrop.dialects.motions import Ending, Evidence, Move, MoveKind, Outcome
 from multidrop.dialects.program_files import Held, Stored
 from multidrop.dialects.scanning import Reach
@@ -87,6 +88,42 @@ def decoded(request, heard):
     found += [("whole", whole)] if whole != first else []
     found += [("quiet", own.quiet_time(request, heard), quiet)] if whole is None else []
     return [*found, ("timeout", late)] if whole is None and quiet is None else found
+
+
+def source(text):
+    """The lines of a program file."""
+    return program_file.read(text, "a.mxt")
+
+
+def progress(shown):
+    """A progress that is kept."""
+    return lambda done, total: shown.append((done, total))
+
+
+def sent(state, text, held=None, shown=None):
+    """A download; the lines that were sent, each with its number."""
+    lines = yield from programs.PROGRAMS.download(state, source(text), held, progress([] if shown is None else shown))
+    return [(line.number, line.text) for line in lines]
+
+
+def held(*lines, names=(), locked=False):
+    """What a drive holds: `1  LB G1`, and what it prints for UV."""
+    return Held(program_readout.stored(lines), tuple(names), locked)
+
+
+def searched(found, **reach):
+    """A search whose finds are kept; what it shows, and the number of its steps."""
+    steps = list[None]()
+    outcome = yield from scan.search(Reach(**reach), found.append, lambda: steps.append(None))
+    return outcome, len(steps)
+
+
+def expected(place, last=None, stated=False, product="", **known):
+    """A drive that is only expected at a place, by the user's word or from last time."""
+    codec = MCode(party=place.party) if last is None else MCode(last.em, place.party, last.checksum)
+    state = MCodeState(codec, place.address, place.address, product, **known)
+    state.expected(Unconfirmed(place, last, stated))
+    return state
 
 
 @pytest.mark.parametrize("title", BLOCKS)

@@ -67,8 +67,10 @@ def download(state, text, shown=None, held=None):
 
 
 def searched(found, **reach):
-    """A search whose finds are kept."""
-    return operations.search(Reach(**reach), found.append, lambda: None)
+    """A search whose finds are kept; what it shows, and the number of its steps."""
+    steps = list[None]()
+    outcome = yield from operations.search(Reach(**reach), found.append, lambda: steps.append(None))
+    return outcome, len(steps)
 
 
 @pytest.mark.parametrize("title", BLOCKS)
