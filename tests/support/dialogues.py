@@ -22,6 +22,7 @@ import importlib
 import sys
 from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
 from dataclasses import fields, is_dataclass
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -33,7 +34,7 @@ from tests.support.procedure import ProcedureRunner
 
 WIDTH = 110
 """A value whose text is longer has a line for each item."""
-NOTHING = "nothing"
+NOTHING, DOUBTFUL = "nothing", " doubtful"
 Replies = Callable[[Request, bytes], str]
 """Returns what stands behind `< ` or, with its `! `, in place of it."""
 
@@ -108,12 +109,10 @@ def request_line(request: Request) -> str:
 
 def reply_of(request: Request, line: str) -> tuple[Reply, str]:
     """Return the reply that a line of a file gives, and the line that shows how the codec reads it."""
-    word, _, marks = line.partition(" doubtful")
-    if word == NOTHING:
-        data = b""
-    else:
-        data = bytes.fromhex(word) if request.codec.framed else ast.literal_eval(word)
-    codec = request.codec
+    codec, word = request.codec, line.removesuffix(DOUBTFUL)
+    data = bytes.fromhex(word) if codec.framed and word != NOTHING else b""
+    if not codec.framed and word != NOTHING:
+        data = ast.literal_eval(word)
     found = codec.decode(request, data) or codec.on_quiet(request, data) or codec.on_timeout(request, data)
     reply = found.reply
     read = [reply.end.name]
@@ -125,7 +124,7 @@ def reply_of(request: Request, line: str) -> tuple[Reply, str]:
     read += [f"used={found.used}"] if found.used != len(data) else []
     read += [f"strays={found.strays}"] if found.strays else []
     text = "" if read == [End.DONE.name] else "  " + " ".join(read)
-    return copy_with(reply, raw=data, doubtful=line.endswith(" doubtful") or bool(marks)), text
+    return copy_with(reply, raw=data, doubtful=word != line), text
 
 
 def conversation(procedure: Generator[Request, Reply, Any], replies: Replies) -> Iterator[str]:
@@ -172,8 +171,9 @@ def called(text: str, names: dict[str, Any], replies: Replies) -> Iterator[str]:
             yield from value_lines(value)
     except (DriveError, Diagnostic, *names.get("ERRORS", ())) as error:
         code = getattr(error, "code", None)
+        number = "" if code is None else f" {code}"
         sure = "" if getattr(error, "certain", True) else " uncertain"
-        yield f"! {type(error).__name__}{f' {code}' if code is not None else ''}{sure}: {str(error).translate({10: '|'})}"
+        yield f"! {type(error).__name__}{number}{sure}: {'|'.join(str(error).splitlines())}"
     after = states(names)
     for name, now in after.items():
         if name in before and before[name] != now:
@@ -194,20 +194,24 @@ def blocks(text: str) -> dict[str, list[str]]:
 
 def played(block: Sequence[str], names: Mapping[str, Any]) -> list[str]:
     """Play the calls of a block with its replies; return the lines that it must have."""
-    scope, lines, at = dict(names), list[str](), 0
-    while at < len(block):
-        assert block[at].startswith("$ "), block[at]
+    scope, lines = dict(names), list[str]()
+    for at, text in enumerate(block):
+        if not text.startswith("$ "):
+            continue
         end = next((n for n in range(at + 1, len(block)) if block[n].startswith("$ ")), len(block))
-        asked = [n for n in range(at, end) if block[n].startswith("> ")]
-        given = iter([block[n + 1].removeprefix("< ") for n in asked])
         try:
-            for line in called(block[at].removeprefix("$ "), scope, lambda request, sent: next(given, NOTHING)):  # noqa: B023
+            for line in called(text.removeprefix("$ "), scope, _given(block[at:end])):
                 lines.append(line)
         except BaseException as error:
-            error.add_note("\n".join([*lines, *block[at:end]]))
+            error.add_note("\n".join([*lines, "written:", *block[at:end]]))
             raise
-        at = end
     return lines
+
+
+def _given(block: Sequence[str]) -> Replies:
+    """Return the replies to the requests of a call, one after the other; behind the last one nothing."""
+    given = iter([reply.removeprefix("< ") for asked, reply in pairwise(block) if asked.startswith("> ")])
+    return lambda request, sent: next(given, NOTHING)
 
 
 def written(found: Mapping[str, Sequence[str]]) -> str:

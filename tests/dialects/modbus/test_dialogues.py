@@ -26,7 +26,7 @@ BLOCKS = {title: lines for file in FILES for title, lines in blocks(file.read_te
 USED = (
     replace, Hints, Kind, Priority, mcode_units, family, MODBUS, codec, framing, limits, mapping, motions, operations,
     pdu, values, MOTIONS, PARAMETERS, UNITS, VALUES, REGISTERS, Evidence, Move, MoveKind, ORDINARY, Change,
-    Permission, Readings,
+    Permission, Readings, pdu_codec,
 )  # fmt: skip
 """The names that calls in the files use."""
 ERRORS = (framing.NotModbus,)
