@@ -212,7 +212,8 @@ def step(state: MCodeState, program: Sequence[Stored]) -> Procedure[Stepped]:
     row = traced(reply.text) if reply.end is End.DONE and not reply.doubtful else None
     if row is None or (program and row not in program):
         state.reply_lost()
-        came = f"'{reply.text}' came, which is not a line of its program" if reply.text else "no line came"
+        why = "may be a late reply" if reply.doubtful else "is not a line of its program"
+        came = f"'{reply.text}' came, which {why}" if reply.text else "no line came"
         raise NoAnswer(f"{who(state)}: {came}: it is not known whether it stepped; the key was sent once")
     state.steps()
     return Stepped(row, (yield from _hold(state, row.text)))

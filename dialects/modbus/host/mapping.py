@@ -156,11 +156,10 @@ def reading(word: str) -> Reading:
         thing = IDENTITY[word]
         asked = pdu_codec().identify(ONE_OBJECT, thing)
         return Reading(asked, lambda answer: pdu_codec().objects(answer)[0].get(thing, ""))
-    row = lookup(word)
     register = REGISTERS.get(word)
     if register is None and word != "E" and word not in CONTROLS:
         raise unavailable(word)
-    if register is None or not register.readable or (row is not None and row.access == "-"):
+    if register is None or not register.readable:
         outputs = OUTPUTS if word == "OT" else [word] if word in OUTPUTS else []
         coils = " and ".join(f"/coil {OUTPUTS[each] + 1}" for each in outputs)
         reads = f"; {coils} {'reads' if len(outputs) == 1 else 'read'} it" if coils else ""

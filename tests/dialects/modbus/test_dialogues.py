@@ -1,0 +1,78 @@
+"""Dialogues with an Ethernet drive: each call of the family with its requests, byte for byte, and what comes of it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from multidrop.dialects import Hints, Kind, Priority, Request
+from multidrop.dialects.mcode.host import units as mcode_units
+from multidrop.dialects.mcode.manual.grammar import parse
+from multidrop.dialects.modbus import family
+from multidrop.dialects.modbus.family import MODBUS
+from multidrop.dialects.modbus.host import codec, framing, limits, mapping, motions, operations, pdu, values
+from multidrop.dialects.modbus.host.codec import Modbus, ModbusState, pdu_codec
+from multidrop.dialects.modbus.host.motions import MOTIONS
+from multidrop.dialects.modbus.host.values import PARAMETERS, UNITS, VALUES
+from multidrop.dialects.modbus.manual.registers import REGISTERS
+from multidrop.dialects.motions import Evidence, Move, MoveKind
+from multidrop.dialects.values import ORDINARY, Change, Permission, Readings
+from tests.support.dialogues import blocks, played
+
+FILES = sorted(Path(__file__).parent.glob("*.dialogues"))
+BLOCKS = {title: lines for file in FILES for title, lines in blocks(file.read_text(encoding="utf-8")).items()}
+USED = (
+    replace, Hints, Kind, Priority, mcode_units, family, MODBUS, codec, framing, limits, mapping, motions, operations,
+    pdu, values, MOTIONS, PARAMETERS, UNITS, VALUES, REGISTERS, Evidence, Move, MoveKind, ORDINARY, Change,
+    Permission, Readings, pdu_codec,
+)  # fmt: skip
+"""The names that calls in the files use."""
+ERRORS = (framing.NotModbus,)
+
+
+def drive(product="LMDCE", stranger="", unit=1, **known):
+    return ModbusState(Modbus(unit), product=product, stranger=stranger, **known)
+
+
+def unread():
+    """A device whose identification was not read."""
+    return ModbusState(Modbus())
+
+
+def type_(state, text):
+    return MODBUS.perform(state, text)
+
+
+def asked(pdu, tag=0):
+    return Request("", "a line", Kind.PRINT, Modbus(), tag=tag, body=bytes.fromhex(pdu))
+
+
+def decoded(pdu, heard, tag=0x1234):
+    """How a reply is read, then what silence makes of the same bytes."""
+    request, data = asked(pdu, tag), bytes.fromhex(heard)
+    return Modbus().decode(request, data), Modbus().on_timeout(request, data)
+
+
+def command(text):
+    """The request of a typed line."""
+    return mapping.command(parse(text, codec.USER)).hex()
+
+
+def progress(shown):
+    """A progress that is kept."""
+    return lambda done, total: shown.append((done, total))
+
+
+def parts_read(state, facts):
+    """Read every part of the conditions, one after the other."""
+    for part in VALUES.parts(state, facts):
+        found = yield from part.read(state)
+        facts = {**facts, **found}
+    return facts
+
+
+@pytest.mark.parametrize("title", BLOCKS)
+def test_a_dialogue_goes_as_it_is_written(title):
+    assert played(BLOCKS[title], globals()) == BLOCKS[title]
