@@ -72,7 +72,11 @@ def test_the_fate_of_a_drive_follows_from_what_was_read_and_sent_after_the_stop(
 @pytest.mark.parametrize("known", [{}, {"seen": MOVES, "running": RUNS}])
 @pytest.mark.parametrize(
     ("more", "fate"),
-    [({"data": b""}, Fate.NOT_REACHED), ({"lost": UNDELIVERED}, Fate.NOT_REACHED), ({"missed": True}, Fate.NOT_REACHED)],
+    [
+        ({"data": b""}, Fate.NOT_REACHED),
+        ({"lost": UNDELIVERED}, Fate.NOT_REACHED),
+        ({"missed": True}, Fate.NOT_REACHED),
+    ],
 )
 def test_a_stop_that_was_not_sent_has_not_reached_a_drive_whatever_was_read(known, more, fate):
     each = drive(**known)
