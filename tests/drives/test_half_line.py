@@ -1,4 +1,4 @@
-"""What the drives hold of a line that was begun: by the bytes written, the ends of lines they know, and their replies."""
+"""What the drives hold of a begun line: by the bytes written, the ends of lines they know, and their replies."""
 
 import pytest
 
