@@ -1,4 +1,4 @@
-"""What a reply and an unsolicited line must not be taken for: doubt, the debris of a stop, leftovers, and the buffer."""
+"""What a reply or an unsolicited line is not taken for: doubt, the debris of a stop, leftovers, and the buffer."""
 
 import re
 from dataclasses import dataclass, replace
