@@ -107,6 +107,7 @@ def transaction(end: End, at: float = 5.0) -> Transaction:
 
 async def test_a_thing_is_read_at_once_and_then_every_period():
     poller = Reads("a")
+    assert poller.periods == {}
     poller.subscribe(["a"], 0.5)
     assert await poller.for_(1.2) == [(0.0, "a"), (0.5, "a"), (1.0, "a")]
     assert [(thing, read) for thing, _, read in poller.read] == [("a", "a!")] * 3
@@ -186,7 +187,7 @@ async def test_naks_in_a_row_are_counted_until_a_reading():
     await poller.for_(0.13)
     assert [count for _, count, _ in poller.refused] == [1, 2, 3]
     poller.last, poller.fails = transaction(End.DONE), {}
-    await asyncio.sleep(0.01)
+    await asyncio.sleep(0.1)
     assert poller._due["a"].refusals == 0
     poller.fails["a"] = Refused("other")
     await asyncio.sleep(12)
