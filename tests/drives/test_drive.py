@@ -1,6 +1,7 @@
 """One drive: what a line to it notes, what is counted, what is refused before it is sent, and its readings."""
 
 import asyncio
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -8,6 +9,7 @@ import pytest
 
 from multidrop.dialects import DriveError, Inexpressible, Motion, NoAnswer, Refused, Stopped
 from multidrop.dialects.errors import Unreferenced
+from multidrop.dialects.family import Referencing
 from multidrop.drives.drive import Drive, confirmed_motion, still
 from multidrop.drives.events import Changed
 from multidrop.drives.readings import REST, Running, Seen
@@ -387,3 +389,162 @@ async def test_a_language_without_a_command_to_all_gets_each_line_by_itself_and_
     with pytest.raises(Stopped):
         await to("1", first, Stopped("stopped"), "4")
     assert len(sent) == 3
+
+
+class Other:
+    """A family that does some things otherwise."""
+
+    def __init__(self, family: Any, **changes: Any) -> None:
+        self._family = family
+        self.__dict__.update(changes)
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._family, name)
+
+
+def otherwise(drive: Drive, **changes: Any) -> None:
+    family: Any = Other(drive.family, **changes)
+    drive.family = family
+
+
+def spoken(drive: Drive, outcome: Any = ("done",), **changes: Any) -> None:
+    """Have lines end so, and places of the axis `x` disturbed by each."""
+
+    def perform(state: Any, text: str) -> Any:
+        if isinstance(outcome, Exception):
+            raise outcome
+        return outcome
+        yield
+
+    units = replace(drive.family.units, disturbs=lambda state, text: frozenset("x"))
+    given = {"perform": perform, "units": units, "referencing": lambda state, text: None, **changes}
+    otherwise(drive, **given)
+
+
+@pytest.mark.parametrize(
+    ("outcome", "disturbed"),
+    [
+        (("done",), True),
+        (NoAnswer("a: no reply"), True),
+        (Refused("a: error 21"), False),
+        (Inexpressible("a: too long"), False),
+    ],
+)
+async def test_a_line_that_may_have_been_executed_disturbs_the_places_of_its_axes(outcome, disturbed):
+    shop, drive = await drive_a()
+    spoken(drive, outcome)
+    drive.anchored = frozenset(["x", "y"])
+    if isinstance(outcome, DriveError):
+        with pytest.raises(type(outcome)) as failure:
+            await drive.send("VM 1")
+        assert str(failure.value) == str(outcome)
+    else:
+        assert await drive.send("VM 1") == outcome
+    assert drive.state.unreferenced == (frozenset("x") if disturbed else frozenset())
+
+
+async def test_a_line_that_is_stored_disturbs_nothing_and_references_nothing():
+    shop, drive = await drive_a()
+    drive.anchored = frozenset("x")
+    drive.state.reference_lost("z")
+    drive.state.found_storing()
+    spoken(drive, referencing=lambda state, text: Referencing("z", homing=False))
+    assert await drive.send("MR 1") == ("done",)
+    assert drive.state.unreferenced == {"z"}
+
+
+async def test_a_line_to_all_disturbs_the_places_of_every_drive():
+    shop, drive = await drive_a()
+    drive.anchored = frozenset("x")
+    spoken(drive)
+    await shop.bus.at("*").send("VM 100000")
+    assert drive.state.unreferenced == {"x"} and shop.bus.drives["b"].state.unreferenced == frozenset()
+
+
+async def homing(drive: Drive, axis: str, text: str = "HM 1") -> list[str]:
+    """Send a homing; return the axes that are watched since."""
+    watched: list[str] = []
+    drive._neighbours = SimpleNamespace(  # type: ignore[assignment]
+        all_drives=[drive],
+        homes=lambda drive, axis: watched.append(axis),
+        conversation_begins=lambda drive: False,
+        conversation_ended=lambda *given: None,
+    )
+    spoken(drive, referencing=lambda state, text: Referencing(axis, homing=True))
+    await drive.send(text)
+    return watched
+
+
+async def test_a_homing_is_watched_where_its_axis_has_no_reference():
+    shop, drive = await drive_a()
+    assert await homing(drive, "x") == []
+    assert list(drive.homings) == ["x"]
+    drive.state.reference_lost("y")
+    assert await homing(drive, "y") == ["y"]
+
+
+@pytest.mark.parametrize("well", [True, False])
+async def test_the_end_of_a_homing_is_asked_once_and_gives_a_reference_if_it_ended_well(well):
+    shop, drive = await drive_a()
+    asked = 0
+
+    def homed(state: Any) -> Any:
+        nonlocal asked
+        asked += 1
+        return well
+        yield
+
+    drive.state.reference_lost("xy")
+    await homing(drive, "x")
+    otherwise(drive, homed=homed)
+    assert await drive.homing_ended("x") is well
+    assert await drive.homing_ended("x") is well
+    assert asked == 1 and drive.homed == {"x": well}
+    assert drive.state.unreferenced == (frozenset("y") if well else frozenset("xy"))
+
+
+@pytest.mark.parametrize("between", ["start", "stop", "another homing", "none"])
+async def test_what_was_sent_since_a_homing_has_ended_it_unless_it_was_the_homing_of_another_axis(between):
+    shop, drive = await drive_a()
+    drive.state.reference_lost("xy")
+    await homing(drive, "x")
+    if between == "start":
+        drive.starts_now()
+    elif between == "stop":
+        shop.bus.stop([drive])
+    elif between == "another homing":
+        await homing(drive, "y")
+    otherwise(drive, homed=lambda state: returns(True))
+    expected = between in ("another homing", "none")
+    assert await drive.homing_ended("x") is expected
+    assert ("x" not in drive.state.unreferenced) is expected
+
+
+def returns(value: Any) -> Any:
+    return value
+    yield
+
+
+async def test_a_homing_that_begins_while_the_end_of_the_last_one_is_asked_has_not_ended():
+    shop, drive = await drive_a()
+    await homing(drive, "x")
+
+    def homed(state: Any) -> Any:
+        drive.homings["x"] = (99, 0.0, 0)
+        return True
+        yield
+
+    otherwise(drive, homed=homed)
+    assert await drive.homing_ended("x") is False
+    assert drive.homed == {}
+
+
+async def test_a_start_makes_the_rest_that_was_read_before_unconfirmed():
+    shop, drive = await drive_a()
+    await drive.motion()
+    await asyncio.sleep(0.2)
+    await drive.motion()
+    assert drive.seen is not None and drive.seen.at_rest()
+    drive.starts_now()
+    await drive.motion()
+    assert not drive.seen.at_rest()
