@@ -83,6 +83,8 @@ async def opened(piece: int = 2) -> AsyncIterator[tuple[ThreadedPipe, Held, list
     try:
         yield pipe, device, seen
     finally:
+        for _ in range(99):
+            device.may.release()
         await pipe.close()
 
 
