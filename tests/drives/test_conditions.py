@@ -256,3 +256,56 @@ async def test_what_the_scales_rest_on_is_read_now_and_then_and_where_they_do_no
     telemetry.watch(["a"], 1.0)
     await a.for_(10.5 if holds else 3.5)
     assert read == times and len(published(link)) == (11 if holds else 4)
+
+
+async def test_the_end_ends_a_reading_that_waits_and_only_one_is_under_way():
+    telemetry, link, [a, b], _ = watched("a", "b")
+    waits = asyncio.Event()
+
+    async def run(procedure: Any) -> Any:
+        read.append("begun")
+        try:
+            await waits.wait()
+        finally:
+            read.append("ended")
+
+    read: list[str] = []
+    a.run = b.run = run  # type: ignore[method-assign]
+    telemetry.watch(["a", "b"], 1.0)
+    await asyncio.sleep(5)
+    assert read == ["begun"]
+    telemetry.close()
+    await asyncio.sleep(0)
+    assert read == ["begun", "ended"]
+
+
+async def test_a_part_that_is_not_due_keeps_none_behind_it_back():
+    telemetry, link, [a], _ = watched("a")
+    a.parts = [*reversed(a.parts)]
+    telemetry.watch(["a"], 1.0)
+    assert await a.for_(2.5) == [(0.0, "limits"), (0.0, "flags"), (1.0, "flags"), (2.0, "flags")]
+
+
+@pytest.mark.parametrize("failing", ["flags", "limits"])
+async def test_a_part_that_is_not_asked_for_any_more_keeps_none_behind_it_back(failing):
+    telemetry, link, [a], _ = watched("a")
+    a.fails[failing] = Refused("a: error 21")
+    telemetry.watch(["a"], 1.0)
+    await a.for_(0.5)
+    times = [(1.0, "flags")] if failing == "limits" else []
+    assert [(at + 0.5, name) for at, name in await a.for_(1)] == times
+
+
+async def test_what_the_scales_rest_on_is_read_in_five_periods_whatever_the_period(monkeypatch):
+    telemetry, link, [a], _ = watched("a")
+    read: list[float] = []
+
+    async def recount(drive: Any, priority: Any) -> None:
+        read.append(round(link.now() - a.begun, 3))
+
+    monkeypatch.setattr("multidrop.drives.telemetry.recount", recount)
+    a.counting.axes = ("x",)
+    a.scale_holds = lambda axis: True  # type: ignore[attr-defined]
+    telemetry.watch(["a"], 0.5)
+    await a.for_(5.2)
+    assert read == [0.0, 2.5, 5.0]

@@ -374,7 +374,9 @@ async def test_a_defect_in_a_look_is_reported():
 
 
 def state(**known: Any) -> MCodeState:
-    made = MCodeState(MCode(), "a", **({"product": "LMDCM", "version": "6.0", "part": "p", "serial": "1"} | known))
+    made = MCodeState(
+        known.pop("codec", MCode()), "a", **({"product": "LMDCM", "version": "6.0", "part": "p", "serial": "1"} | known)
+    )
     return made
 
 
@@ -611,3 +613,63 @@ async def test_what_is_to_be_remembered_goes_to_the_keeper():
     roster.drives = {}
     roster.remember()
     assert len(kept) == 1
+
+
+async def test_after_a_loss_a_drive_that_is_there_keeps_what_is_known_of_it_and_one_that_is_not_is_still_stopped():
+    shop, roster = await roster_of("a", "b")
+    a, b = roster.drives["a"], roster.drives["b"]
+    a.label, a.missing, looked = "left", True, list[Any]()
+    roster.restarts.replied_again = lambda drive, sign="": looked.append((drive, sign))  # type: ignore[method-assign]
+    b.state.settings_confirmed()
+    now, other = state(codec=MCode(em=1)), MCodeState(MCode(em=1), "c")
+    roster.found_again([now, other])
+    assert list(roster.drives) == ["a", "c"] and roster.drives["a"] is a and looked == [(a, "")]
+    assert a.state is now and (a.label, a.missing) == ("left", False)
+    assert roster.unlisted == {"b": b} and b.state.settings_unknown
+    assert roster.link.line.inbox.codec is now.codec
+    assert len(roster.all_drives) == 3
+
+
+async def test_a_sole_drive_that_was_renamed_is_the_same_one():
+    shop, roster = await roster_of("a")
+    a = roster.drives["a"]
+    roster.found_again([MCodeState(MCode(em=1), "z", product="LMDCM")])
+    assert roster.drives == {"z": a} and roster.unlisted == {} and a.address == "z"
+
+
+@pytest.mark.parametrize(
+    ("hints", "probing"),
+    [
+        (Hints(drives=("a", "b")), ("a", "b")),
+        (Hints(drives=("a",), tried=("t",)), ("a",)),
+        (Hints(tried=("t", "u")), ("t", "u")),
+        (Hints(), ()),
+    ],
+)
+async def test_while_drives_are_looked_for_a_stop_reaches_the_addresses_that_may_be_asked(hints, probing):
+    shop = SimulatedBus(party("a"))
+    roster, seen = shop.bus.roster, list[Any]()
+
+    async def run(procedure: Any, state: Any, searching: bool) -> Any:
+        procedure.close()
+        seen.append((roster.probing, state.address, searching))
+        return []
+
+    roster.conversations.run = run  # type: ignore[assignment]
+    assert await roster.search(hints) == []
+    assert seen == [(probing, "", True)]
+
+
+async def test_a_search_that_takes_too_long_ends_with_the_likely_causes():
+    shop = SimulatedBus(party("a"))
+    roster = shop.bus.roster
+
+    async def run(procedure: Any, state: Any, searching: bool) -> Any:
+        procedure.close()
+        await asyncio.sleep(1e5)
+
+    roster.conversations.run = run  # type: ignore[assignment]
+    began = shop.bus.now()
+    with pytest.raises(NoAnswer, match=r"^no drive could be identified within 16 s; nothing was received; check power"):
+        await roster.search(Hints(drives=("a", "b")))
+    assert shop.bus.now() - began == pytest.approx(16.0)
