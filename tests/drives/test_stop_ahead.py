@@ -103,3 +103,56 @@ def test_the_loop_is_asked_for_a_sign_of_life_before_its_stop_is_taken_from_it(d
     desk.calls.clear()
     desk.ahead._go_on()
     assert desk.calls[:1] == [("follow", False)] and desk.soon == [desk.ahead._lives] * 2
+
+
+def test_the_next_piece_is_written_once_it_is_due_and_nothing_waits(desk: Desk) -> None:
+    ahead = desk.ahead
+    assert ahead._next(0) is None
+    ahead.press()
+    begun = ahead._begun
+    assert begun is not None and ahead._next(0) == ahead._next(3) == b""
+    begun.left = 4.7
+    assert ahead._next(3) == b"" and ahead._next(0) == b"x"
+    assert begun.written == [(5.0, b"STOP"), (5.0, b"x")] and begun.pieces == []
+    assert ahead._next(3) == b"" and ahead._next(0) is None
+
+
+def test_a_piece_is_taken_back_from_a_loop_that_is_held_up(desk: Desk) -> None:
+    ahead = desk.ahead
+    assert ahead._take_back(0) is None
+    desk.line.only_stop, desk.owed = True, [StopPiece(b"y", 0.2), StopPiece(b"z", 0.2)]
+    ahead.watch(FORMS)
+    assert ahead._take_back(0) is None and not hasattr(desk.line, "overtaken")
+    desk.line.transmitted = 4.8
+    assert ahead._take_back(0) == b"y" and desk.line.overtaken
+    begun = ahead._begun
+    assert begun is not None and begun.pieces == [StopPiece(b"z", 0.2)] and begun.written == [(5.0, b"y")]
+    assert ahead._take_back(0) is None
+
+
+def test_where_bytes_wait_the_stop_is_taken_back_and_nothing_written(desk: Desk) -> None:
+    desk.line.only_stop, desk.owed = True, [StopPiece(b"y", 0.2)]
+    desk.ahead.watch(FORMS)
+    assert desk.ahead._take_back(3) == b"" and desk.line.overtaken
+    assert desk.ahead._begun is not None and desk.ahead._begun.written == []
+
+
+@pytest.mark.parametrize("last", [True, False])
+def test_the_loop_takes_the_stop_over_after_the_last_key(desk: Desk, last: bool) -> None:
+    desk.ahead._link.transport.yielded = lambda note: note(last)  # type: ignore[method-assign]
+    assert desk.ahead.take(True) is None
+    desk.ahead.press()
+    begun = desk.ahead._begun
+    assert begun is not None
+    taken = desk.ahead.take(True)
+    assert taken is not None and taken.data == b"STOP"
+    assert (taken.pieces, taken.written) == ((begun.pieces, begun.written) if last else ([], []))
+    assert desk.ahead._begun is (None if last else begun)
+
+
+def test_a_stop_that_follows_no_key_takes_nothing_over(desk: Desk) -> None:
+    desk.ahead.press()
+    begun, taken = desk.ahead._begun, desk.ahead.take(False)
+    assert taken is not None and taken.pieces == taken.written == [] and desk.ahead._begun is begun
+    desk.ahead.forget()
+    assert desk.ahead.take(False) is None
