@@ -93,7 +93,7 @@ class MotionRecord:
         for new in courses:
             kept = [each for each in self._courses.get(new.move.axis, ()) if each.by is not new.by]
             for each in kept:
-                if each.open:
+                if each.open and each.replaced is None:
                     each.replaced = new.move
             self._courses[new.move.axis] = [*kept, new][-KEPT:]
             if new.move.kind is MoveKind.PROGRAM:
@@ -101,15 +101,23 @@ class MotionRecord:
                     each.program = True
 
     def copy(self) -> Courses:
-        """What `restore` brings back, where the drive refused a line."""
+        """Return what `restore` needs if the drive refuses a line."""
         return {axis: [*courses] for axis, courses in self._courses.items()}
 
-    def restore(self, before: Courses) -> None:
-        for course in self._all():
-            for kept in before.get(course.move.axis, ()):
-                if kept.replaced is course.move:
-                    kept.replaced = None
-        self._courses = before
+    def restore(self, before: Courses, by: Sequence) -> None:
+        """Remove the motions that this sequence has begun since `copy`, and put back those that they replaced.
+
+        The drive refused their line. Motions that other sequences have begun meanwhile stay.
+        """
+        refused = [each for each in self.of(by) if each not in before.get(each.move.axis, ())]
+        for course in refused:
+            axis = course.move.axis
+            now = [each for each in self._courses[axis] if each is not course]
+            known = [each.by for each in now]
+            self._courses[axis] = [*(each for each in before.get(axis, ()) if each.by not in known), *now]
+            for each in self._courses[axis]:
+                if each.replaced is course.move:
+                    each.replaced = None
 
     def effect(self, effect: Effect, by: Sequence) -> None:
         """Record what else a line does, which was not refused."""

@@ -50,7 +50,7 @@ class Judged:
         if displaced and len(here) == len(places) and 0 < at - before < RECENT:
             for number, way in enumerate(after - earlier for earlier, after in zip(places, here, strict=True)):
                 if way and not velocities[number]:
-                    velocities[number] = round(way / (at - before)) or (1 if way > 0 else -1)
+                    velocities[number] = round(way / (at - before))  # at least 1: RECENT is a second
         velocity = max(velocities, key=abs)
         if velocity or displaced:
             self.still.clear()

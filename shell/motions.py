@@ -114,7 +114,7 @@ class _Line:
                 self._took_effect()
             else:
                 for was in before:
-                    was.drive.motions.restore(was.courses)
+                    was.drive.motions.restore(was.courses, self.by)
             if not isinstance(refusal, MotionFailed):
                 await self._judge_after(before, f"; {refusal}")
             raise

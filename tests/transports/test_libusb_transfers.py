@@ -1,0 +1,268 @@
+"""The transfers of a controller through libusb, on a library in memory: how each begins, ends and is cancelled."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import threading
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+
+from multidrop.transports import Unreachable, libusb, performax
+from multidrop.transports.controllers import ASKING, OTHER, STATUS
+from multidrop.transports.libusb import LibusbCarrier
+from multidrop.transports.usb import TransferFailed
+from tests.support.until import PATIENCE, until
+
+
+class USBError(Exception):
+    def __init__(self, value: int = 0) -> None:
+        super().__init__(f"error {value}")
+        self.value = value
+
+
+class USBErrorInterrupted(USBError):
+    pass
+
+
+class Transfer:
+    """A transfer that ends as the test says."""
+
+    def __init__(self, bus: Bus) -> None:
+        self.bus, self.set = bus, ()
+        self.status, self.buffer, self.actual, self.cancelled = 0, b"", 0, 0
+
+    def setControl(self, *given: Any, callback: Any, user_data: int) -> None:
+        self.set, self.callback, self.number, self.endpoint = ("control", *given), callback, user_data, 0
+
+    def setBulk(self, endpoint: int, data: Any, callback: Any, user_data: int) -> None:
+        self.set, self.callback, self.number, self.endpoint = ("bulk", endpoint, data), callback, user_data, endpoint
+
+    def submit(self) -> None:
+        if self.bus.refuses is not None:
+            raise USBError(self.bus.refuses)
+        self.bus.submitted.append(self)
+
+    def cancel(self) -> None:
+        self.cancelled += 1
+        if self.bus.refuses is not None:
+            raise USBError(self.bus.refuses)
+        self.end(Bus.TRANSFER_CANCELLED)
+
+    def end(self, status: int = 0, buffer: bytes = b"", actual: int | None = None) -> None:
+        self.status, self.buffer, self.actual = status, buffer, len(buffer) if actual is None else actual
+        self.bus.ended.append(self)
+
+    def getUserData(self) -> int:
+        return self.number
+
+    def getStatus(self) -> int:
+        return self.status
+
+    def getEndpoint(self) -> int:
+        return self.endpoint
+
+    def getBuffer(self) -> bytes:
+        return self.buffer
+
+    def getActualLength(self) -> int:
+        return self.actual
+
+
+class Bus:
+    """The library, its context, one device and its handle."""
+
+    USBError, USBErrorInterrupted = USBError, USBErrorInterrupted
+    TRANSFER_COMPLETED, TRANSFER_CANCELLED, TRANSFER_STALL, TRANSFER_NO_DEVICE, TRANSFER_TIMED_OUT = range(5)
+
+    def __init__(self) -> None:
+        self.submitted: list[Transfer] = []
+        self.ended: list[Transfer] = []
+        self.made = 0
+        self.calls: list[Any] = []
+        self.refuses: int | None = None
+        self.claims: int | None = None
+        self.finds: int | None = None
+        self.breaks: list[Exception] = []
+        self.polls = threading.Semaphore(0)
+
+    @contextlib.contextmanager
+    def USBContext(self) -> Iterator[Bus]:
+        if self.finds is not None:
+            raise USBError(self.finds)
+        try:
+            yield self
+        finally:
+            self.calls.append("context closed")
+
+    def handleEventsTimeout(self, seconds: float) -> None:
+        self.polls.acquire(timeout=0.001)
+        if self.breaks:
+            raise self.breaks.pop(0)
+        while self.ended:
+            transfer = self.ended.pop(0)
+            transfer.callback(transfer)
+
+    def open(self) -> Bus:
+        return self
+
+    def claimInterface(self, number: int) -> None:
+        if self.claims is not None:
+            raise USBError(self.claims)
+        self.calls.append(("claim", number))
+
+    def getTransfer(self) -> Transfer:
+        self.made += 1
+        return Transfer(self)
+
+    def clearHalt(self, endpoint: int) -> None:
+        self.calls.append(("clear", endpoint))
+
+    def controlWrite(self, *given: Any) -> None:
+        self.calls.append(given)
+
+    def close(self) -> None:
+        self.calls.append("closed")
+
+
+@pytest.fixture
+def bus(monkeypatch: pytest.MonkeyPatch) -> Bus:
+    made = Bus()
+    found = type("Found", (), {"device": made, "url": "usb:00"})()
+    monkeypatch.setattr(libusb, "library", lambda: made)
+    monkeypatch.setattr(libusb, "controllers", lambda usb1, context: [found] if usb1 is context is made else [])
+    monkeypatch.setattr(libusb, "chosen", lambda found, target: found[0] if target == "00" else None)
+    monkeypatch.setattr(libusb, "refusal", lambda value, found: f"refused with {value}")
+    return made
+
+
+class Desk:
+    def __init__(self) -> None:
+        self.done: list[Any] = []
+        self.broken: list[TransferFailed] = []
+        self.carrier = LibusbCarrier("00")
+        self.carrier.start(lambda *given: self.done.append(given), self.broken.append)
+
+
+END = (performax.REQUEST_TYPE, performax.REQUEST, performax.Control.CLOSE, 0, b"", ASKING)
+
+
+def test_a_controller_that_is_claimed_has_its_url_as_a_name(bus: Bus) -> None:
+    carrier = LibusbCarrier("00")
+    assert carrier.name == "usb:00" and bus.calls == [("claim", 0)] and carrier.delay == 0.0
+    carrier.close()
+    assert bus.calls == [("claim", 0), END, "closed", "context closed"]
+
+
+def test_a_bus_that_cannot_be_read_and_a_controller_that_cannot_be_claimed_are_named(bus: Bus) -> None:
+    bus.finds = 7
+    with pytest.raises(Unreachable, match=r"^usb:00: error 7$"):
+        LibusbCarrier("00")
+    bus.finds, bus.claims = None, 9
+    with pytest.raises(Unreachable, match=r"^usb:00: refused with 9$"):
+        LibusbCarrier("00")
+    assert bus.calls == ["context closed"]
+
+
+async def test_each_transfer_has_its_number_and_ends_with_its_status_and_what_came(bus: Bus) -> None:
+    desk = Desk()
+    carrier = desk.carrier
+    assert [carrier.control(performax.Control.OPEN), carrier.send(b"ID"), carrier.receive()] == [1, 2, 3]
+    assert [each.set for each in bus.submitted] == [
+        ("control", performax.REQUEST_TYPE, performax.REQUEST, performax.Control.OPEN, 0, b""),
+        ("bulk", performax.OUT, b"ID"),
+        ("bulk", performax.IN, performax.PACKET),
+    ]
+    bus.submitted[0].end()
+    bus.submitted[1].end(buffer=b"ID")
+    bus.submitted[2].end(buffer=b"Performax", actual=4)
+    await until(lambda: len(desk.done) == 3)
+    assert desk.done == [(1, 0, b""), (2, 0, b""), (3, 0, b"Perf")]
+    assert carrier.send(b"x") == 4 and bus.made == 3
+    bus.submitted[3].end()
+    await until(lambda: len(desk.done) == 4)
+    carrier.close()
+    assert bus.calls[1:] == [END, "closed", "context closed"]
+
+
+@pytest.mark.parametrize(
+    ("status", "end"),
+    [
+        (Bus.TRANSFER_CANCELLED, performax.CANCELLED),
+        (Bus.TRANSFER_STALL, performax.STALLED),
+        (Bus.TRANSFER_NO_DEVICE, performax.GONE),
+        (Bus.TRANSFER_TIMED_OUT, performax.TIMEOUT),
+        (99, OTHER),
+    ],
+)
+async def test_a_transfer_that_fails_has_no_bytes_and_a_halted_endpoint_is_freed_at_the_end(
+    bus: Bus, status: int, end: int
+) -> None:
+    desk = Desk()
+    desk.carrier.receive()
+    desk.carrier.control(performax.Control.OPEN)
+    for each in bus.submitted:
+        each.end(status, b"what came")
+    await until(lambda: len(desk.done) == 2)
+    assert desk.done == [(1, end, b""), (2, end, b"")]
+    desk.carrier.close()
+    halted = [("clear", performax.IN)] if end == performax.STALLED else []
+    assert bus.calls[1:] == [*halted, END, "closed", "context closed"]
+
+
+@pytest.mark.parametrize("value", [next(iter(STATUS)), 12345])
+async def test_a_transfer_that_cannot_begin_says_why_and_is_forgotten(bus: Bus, value: int) -> None:
+    desk = Desk()
+    bus.refuses = value
+    with pytest.raises(TransferFailed) as failure:
+        desk.carrier.send(b"x")
+    assert failure.value.args == TransferFailed(STATUS.get(value, OTHER)).args
+    bus.refuses = None
+    desk.carrier.cancel(1)
+    desk.carrier.close()
+    assert bus.submitted == [] and desk.done == []
+
+
+async def test_a_transfer_is_cancelled_once_and_one_that_has_ended_or_has_just_ended_is_left(bus: Bus) -> None:
+    desk = Desk()
+    number = desk.carrier.receive()
+    desk.carrier.cancel(number)
+    await until(lambda: bool(desk.done))
+    assert desk.done == [(number, performax.CANCELLED, b"")]
+    desk.carrier.cancel(number)
+    desk.carrier.cancel(99)
+    other = desk.carrier.receive()
+    bus.refuses = 5
+    desk.carrier.cancel(other)
+    bus.refuses = None
+    bus.submitted[1].end()
+    desk.carrier.close()
+
+
+async def test_after_the_end_nothing_begins_and_nothing_is_reported(bus: Bus) -> None:
+    desk = Desk()
+    desk.carrier.receive()
+    desk.carrier.halt()
+    with pytest.raises(TransferFailed) as failure:
+        desk.carrier.send(b"x")
+    assert failure.value.args == TransferFailed(performax.GONE).args
+    desk.carrier.close()
+    thread = desk.carrier._thread
+    assert thread is not None and thread.daemon and not thread.is_alive()
+    await asyncio.sleep(0)
+    assert desk.done == desk.broken == [] and bus.submitted[0].cancelled >= 1
+
+
+@pytest.mark.parametrize("value", [next(iter(STATUS)), 12345])
+async def test_a_bus_that_breaks_is_reported_once_and_an_interruption_is_none(bus: Bus, value: int) -> None:
+    desk = Desk()
+    bus.breaks = [USBErrorInterrupted(4), USBError(value)]
+    await until(lambda: bool(desk.broken))
+    assert [each.args for each in desk.broken] == [TransferFailed(STATUS.get(value, OTHER)).args]
+    thread = desk.carrier._thread
+    assert thread is not None
+    thread.join(PATIENCE)
+    assert not thread.is_alive()
+    desk.carrier.close()

@@ -1,0 +1,198 @@
+"""The writing side of a pipe over a device whose calls block: its queue, stops of other threads, loss and end."""
+
+from __future__ import annotations
+
+import asyncio
+import threading
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from typing import Any
+
+import pytest
+
+from multidrop.transports import TransportLost
+from multidrop.transports.threaded import ThreadedPipe, closing
+from tests.support.until import PATIENCE, until
+
+
+class Held:
+    """A device that takes a piece each time that the test lets it, and reads what the test gives it."""
+
+    name = "held"
+
+    def __init__(self, piece: int = 2) -> None:
+        self.piece, self.aborted = piece, 5
+        self.taking, self.may = threading.Semaphore(0), threading.Semaphore(0)
+        self.given = threading.Semaphore(0)
+        self.coming: list[Any] = []
+        self.written: list[bytes] = []
+        self.ended: list[str] = []
+        self.breaks: OSError | None = None
+
+    def read(self) -> bytes | None:
+        if not self.given.acquire(timeout=PATIENCE):
+            return None
+        found = self.coming.pop(0) if self.coming else b""
+        if isinstance(found, OSError):
+            raise found
+        return found  # type: ignore[no-any-return]
+
+    def give(self, *found: Any) -> None:
+        for each in found:
+            self.coming.append(each)
+            self.given.release()
+
+    def write(self, data: bytes) -> None:
+        self.taking.release()
+        assert self.may.acquire(timeout=PATIENCE)
+        if self.breaks is not None:
+            raise self.breaks
+        self.written.append(data)
+
+    def abort(self) -> int:
+        return self.aborted
+
+    def cancel(self) -> None:
+        self.ended.append("cancel")
+        self.give(b"")
+        for _ in range(99):
+            self.may.release()
+
+    def explain(self, error: OSError | None) -> str:
+        return f"it broke: {error}"
+
+    def close(self) -> None:
+        self.ended.append("close")
+
+    def begun(self) -> None:
+        """Wait until a piece is being written."""
+        assert self.taking.acquire(timeout=PATIENCE)
+
+    def take(self, pieces: int = 1) -> None:
+        """Let so many pieces pass; the next one is being written then."""
+        for _ in range(pieces):
+            self.may.release()
+            self.begun()
+
+
+@asynccontextmanager
+async def opened(piece: int = 2) -> AsyncIterator[tuple[ThreadedPipe, Held, list[Any]]]:
+    device, seen = Held(piece), list[Any]()
+    pipe = ThreadedPipe(device)
+    pipe.start(seen.append, seen.append)
+    try:
+        yield pipe, device, seen
+    finally:
+        for _ in range(99):
+            device.may.release()
+        await pipe.close()
+
+
+async def test_a_write_leaves_in_pieces_and_what_has_not_begun_is_pending() -> None:
+    async with opened() as (pipe, device, _):
+        assert pipe.write(b"") and pipe.pending == 0
+        assert pipe.write(b"abcde")
+        device.begun()
+        assert pipe.pending == 3
+        assert pipe.write(b"fg") and pipe.pending == 5
+        device.take(3)
+        assert device.written == [b"ab", b"cd", b"e"] and pipe.pending == 0
+
+
+async def test_a_device_without_pieces_gets_each_write_whole() -> None:
+    async with opened(piece=0) as (pipe, device, _):
+        pipe.write(b"abcde")
+        device.begun()
+        assert pipe.pending == 0
+        pipe.write(b"x")
+        device.take()
+        assert device.written == [b"abcde"]
+
+
+async def test_what_waits_is_dropped_with_what_the_machine_holds_or_up_to_what_has_begun() -> None:
+    async with opened() as (pipe, device, _):
+        pipe.write(b"abcde")
+        device.begun()
+        pipe.write(b"fg")
+        assert pipe.discard(whole=True) == 2 and pipe.pending == 3
+        pipe.write(b"hi")
+        assert pipe.discard() == 3 + 2 + device.aborted and pipe.pending == 0
+        pipe.write(b"jk")
+        device.take()
+        assert device.written == [b"ab"]
+        pipe.write(b"lm")
+        assert pipe.discard(whole=True) == 2 and pipe.pending == 0
+
+
+async def test_a_stop_of_another_thread_takes_the_place_of_the_queue_until_the_loop_knows_of_each() -> None:
+    async with opened() as (pipe, device, _):
+        pipe.write(b"abcd")
+        device.begun()
+        dropped: list[int] = []
+        assert pipe.preempt(False, lambda number: dropped.append(number) or b"!1")  # type: ignore[func-returns-value]
+        assert pipe.preempt(True, lambda number: dropped.append(number) or b"!2")  # type: ignore[func-returns-value]
+        assert dropped == [2 + device.aborted, 2] and pipe.pending == 2
+        assert not pipe.write(b"x")
+        notes: list[bool] = []
+        assert not pipe.yielded(notes.append) and pipe.yielded(notes.append) and pipe.yielded(notes.append)
+        assert notes == [False, True, True]
+        assert pipe.write(b"xy")
+        device.take(2)
+        assert device.written == [b"ab", b"!2"]
+
+
+async def test_a_stop_is_followed_by_its_pieces_and_a_key_counts_as_one_more() -> None:
+    async with opened() as (pipe, device, _):
+        waiting: list[int] = []
+
+        def piece(data: bytes | None) -> Any:
+            return lambda number: waiting.append(number) or data  # type: ignore[func-returns-value]
+
+        assert not pipe.follow(piece(b"??")) and waiting == []
+        assert not pipe.follow(piece(None), key=True) and pipe.write(b"ab")
+        device.begun()
+        assert pipe.follow(piece(b"!1"), key=True) and pipe.pending == 2
+        assert pipe.follow(piece(b"")) and pipe.follow(piece(b"!2")) and not pipe.follow(piece(None))
+        assert waiting == [0, 1, 3, 3, 5] and pipe.pending == 4
+        assert not pipe.write(b"x") and pipe.yielded() and pipe.write(b"x")
+        device.take(3)
+        assert device.written == [b"ab", b"!1", b"!2"]
+
+
+async def test_what_was_read_is_delivered_in_order() -> None:
+    async with opened() as (_, device, seen):
+        device.give(b"ab", b"", b"cd")
+        await until(lambda: b"".join(seen) == b"abcd")
+
+
+@pytest.mark.parametrize("error", [OSError(5, "gone"), None])
+async def test_a_break_of_the_reading_side_is_a_loss_and_nothing_is_written_after_it(error: OSError | None) -> None:
+    async with opened() as (pipe, device, seen):
+        device.give(error)
+        await until(lambda: bool(seen))
+        [loss] = seen
+        assert isinstance(loss, TransportLost) and f"it broke: {error}" in str(loss)
+        assert not pipe.write(b"x") and pipe.discard() == 0
+        assert not pipe.preempt(False, lambda dropped: b"!") and not pipe.follow(lambda waiting: b"!", key=True)
+
+
+async def test_a_break_of_the_writing_side_is_a_loss() -> None:
+    async with opened() as (pipe, device, seen):
+        device.breaks = OSError(5, "gone")
+        pipe.write(b"abcd")
+        device.begun()
+        device.may.release()
+        await until(lambda: bool(seen))
+        assert "it broke: [Errno 5] gone" in str(seen[0]) and device.written == []
+
+
+async def test_the_end_cancels_what_waits_and_closes_the_device_once() -> None:
+    device = Held()
+    pipe = ThreadedPipe(device)
+    pipe.start(lambda data: None, lambda error: None)
+    closed = asyncio.ensure_future(pipe.close())
+    await closed
+    await pipe.close()
+    await until(lambda: device.name not in closing)
+    assert device.ended == ["cancel", "close"]
+    assert not pipe.write(b"x") and not pipe.preempt(False, lambda dropped: b"!")
