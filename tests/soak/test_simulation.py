@@ -347,7 +347,7 @@ def test_a_seed_ends_with_its_one_line(capsys: pytest.CaptureFixture[str]) -> No
     line = capsys.readouterr().out
     assert re.fullmatch(r"seed 3: held, \d+\.\d virtual s, \d+ commands, trace [0-9a-f]{16}\n", line)
     assert main(["--seed", "3", "--only", "0,1,2,3,4", "--without", next(iter(FAULTS))]) in (0, 1)
-    assert result(Life(3, tuple(range(5)))).line == line.strip()
+    assert result(Life(3, whole(3, 5))).line == line.strip()
 
 
 def test_a_kind_of_fault_that_does_not_exist_is_refused() -> None:
