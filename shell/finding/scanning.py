@@ -195,7 +195,9 @@ class Scanning:
         """What shows that drives of another family reply on the line, in words."""
         self._said: set[str] = set()
         self._first: Bus | None = None
-        """The bus of the first stage."""
+        """The first bus on which something was received, or else the bus of the first stage."""
+        self._received = False
+        """Something was received on a bus."""
 
     async def run(self, bauds: Sequence[int], everything: bool) -> None:
         """Search. `bauds`: only these; `everything`: do not end with the first stage that finds a drive.
@@ -445,6 +447,8 @@ class Scanning:
         reach = replace(reach, asks=asks, cut=hints.cut, first_mark=hints.first_mark)
         with bus.link.received() as heard:
             outcome = await searched(bus, stage.scan, reach, found, step)
+        if heard and not self._received:
+            self._first, self._received = bus, True
         self._other = spoken(bytes(heard), stage.family) or self._other
         self._warn(f"{port}: {stage.words}", filter(None, (*outcome.remarks, self._other)))
 

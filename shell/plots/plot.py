@@ -15,6 +15,7 @@ from datetime import datetime
 from functools import partial
 
 from multidrop.dialects import Diagnostic
+from multidrop.dialects.text import counted
 from multidrop.dialects.units import Takes
 from multidrop.dialects.values import UNREAD, Conditions
 from multidrop.drives.events import Conditioned, Lost, Sample, Unsolicited, Valued
@@ -171,7 +172,7 @@ class Plot:
         await asyncio.shield(self._task)
         if self.failure:
             raise Diagnostic(self.failure)
-        return f"{self.samples} samples in {self.target.text}"
+        return f"{counted(self.samples, 'sample')} in {self.target.text}"
 
     @property
     def _done(self) -> bool:

@@ -154,7 +154,7 @@ async def test_a_run_without_a_twin_says_so(rerun: Any, tmp_path: Path) -> None:
 async def test_the_difference_alone_is_a_plot(rerun: Any, tmp_path: Path) -> None:
     plot = await Plot.open(PlotTarget(file=tmp_path / "a.rrd"), clock=lambda: 0.0, wall=lambda at: datetime.now(UTC))
     plot.predicted("press", Predicted(1.0, "a", 5, 6, -7), alone=True)
-    assert (await plot.close()).startswith("1 samples in")
+    assert (await plot.close()).startswith("1 sample in")
     found = contents(tmp_path / "a.rrd")
     assert found["/press/a/twin/difference"]["Scalars:scalars"] == [[-7.0]] and "/press/a/twin/position" not in found
 

@@ -1,0 +1,47 @@
+"""Transcripts of every verb: the files in `said` have each typed line after `> `, and below it all that is said.
+
+`!` marks a warning, `=` an outcome, `-` another notice, and `x` the error that ends the line.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from tests.support.cell_session import CellSession, bus, drive, party, pmx
+from tests.support.said import transcript
+
+pytestmark = pytest.mark.virtual
+
+PLANT = (
+    bus("press", party("a"), party("b"), baud=0),
+    bus("pmx", pmx("00"), baud=0),
+    bus("slide", drive("TMCM-1140", "1"), baud=0),
+)
+PLAIN = (bus("line", drive("LMDCM"), baud=0),)
+SCALES = {"a": {"scale": "5 mm/turn", "zero": "120 mm", "travel": "0..300 mm"}, "00.x": "1 mm/step"}
+FILES = {
+    "p.mxt": "PG 100\nLB Ga\nR1=5\nH 2000\nR2=R1+1\nE\nPG\n",
+    "q.mxt": "PG 100\nLB Gb\nXX 5\nE\nPG\n",
+    "x.prg": "PRG 0\nX1000\nEND\n",
+}
+NO = {"macros"}
+"""Where the answer to every question is no."""
+
+
+def typed(name: str) -> list[str]:
+    return (Path(__file__).parent / "said" / f"{name}.txt").read_text(encoding="utf-8").splitlines()
+
+
+@pytest.mark.parametrize("name", sorted(each.stem for each in (Path(__file__).parent / "said").glob("*.txt")))
+async def test_each_line_says_this_and_nothing_else(tmp_path, monkeypatch, name):
+    monkeypatch.chdir(tmp_path)
+    for file, text in FILES.items():
+        (tmp_path / file).write_text(text)
+    expected = typed(name)
+    lines = [each.removeprefix("> ") for each in expected if each.startswith("> ")]
+    units = SCALES if name == "units" else {}
+    async with CellSession(tmp_path, *(PLAIN if name == "steps" else PLANT), units=units) as shop:
+        shop.session.questions.agreed = name not in NO
+        assert await transcript(shop, lines, tmp_path) == expected

@@ -1,0 +1,56 @@
+"""What a line has a session say: everything that is printed, narrated or refused, marked by its kind."""
+
+from __future__ import annotations
+
+import os
+import re
+from pathlib import Path
+
+from multidrop.dialects import Diagnostic, DriveError
+from multidrop.shell.events import By, Failed, Notified, Output, Printed
+from multidrop.transports import TransportLost
+from tests.support.cell_session import CellSession
+
+_CHANGING = (
+    (r"usage: .*", "usage: ..."),
+    (r"\d{4}-\d\d-\d\d[T -]\d\d:?\d\d:?\d\d(\+00:00)?", "TIME"),
+    (r"(backups/TIME-[a-z-]*?)-\d+\.mxt", r"\1.mxt"),
+    (r"since \d\d:\d\d:\d\d", "since TIME"),
+)
+
+
+async def said(shop: CellSession, line: str, by: By = By.OPERATOR) -> list[str]:
+    """Run a line. `! ` marks a warning, `= ` an outcome, `- ` another notice, `x ` the error that ends the line."""
+    shop.events.clear()
+    refused = []
+    try:
+        await shop.session.run(line, by)
+    except (Diagnostic, DriveError, TransportLost) as error:
+        refused = [f"x {error}"]
+    return [*texts(shop), *refused]
+
+
+def texts(shop: CellSession) -> list[str]:
+    """What was said until now, marked in the same way."""
+    found = []
+    for event in shop.events:
+        if isinstance(event, Output | Printed):
+            found.append(event.text)
+        elif isinstance(event, Notified):
+            found.append(f"{'!' if event.warning else '=' if event.outcome else '-'} {event.text}")
+    return found
+
+
+async def transcript(shop: CellSession, lines: list[str], folder: Path) -> list[str]:
+    """Run lines; return each after `> `, with what was said. The folder is `DIR`, a time of day `TIME`."""
+    found = []
+    for line in lines:
+        found.append(f"> {line}")
+        for text in await said(shop, line):
+            for pattern, words in ((re.escape(str(folder)), "DIR"), *_CHANGING):
+                text = re.sub(pattern, words, text)
+            text = text.replace(os.sep, "/")
+            found.append(f"  {text}".rstrip())
+        failed = [each.text for each in shop.events if isinstance(each, Failed)]
+        assert failed == [] or len(failed) == 1, "a line fails once"
+    return found
