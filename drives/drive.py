@@ -218,8 +218,11 @@ class Drive:
 
     def check_address(self, text: str) -> None:
         """Raise Inexpressible for a line that begins with the address of a drive of this line, as on the wire."""
-        found = self.family.addressed(text, self.state.product)
-        check_name(self.shown, text, found, [(each.address, each.state.name) for each in self._neighbours.all_drives])
+        drives = [(each.address, each.state.name) for each in self._neighbours.all_drives]
+        check_name(self.shown, text, self.family.addressed(text, self.state.product), drives)
+        if self.state.address not in (*GLOBAL, *(address for address, _ in drives)):  # `@bMR 5`, without a blank
+            whole = f"{self.state.address} {text}"
+            check_name(self.shown, f"@{whole}", self.family.addressed(whole, self.state.product), drives)
 
     async def _send(self, text: str, check: Check | None) -> tuple[str, ...]:
         to_all = self.state.address in GLOBAL

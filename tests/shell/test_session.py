@@ -134,12 +134,20 @@ async def test_a_number_at_the_head_of_a_command_of_a_controller_is_refused_like
         assert cell.written("p") == b""
 
 
-@pytest.mark.parametrize("line", ["@01PX", "@bMR 5", "@2GAP 1, 0", "@01X1000"])
-async def test_an_address_without_a_blank_behind_it_is_told_so(tmp_path, line):
+@pytest.mark.parametrize(
+    ("line", "told"),
+    [
+        ("@01PX", "with a blank between them"),
+        ("@01X1000", "with a blank between them"),
+        ("@bMR 5", "'@bMR 5' is not a command: write @b MR 5; nothing was sent"),
+        ("@2GAP 1, 0", "no module address '2GAP'; valid: 1 to 255"),
+    ],
+)
+async def test_an_address_without_a_blank_behind_it_is_told_so(tmp_path, line, told):
     module = 'personality = "TMCM"\nname = "2"'
     cells = {"@0": bus("l", pmx("00"), pmx("01")), "@b": bus("l", party("a"), party("b")), "@2": bus("l", module)}
     async with Press(tmp_path, cells[line[:2]]) as cell:
-        with pytest.raises((Inexpressible, Diagnostic), match="blank"):
+        with pytest.raises((Inexpressible, Diagnostic), match=re.escape(told)):
             await cell.run(line)
         assert cell.written("l") == b""
 

@@ -1,10 +1,12 @@
 """Transcripts of every verb: the files in `said` have each typed line after `> `, and below it all that is said.
 
-`!` marks a warning, `=` an outcome, `-` another notice, and `x` the error that ends the line.
+`!` marks a warning, `=` an outcome, `-` another notice, and `x` the error that ends the line. With `SAID=renew` in
+the environment the files are written anew: look at each change.
 """
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 import pytest
@@ -30,18 +32,21 @@ NO = {"macros"}
 """Where the answer to every question is no."""
 
 
-def typed(name: str) -> list[str]:
-    return (Path(__file__).parent / "said" / f"{name}.txt").read_text(encoding="utf-8").splitlines()
+SAID = Path(__file__).parent / "said"
 
 
-@pytest.mark.parametrize("name", sorted(each.stem for each in (Path(__file__).parent / "said").glob("*.txt")))
+@pytest.mark.parametrize("name", sorted(each.stem for each in SAID.glob("*.txt")))
 async def test_each_line_says_this_and_nothing_else(tmp_path, monkeypatch, name):
     monkeypatch.chdir(tmp_path)
-    for file, text in FILES.items():
-        (tmp_path / file).write_text(text)
-    expected = typed(name)
+    for path, text in FILES.items():
+        (tmp_path / path).write_text(text)
+    file = SAID / f"{name}.txt"
+    expected = file.read_text(encoding="utf-8").splitlines()
     lines = [each.removeprefix("> ") for each in expected if each.startswith("> ")]
     units = SCALES if name == "units" else {}
     async with CellSession(tmp_path, *(PLAIN if name == "steps" else PLANT), units=units) as shop:
         shop.session.questions.agreed = name not in NO
-        assert await transcript(shop, lines, tmp_path) == expected
+        found = await transcript(shop, lines, tmp_path)
+    if os.environ.get("SAID") == "renew":
+        file.write_text("\n".join([*found, ""]), encoding="utf-8")
+    assert found == expected

@@ -193,7 +193,7 @@ class MCode(Codec):
         if (at := unsendable(text)) is not None:
             raise Inexpressible(f"{text[at]!r} cannot be sent to a drive: printable ASCII only")
         if self.party and not (len(address) == 1 and "!" <= address <= "~"):
-            raise Inexpressible(f"no drive name '{address}'; valid: one letter or digit, or !, and a blank after it")
+            raise Inexpressible(f"no drive name '{address}'; valid: one letter or digit, or !")
         kind = kind or classify.kind_of(text)
         request = Request(
             address, text, kind, self, expect=classify.NOTHING if kind in SILENT else classify.print_form(text)

@@ -57,7 +57,7 @@ class Pmx(Codec):
         if not text:
             raise Inexpressible("an empty command has no reply; nothing was sent")
         if self.addressed and not (len(address) == 2 and address.isascii() and address.isdigit()):
-            raise Inexpressible(f"no device number '{address}'; valid: 00 to 99, and a blank after it")
+            raise Inexpressible(f"no device number '{address}'; valid: 00 to 99")
         size = len(address) + len(text) + 1
         if size > LONGEST:
             raise Inexpressible(f"the command has {size} characters with its number, {LONGEST} are sent at most")

@@ -261,7 +261,7 @@ class Tmcl(Codec):
 def number_of(address: str) -> int:
     """The number in an address. Raises Inexpressible."""
     if address not in ADDRESSES:
-        raise Inexpressible(f"no module address '{address}'; valid: 1 to 255, and a blank after it")
+        raise Inexpressible(f"no module address '{address}'; valid: 1 to 255")
     return int(address)
 
 
