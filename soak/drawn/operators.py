@@ -18,6 +18,9 @@ COMPUTED = {
     ast.LShift: ">>", ast.RShift: "<<", ast.BitAnd: "|", ast.BitOr: "&",
 }  # fmt: skip
 
+SAME_IN_ANY_ORDER = {"isinstance", "cast", "TypeVar", "NamedTuple", "min", "max"}
+"""Functions of which the swapped arguments are the same, or an error at once."""
+
 
 class Mutant(NamedTuple):
     """A change. `after` replaces the bytes from `start` to `end`; `function`: dotted, empty at module level."""
@@ -243,7 +246,7 @@ class _Finder(ast.NodeVisitor):
             self.generic_visit(node)
 
     def _swap(self, first: ast.expr, second: ast.expr, call: ast.Call) -> None:
-        if isinstance(call.func, ast.Name) and call.func.id in ("isinstance", "cast", "TypeVar", "NamedTuple"):
+        if isinstance(call.func, ast.Name) and call.func.id in SAME_IN_ANY_ORDER:
             return
         (start, first_end), (second_start, end) = self._place(first), self._place(second)
         between = self.source[first_end:second_start].decode()

@@ -83,6 +83,11 @@ def test_the_assertion_in_a_zip_is_no_behaviour() -> None:
     assert changes(b"def f(a):\n    for x in zip(a, strict=True):\n        h = x\n") == set()
 
 
+def test_the_lesser_of_two_values_is_the_same_in_any_order() -> None:
+    assert {after for _, after in changes(b"def f(a, b):\n    return [min(a, b), g(a, b)]\n")} == {"None", "b, a"}
+    assert len(mutants("line.py", b"def f(a, b):\n    return [min(a, b), g(a, b)]\n")) == 2
+
+
 def test_each_mutant_is_another_program_and_names_its_function() -> None:
     whole = ast.dump(ast.parse(SOURCE))
     for each in mutants("line.py", SOURCE):
