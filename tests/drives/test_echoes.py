@@ -127,7 +127,7 @@ def test_after_a_reply_nothing_is_kept():
     heard = Heard()
     heard.received(b"x")
     heard.wrote(b"PR P\r")
-    heard.replied()
+    heard.replied("a")
     heard.received(b"PR P\ry")
     heard.wrote(b"z")
     assert heard.answered and heard.came == heard.foreign() == b""

@@ -105,7 +105,7 @@ class Desk:
 
 
 def heard(desk: Desk) -> Desk:
-    desk.link.heard.replied()
+    desk.link.heard.replied("a")
     return desk
 
 
@@ -228,7 +228,7 @@ async def test_what_a_session_before_has_left_is_said_and_is_no_print():
 async def test_what_comes_at_first_on_a_network_may_be_a_greeting(network, replied, after, greeting):
     desk = Desk(network=network)
     if replied:
-        desk.link.heard.replied()
+        desk.link.heard.replied("a")
     await asyncio.sleep(after)
     await desk.hear(b"hello\r\n")
     assert desk.prints == [(("hello",), greeting)]

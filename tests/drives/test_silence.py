@@ -53,8 +53,8 @@ def test_whole_messages_are_named_by_the_failure_itself():
 
 def test_after_the_first_reply_only_another_program_is_named():
     replied, shared = link(), link(other="minicom has it")
-    replied.heard.replied()
-    shared.heard.replied()
+    replied.heard.replied("a")
+    shared.heard.replied("a")
     failure = NoAnswer("no reply")
     assert explained(failure, replied, "mcode") is failure
     named = explained(failure, shared, "mcode")

@@ -86,8 +86,17 @@ async def test_a_lost_reading_is_no_rest(family, lost, tmp_path, monkeypatch):
                 await shop.session.run(line)
             assert now() < ENDS
         Moving(monkeypatch, family, lost=[lost])
+        watch = await wait(shop.session, 20, idle=False, ended=True)  # asks again
+        assert now() >= ENDS and Outcome.UNKNOWN not in [each.outcome for each in watch.endings[drive]]
+
+
+@pytest.mark.parametrize("family", FAMILY_NAMES)
+async def test_after_three_lost_readings_the_end_is_not_known(family, tmp_path, monkeypatch):
+    async with CellSession(tmp_path, bus("press", party("a"))) as shop:
+        Moving(monkeypatch, family, lost=range(100))
         watch = await wait(shop.session, 20, idle=False, ended=True)
-        assert [each.outcome for each in watch.endings[drive]] == [Outcome.UNKNOWN]
+        assert asyncio.get_running_loop().time() < ENDS
+        assert [each.outcome for each in watch.endings[shop.session.selected]] == [Outcome.UNKNOWN]
 
 
 @pytest.mark.parametrize("family", FAMILY_NAMES)
