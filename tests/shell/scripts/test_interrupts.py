@@ -1,7 +1,7 @@
 """Automation that is interrupted, from outside: real processes, a simulated cell served on TCP and ptys."""
 
-import shutil
 import re
+import shutil
 import signal
 import sys
 from pathlib import Path
