@@ -12,26 +12,9 @@ from multidrop.drives.events import Conditioned
 from multidrop.drives.readings import Running
 from multidrop.drives.telemetry import AGED, LEAST, Telemetry
 from multidrop.transports import TransportLost
+from tests.support.told_link import ToldLink
 
 pytestmark = pytest.mark.virtual
-
-
-class Link:
-    name, away = "w", None
-
-    def __init__(self) -> None:
-        self.line = SimpleNamespace(printed_at=float("-inf"))
-        self.told: list[tuple[str, str, bool]] = []
-        self.events: list[Any] = []
-
-    def now(self) -> float:
-        return asyncio.get_running_loop().time()
-
-    def notify(self, text: str, address: str = "", warning: bool = False) -> None:
-        self.told.append((text, address, warning))
-
-    def publish(self, event: Any) -> None:
-        self.events.append(event)
 
 
 class Drive:
@@ -40,7 +23,7 @@ class Drive:
     programming = transferring = False
     running: Running | None = None
 
-    def __init__(self, link: Link, address: str = "a") -> None:
+    def __init__(self, link: ToldLink, address: str = "a") -> None:
         self.link, self.address, self.shown, self.commands = link, address, address, 0
         self.settings: dict[str, Any] = {}
         self.state = SimpleNamespace(programming=False, settings_unknown=False, stranger="")
@@ -80,15 +63,15 @@ class Drive:
         return self.read
 
 
-def watched(*names: str) -> tuple[Telemetry, Link, list[Drive], Any]:
-    link = Link()
+def watched(*names: str) -> tuple[Telemetry, ToldLink, list[Drive], Any]:
+    link = ToldLink()
     drives = {name: Drive(link, name) for name in names}
     restarts = SimpleNamespace(counts={}, count=lambda drive: restarts.counts.get(drive.address, 0))
     roster: Any = SimpleNamespace(link=link, drives=drives, at=drives.__getitem__, restarts=restarts)
     return Telemetry(roster), link, list(drives.values()), roster
 
 
-def published(link: Link) -> list[dict[str, int]]:
+def published(link: ToldLink) -> list[dict[str, int]]:
     return [each.conditions[0].facts for each in link.events if isinstance(each, Conditioned)]
 
 

@@ -14,26 +14,9 @@ from multidrop.drives.poller import AFTER_DEFECT, Due, Poller, Subscription
 from multidrop.drives.readings import Seen
 from multidrop.drives.telemetry import Value, _MotionPoller, _ValuePoller
 from multidrop.transports import TransportLost
+from tests.support.told_link import ToldLink
 
 pytestmark = pytest.mark.virtual
-
-
-class Link:
-    name, away = "w", None
-
-    def __init__(self) -> None:
-        self.line = SimpleNamespace(printed_at=float("-inf"))
-        self.told: list[tuple[str, str, bool]] = []
-        self.events: list[Any] = []
-
-    def now(self) -> float:
-        return asyncio.get_running_loop().time()
-
-    def notify(self, text: str, address: str = "", warning: bool = False) -> None:
-        self.told.append((text, address, warning))
-
-    def publish(self, event: Any) -> None:
-        self.events.append(event)
 
 
 class Drive:
@@ -50,7 +33,7 @@ class Reads(Poller[str]):
     shortest, retry, after_silence = 0.1, 0.05, 1.0
 
     def __init__(self, *names: str, took: float = 0.01) -> None:
-        self.link = Link()
+        self.link = ToldLink()
         self.roster = SimpleNamespace(link=self.link, drives={name: Drive(name) for name in names})
         super().__init__(self.roster)  # type: ignore[arg-type]
         self.reply_after = took
@@ -310,8 +293,8 @@ async def test_a_subscription_ends_once():
 # Motion and values
 
 
-def motions(*names: str) -> tuple[_MotionPoller, Link, Any]:
-    link = Link()
+def motions(*names: str) -> tuple[_MotionPoller, ToldLink, Any]:
+    link = ToldLink()
     roster: Any = SimpleNamespace(link=link, drives={name: Drive(name) for name in names})
     roster.at = roster.drives.__getitem__
     for drive in roster.drives.values():
@@ -381,8 +364,8 @@ async def test_a_drive_that_does_not_reply_to_a_poll_is_silent():
     assert link.events == [Silent(now, "a")]
 
 
-def values(*names: str) -> tuple[_ValuePoller, Link, Any]:
-    link = Link()
+def values(*names: str) -> tuple[_ValuePoller, ToldLink, Any]:
+    link = ToldLink()
     roster: Any = SimpleNamespace(link=link, drives={name: Drive(name) for name in names})
     roster.at = roster.drives.__getitem__
     for drive in roster.drives.values():

@@ -18,24 +18,13 @@ from multidrop.drives.roster import OPENING, OPENING_PLACE, PAUSE, REPAIRS, Rest
 from multidrop.drives.roster import _ran_on as ran_on
 from tests.support.cell_session import party
 from tests.support.simulated_bus import SimulatedBus
+from tests.support.told_link import ToldLink
 
 pytestmark = pytest.mark.virtual
 
 
-class Link:
+class Link(ToldLink):
     """A link as far as a look for restarts asks it."""
-
-    name, away = "w", None
-
-    def __init__(self) -> None:
-        self.told: list[tuple[str, str, bool]] = []
-        self.events: list[Any] = []
-
-    def now(self) -> float:
-        return asyncio.get_running_loop().time()
-
-    def notify(self, text: str, address: str = "", warning: bool = False) -> None:
-        self.told.append((text, address, warning))
 
     def publish(self, event: Any) -> None:
         self.events.append((event.address, event.certain) if isinstance(event, Restarted) else event)
