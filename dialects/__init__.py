@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from multidrop.dialects.on_demand import imported
+from multidrop.base.on_demand import imported
 
 if TYPE_CHECKING:
     from multidrop.dialects.codec import Codec as Codec
@@ -20,25 +20,16 @@ if TYPE_CHECKING:
     from multidrop.dialects.codec import Request as Request
     from multidrop.dialects.codec import Started as Started
     from multidrop.dialects.codec import StopPiece as StopPiece
-    from multidrop.dialects.errors import Diagnostic as Diagnostic
-    from multidrop.dialects.errors import DriveError as DriveError
-    from multidrop.dialects.errors import Inexpressible as Inexpressible
-    from multidrop.dialects.errors import NoAnswer as NoAnswer
-    from multidrop.dialects.errors import Refused as Refused
-    from multidrop.dialects.errors import Stopped as Stopped
     from multidrop.dialects.family import Family as Family
     from multidrop.dialects.family import Hints as Hints
     from multidrop.dialects.family import Motion as Motion
     from multidrop.dialects.family import Progress as Progress
-    from multidrop.dialects.files import SourceLine as SourceLine
     from multidrop.dialects.state import DriveState as DriveState
     from multidrop.dialects.state import Owed as Owed
 
 _MODULES = {
     "codec": ("Codec", "Decoded", "End", "Kind", "Priority", "Procedure", "Reply", "Request", "Started", "StopPiece"),
-    "errors": ("Diagnostic", "DriveError", "Inexpressible", "NoAnswer", "Refused", "Stopped"),
     "family": ("Family", "Hints", "Motion", "Progress"),
-    "files": ("SourceLine",),
     "state": ("DriveState", "Owed"),
 }
 _PLACES = {name: f"multidrop.dialects.{module}:{name}" for module, names in _MODULES.items() for name in names}

@@ -9,9 +9,9 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Generic, NamedTuple, TypeVar
 
+from multidrop.base.errors import NoAnswer, Refused
+from multidrop.base.files import rows
 from multidrop.dialects.codec import Procedure
-from multidrop.dialects.errors import NoAnswer, Refused
-from multidrop.dialects.files import rows
 from multidrop.dialects.state import DriveState, Owed
 
 S = TypeVar("S", bound=DriveState)

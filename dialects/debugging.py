@@ -6,8 +6,8 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Generic, NamedTuple, TypeVar
 
+from multidrop.base.errors import Inexpressible
 from multidrop.dialects.codec import Procedure
-from multidrop.dialects.errors import Inexpressible
 from multidrop.dialects.program_files import Held, Stored
 from multidrop.dialects.state import DriveState
 

@@ -11,10 +11,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Generic, TypeVar
 
+from multidrop.base.errors import NoAnswer, Refused, Stopped
+from multidrop.base.text import visible
 from multidrop.dialects.codec import End, Kind, Procedure, Reply, Request
-from multidrop.dialects.errors import NoAnswer, Refused, Stopped
 from multidrop.dialects.state import DriveState
-from multidrop.dialects.text import visible
 
 S = TypeVar("S", bound=DriveState)
 T = TypeVar("T")

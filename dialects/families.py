@@ -9,10 +9,10 @@ import os
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from multidrop.dialects.files import split_lines
-from multidrop.dialects.on_demand import OnDemand
+from multidrop.base.files import split_lines
+from multidrop.base.on_demand import OnDemand
+from multidrop.base.text import visible
 from multidrop.dialects.program_files import FileLanguage, ProgramFiles, errors
-from multidrop.dialects.text import visible
 
 if TYPE_CHECKING:
     from multidrop.dialects.codec import Codec

@@ -10,11 +10,11 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Generic, NamedTuple, Protocol, TypeVar
 
+from multidrop.base.comments import unsent
+from multidrop.base.errors import Inexpressible
+from multidrop.base.files import SourceLine, lines_of_text
+from multidrop.base.on_demand import imported, imported_if
 from multidrop.dialects.codec import Codec, Priority, Procedure
-from multidrop.dialects.comments import unsent
-from multidrop.dialects.errors import Inexpressible
-from multidrop.dialects.files import SourceLine, lines_of_text
-from multidrop.dialects.on_demand import imported, imported_if
 from multidrop.dialects.state import DriveState, Owed, Remembered
 
 if TYPE_CHECKING:

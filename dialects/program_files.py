@@ -14,10 +14,10 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any, NamedTuple, Protocol, cast
 
-from multidrop.dialects.comments import ENTER, behind_number, enter_in, grouped_at
-from multidrop.dialects.errors import Diagnostic, Refused
-from multidrop.dialects.files import SourceLine
-from multidrop.dialects.on_demand import imported_if
+from multidrop.base.comments import ENTER, behind_number, enter_in, grouped_at
+from multidrop.base.errors import Diagnostic, Refused
+from multidrop.base.files import SourceLine
+from multidrop.base.on_demand import imported_if
 
 
 class Problem(NamedTuple):

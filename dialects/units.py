@@ -18,10 +18,10 @@ from fractions import Fraction
 from functools import cached_property
 from typing import Any, Generic, NamedTuple, TypeVar
 
+from multidrop.base.errors import Diagnostic
+from multidrop.base.text import DECIMAL
 from multidrop.dialects.codec import Procedure, Request
-from multidrop.dialects.errors import Diagnostic
 from multidrop.dialects.state import DriveState
-from multidrop.dialects.text import DECIMAL
 
 LENGTH, ANGLE, MOTOR = "length", "angle", "motor"
 """The kinds of units; each own word is a kind of its own."""

@@ -16,11 +16,11 @@ from math import isclose
 from types import MappingProxyType
 from typing import Any, Generic, TypeVar
 
+from multidrop.base.errors import Refused
+from multidrop.base.files import rows
+from multidrop.base.text import real
 from multidrop.dialects.codec import Priority, Procedure
-from multidrop.dialects.errors import Refused
-from multidrop.dialects.files import rows
 from multidrop.dialects.state import DriveState
-from multidrop.dialects.text import real
 
 # Settings, and the steps that change them
 

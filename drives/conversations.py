@@ -16,18 +16,8 @@ from dataclasses import replace
 from typing import Any, Generic, TypeVar
 from weakref import WeakKeyDictionary
 
-from multidrop.dialects import (
-    DriveState,
-    End,
-    Inexpressible,
-    Kind,
-    NoAnswer,
-    Owed,
-    Procedure,
-    Refused,
-    Request,
-    Stopped,
-)
+from multidrop.base.errors import Inexpressible, NoAnswer, Refused, Stopped
+from multidrop.dialects import DriveState, End, Kind, Owed, Procedure, Request
 from multidrop.drives.events import Concluded, Outcome, Transaction, Witnesses
 from multidrop.drives.link import Link, LostInFlight
 from multidrop.drives.port_journal import GLOBAL, Keeper

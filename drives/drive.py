@@ -6,8 +6,7 @@ import asyncio
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Protocol, TypeVar
 
-from multidrop.dialects.codec import Codec, Priority, Procedure
-from multidrop.dialects.errors import (
+from multidrop.base.errors import (
     Differs,
     DriveError,
     Inexpressible,
@@ -17,9 +16,10 @@ from multidrop.dialects.errors import (
     Stopped,
     Unreferenced,
 )
+from multidrop.base.files import SourceLine
+from multidrop.dialects.codec import Codec, Priority, Procedure
 from multidrop.dialects.families import FAMILIES, program_languages
 from multidrop.dialects.family import Family, Motion, Programs
-from multidrop.dialects.files import SourceLine
 from multidrop.dialects.program_files import Held, ProgramFiles
 from multidrop.dialects.state import DriveState
 from multidrop.dialects.values import Value

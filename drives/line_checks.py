@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from multidrop.dialects.errors import Inexpressible
+from multidrop.base.errors import Inexpressible
 from multidrop.drives.port_journal import GLOBAL
 
 

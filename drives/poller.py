@@ -12,7 +12,8 @@ from dataclasses import dataclass
 from math import inf
 from typing import Any, Generic, TypeVar
 
-from multidrop.dialects import DriveError, End, NoAnswer, Refused
+from multidrop.base.errors import DriveError, NoAnswer, Refused
+from multidrop.dialects import End
 from multidrop.drives.conversations import Conversation, OnOver
 from multidrop.drives.drive import Drive
 from multidrop.drives.events import Outcome, isolated

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import Any, TypeVar
 
-from multidrop.dialects import Refused
+from multidrop.base.errors import Refused
 from multidrop.dialects.family import Family, Protection
 from multidrop.drives.link import Link
 

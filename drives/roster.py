@@ -17,7 +17,8 @@ from dataclasses import replace
 from functools import partial
 from typing import Any
 
-from multidrop.dialects import DriveError, DriveState, Family, Hints, Motion, NoAnswer, StopPiece
+from multidrop.base.errors import DriveError, NoAnswer
+from multidrop.dialects import DriveState, Family, Hints, Motion, StopPiece
 from multidrop.dialects.families import FAMILIES, family_of
 from multidrop.dialects.values import Value
 from multidrop.drives.conversations import Conversations

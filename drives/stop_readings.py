@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from multidrop.dialects import DriveError, Stopped
+from multidrop.base.errors import DriveError, Stopped
 from multidrop.drives.drive import Drive
 from multidrop.drives.events import Sample
 from multidrop.transports import TransportLost

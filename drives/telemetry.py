@@ -23,7 +23,8 @@ from functools import partial
 from math import inf
 from typing import Any, NamedTuple
 
-from multidrop.dialects import DriveError, Motion, NoAnswer, Priority, Refused
+from multidrop.base.errors import DriveError, NoAnswer, Refused
+from multidrop.dialects import Motion, Priority
 from multidrop.dialects.values import Part
 from multidrop.dialects.values import Value as Fact
 from multidrop.drives.drive import Drive, Running

@@ -13,9 +13,9 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 from itertools import islice
 
-from multidrop.dialects import DriveError, Request
+from multidrop.base.errors import Diagnostic, DriveError
+from multidrop.dialects import Request
 from multidrop.dialects.codec import Codec
-from multidrop.dialects.errors import Diagnostic
 from multidrop.dialects.families import FAMILIES, program_languages
 from multidrop.dialects.mcode.host.codec import MCode
 from multidrop.dialects.pmx.host.codec import Pmx

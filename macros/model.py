@@ -14,9 +14,9 @@ import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
-from multidrop.dialects.errors import Diagnostic
-from multidrop.dialects.text import DECIMAL, counted, visible
-from multidrop.macros.atomic import reserved
+from multidrop.base.atomic import reserved
+from multidrop.base.errors import Diagnostic
+from multidrop.base.text import DECIMAL, counted, visible
 
 _UNIT = r"(?:(?:[mcu]?m|in|deg|rad|m?turn)(?:/s2?|/min)?|m?rpm)"
 _QUANTITY = rf"\{{{DECIMAL} [A-Za-z][A-Za-z0-9_/]*\}}"

@@ -12,8 +12,8 @@ from collections import deque
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 
-from multidrop.dialects.errors import Diagnostic
-from multidrop.dialects.text import visible
+from multidrop.base.errors import Diagnostic
+from multidrop.base.text import visible
 from multidrop.macros.model import Macro, Step, check_name, escape
 
 LONG = 1.0

@@ -15,10 +15,10 @@ from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
-from multidrop.dialects.errors import Diagnostic
-from multidrop.dialects.files import bounded, opened, utf8
-from multidrop.dialects.text import visible
-from multidrop.macros.atomic import create_atomically, make_folder, write_atomically
+from multidrop.base.atomic import create_atomically, make_folder, write_atomically
+from multidrop.base.errors import Diagnostic
+from multidrop.base.files import bounded, opened, utf8
+from multidrop.base.text import visible
 from multidrop.macros.model import FIRST_PAGE, KEYS, Macro, check, check_name, describe_clash, page_order
 from multidrop.macros.toml_format import format_macro, parse_macro, with_values
 

@@ -10,8 +10,8 @@ import tomllib
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from multidrop.dialects.errors import Diagnostic
-from multidrop.dialects.files import toml_keys, toml_of
+from multidrop.base.errors import Diagnostic
+from multidrop.base.files import toml_keys, toml_of
 from multidrop.macros.model import FIRST_PAGE, At, Macro, Step, check
 
 _HEAD = "# a macro of multidrop: lines as typed, with the seconds after the line before\n"

@@ -10,9 +10,9 @@ import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
-from multidrop.dialects.errors import Diagnostic
-from multidrop.dialects.files import lines_of
-from multidrop.dialects.text import visible
+from multidrop.base.errors import Diagnostic
+from multidrop.base.files import lines_of
+from multidrop.base.text import visible
 from multidrop.macros.model import KEYS, Macro, Step, escape, fill
 
 MOST = 10_000

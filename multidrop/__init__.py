@@ -40,16 +40,16 @@ if TYPE_CHECKING:
     from multidrop.api.telemetry import Sample as Sample
     from multidrop.api.telemetry import Samples as Samples
     from multidrop.api.telemetry import read_rrd as read_rrd
-    from multidrop.dialects.errors import Diagnostic as Diagnostic
-    from multidrop.dialects.errors import Differs as Differs
-    from multidrop.dialects.errors import DriveError as DriveError
-    from multidrop.dialects.errors import Inexpressible as Inexpressible
-    from multidrop.dialects.errors import MotionFailed as MotionFailed
-    from multidrop.dialects.errors import NoAnswer as NoAnswer
-    from multidrop.dialects.errors import Refused as Refused
-    from multidrop.dialects.errors import Stopped as Stopped
-    from multidrop.dialects.errors import Timeout as Timeout
-    from multidrop.dialects.errors import Unreferenced as Unreferenced
+    from multidrop.base.errors import Diagnostic as Diagnostic
+    from multidrop.base.errors import Differs as Differs
+    from multidrop.base.errors import DriveError as DriveError
+    from multidrop.base.errors import Inexpressible as Inexpressible
+    from multidrop.base.errors import MotionFailed as MotionFailed
+    from multidrop.base.errors import NoAnswer as NoAnswer
+    from multidrop.base.errors import Refused as Refused
+    from multidrop.base.errors import Stopped as Stopped
+    from multidrop.base.errors import Timeout as Timeout
+    from multidrop.base.errors import Unreferenced as Unreferenced
     from multidrop.transports import TransportLost as TransportLost
     from multidrop.transports import Unreachable as Unreachable
 
@@ -64,7 +64,7 @@ _PLACES = {
     "multidrop.api.sessions": "AsyncSession Run connect_async",
     "multidrop.api.simulated": "SimulatedCell simulate",
     "multidrop.api.telemetry": "AsyncTelemetry Sample Samples read_rrd",
-    "multidrop.dialects.errors": (
+    "multidrop.base.errors": (
         "Diagnostic Differs DriveError Inexpressible MotionFailed NoAnswer Refused Stopped Timeout Unreferenced"
     ),
     "multidrop.transports": "TransportLost Unreachable",

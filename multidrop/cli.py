@@ -15,7 +15,7 @@ from contextvars import copy_context
 from importlib.machinery import PathFinder
 from typing import TYPE_CHECKING, Any, NoReturn
 
-from multidrop.dialects.on_demand import imported
+from multidrop.base.on_demand import imported
 
 if TYPE_CHECKING:
     from _typeshed import SupportsWrite
@@ -161,7 +161,7 @@ def run(chosen: argparse.Namespace) -> int:
     """Run a parsed command; return the exit code. A Diagnostic, or a loss, is one line on standard error."""
     file, _, function = chosen.run_by.partition(".")
     command: Callable[[argparse.Namespace], int] = imported(f"multidrop.commands.{file}:{function}")
-    from multidrop.dialects.errors import Diagnostic
+    from multidrop.base.errors import Diagnostic
     from multidrop.shell.streams.stdout import fail
     from multidrop.transports import TransportLost
 

@@ -49,7 +49,7 @@ def multidrop_folders(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 @contextmanager
 def _faults_named() -> Iterator[None]:
-    from multidrop.dialects.errors import Diagnostic
+    from multidrop.base.errors import Diagnostic
 
     try:
         yield

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import asyncio
 
-from multidrop.dialects import DriveError, Stopped
+from multidrop.base.errors import DriveError, Stopped
 from multidrop.drives.drive import REST, Drive
 from multidrop.transports import TransportLost
 

@@ -15,7 +15,8 @@ from collections.abc import AsyncIterator, Callable, Collection, Iterator, Mappi
 from contextvars import ContextVar
 from dataclasses import dataclass, field
 
-from multidrop.dialects import Diagnostic, Started
+from multidrop.base.errors import Diagnostic
+from multidrop.dialects import Started
 from multidrop.drives.bus import Bus
 from multidrop.drives.drive import Drive
 from multidrop.drives.events import isolated

@@ -10,8 +10,8 @@ import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any, TypeVar
 
-from multidrop.dialects import Diagnostic
-from multidrop.dialects.files import split_lines, toml_keys, toml_names, toml_of, utf8_of
+from multidrop.base.errors import Diagnostic
+from multidrop.base.files import split_lines, toml_keys, toml_names, toml_of, utf8_of
 
 WAY = "--no-config goes on without the file"
 _HEADER = re.compile(r"\s*\[\[?([^\]]*)\]")

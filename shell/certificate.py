@@ -16,15 +16,15 @@ from dataclasses import dataclass, field
 from functools import partial
 from typing import Any
 
-from multidrop.dialects import Diagnostic, DriveError, NoAnswer, Refused, Stopped
+from multidrop.base import new_file
+from multidrop.base.errors import Diagnostic, DriveError, NoAnswer, Refused, Stopped
+from multidrop.base.files import escaped_toml, text_of, toml_of
+from multidrop.base.on_demand import imported
+from multidrop.base.text import counted
 from multidrop.dialects.certifying import BYTES, FITS, MOVES, Occupied, Question, owed, restored
-from multidrop.dialects.files import escaped_toml, text_of, toml_of
-from multidrop.dialects.on_demand import imported
-from multidrop.dialects.text import counted
 from multidrop.drives.conversations import refuse_stranger
 from multidrop.drives.drive import Drive
 from multidrop.drives.events import Concluded, Transaction
-from multidrop.shell import new_file
 from multidrop.shell.channel import running
 from multidrop.shell.events import By
 from multidrop.shell.session import TRAVEL, Session

@@ -13,7 +13,8 @@ from datetime import datetime, timedelta
 from functools import partial
 from typing import Any, TypeVar
 
-from multidrop.dialects import Diagnostic, Procedure, Stopped
+from multidrop.base.errors import Diagnostic, Stopped
+from multidrop.dialects import Procedure
 from multidrop.drives.drive import Drive
 from multidrop.drives.events import Publisher
 from multidrop.shell.events import By, Notified, Output, Progressed, SessionEvent, StateChanged, kind_of

@@ -45,12 +45,13 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from multidrop.dialects import Diagnostic
-from multidrop.dialects.files import opened, text_of, toml_of, utf8_of, why
-from multidrop.dialects.text import NOT_FIRST, acts_first, visible
-from multidrop.macros.atomic import write_atomically
+from multidrop.base.atomic import write_atomically
+from multidrop.base.errors import Diagnostic
+from multidrop.base.file_owners import other_writer, places
+from multidrop.base.files import opened, text_of, toml_of, utf8_of, why
+from multidrop.base.places import config_file, config_folder, data_folder, state_folder
+from multidrop.base.text import NOT_FIRST, acts_first, visible
 from multidrop.shell.broken_configuration import TABLES, WrongConfiguration, salvage
-from multidrop.shell.file_owners import other_writer, places
 from multidrop.shell.roles import TIMES
 
 if TYPE_CHECKING:
@@ -192,38 +193,6 @@ class Settings:
     def history(self) -> Path:
         """The file of the history, which the prompt and the TUI share."""
         return self.state / "history"
-
-
-def config_folder() -> Path:
-    """The folder of the configuration file and the macros; may not exist."""
-    if given := os.environ.get("MULTIDROP_CONFIG_DIR"):
-        return Path(given)
-    from platformdirs import user_config_path
-
-    return user_config_path("multidrop", appauthor=False)
-
-
-def state_folder() -> Path:
-    """The folder of the state kept between runs; may not exist."""
-    if given := os.environ.get("MULTIDROP_STATE_DIR"):
-        return Path(given)
-    from platformdirs import user_state_path
-
-    return user_state_path("multidrop", appauthor=False)
-
-
-def data_folder() -> Path:
-    """The folder of the backups; may not exist."""
-    if given := os.environ.get("MULTIDROP_DATA_DIR"):
-        return Path(given)
-    from platformdirs import user_data_path
-
-    return user_data_path("multidrop", appauthor=False)
-
-
-def config_file() -> Path:
-    """The configuration file; may not exist."""
-    return config_folder() / "multidrop.toml"
 
 
 def load(lenient: bool = False) -> Settings:

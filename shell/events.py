@@ -10,7 +10,7 @@ from enum import Enum
 from math import ceil
 from typing import NamedTuple
 
-from multidrop.dialects import Diagnostic, DriveError
+from multidrop.base.errors import Diagnostic, DriveError
 from multidrop.dialects.values import Readings
 from multidrop.drives.events import BusEvent
 from multidrop.transports import TransportLost

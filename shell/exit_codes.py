@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from multidrop.dialects import Diagnostic, DriveError, Stopped
+from multidrop.base.errors import Diagnostic, DriveError, Stopped
 from multidrop.transports import TransportLost
 
 CODES: tuple[tuple[type[BaseException], int], ...] = (

@@ -15,7 +15,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, NamedTuple
 
-from multidrop.dialects import Diagnostic
+from multidrop.base.errors import Diagnostic
 
 if TYPE_CHECKING:
     from multidrop.macros import Macro

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from functools import partial
 
-from multidrop.dialects import Diagnostic
+from multidrop.base.errors import Diagnostic
 from multidrop.macros import Macro, checked_values, is_role, missing
 from multidrop.macros.model import written
 from multidrop.shell.channel import Field

@@ -11,13 +11,13 @@ from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
-from multidrop.dialects import Diagnostic
-from multidrop.dialects.files import text_of
-from multidrop.dialects.text import counted
+from multidrop.base import new_file
+from multidrop.base.atomic import write_atomically
+from multidrop.base.errors import Diagnostic
+from multidrop.base.files import text_of
+from multidrop.base.text import counted
 from multidrop.macros import FIRST_PAGE, MacroStore, format_macro
-from multidrop.macros.atomic import write_atomically
 from multidrop.macros.vendor import REMARK, STOP, exported, imported, is_key_name
-from multidrop.shell import new_file
 
 OFF = "off"
 """In place of a macro: the key is freed."""

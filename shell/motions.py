@@ -13,8 +13,8 @@ from contextvars import ContextVar
 from dataclasses import replace
 from typing import TypeVar
 
-from multidrop.dialects import Inexpressible, NoAnswer, Procedure, Refused, Stopped
-from multidrop.dialects.errors import MotionFailed
+from multidrop.base.errors import Inexpressible, MotionFailed, NoAnswer, Refused, Stopped
+from multidrop.dialects import Procedure
 from multidrop.dialects.motions import NO_MOTIONS, NO_SIGNS, Ending, Evidence, Motions, MoveKind, Outcome, Signs, joined
 from multidrop.dialects.state import DriveState
 from multidrop.drives.drive import NOT_SENT, Check, Drive, still

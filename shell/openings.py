@@ -12,7 +12,7 @@ from itertools import count
 from math import inf
 from typing import Any, TypeVar
 
-from multidrop.dialects import Diagnostic, DriveError, NoAnswer
+from multidrop.base.errors import Diagnostic, DriveError, NoAnswer
 from multidrop.drives.bus import Bus
 from multidrop.drives.drive import Drive
 from multidrop.drives.echoes import LocalEcho
@@ -178,7 +178,7 @@ class Openings:
         Diagnostic where a person does not agree or nothing can be searched, and the failures of a port.
         """
         from multidrop.shell.finding.scanning import Scanning, url_of
-        from multidrop.shell.state.store import note
+        from multidrop.shell.state.opened import note
 
         workspace, record, connection = self._workspace, self._workspace.of(bus), self._workspace.of(bus).connection
         assert connection is not None, bus.name

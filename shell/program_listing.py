@@ -7,13 +7,14 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from multidrop.dialects import Diagnostic, SourceLine
+from multidrop.base import new_file
+from multidrop.base.errors import Diagnostic
+from multidrop.base.files import SourceLine
+from multidrop.base.text import counted
 from multidrop.dialects.family import Programs
 from multidrop.dialects.program_files import Held, Stored
-from multidrop.dialects.text import counted
 from multidrop.dialects.values import Readings
 from multidrop.drives.drive import Drive
-from multidrop.shell import new_file
 from multidrop.shell.channel import Channel, running, transferring
 from multidrop.shell.events import Phase, ProgramRead, ProgramSeen, SettingsRead
 from multidrop.shell.line_syntax import EVERYONE

@@ -12,7 +12,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any
 
-from multidrop.dialects.text import counted, visible
+from multidrop.base.text import counted, visible
 from multidrop.shell.channel import Channel
 
 EVEN_NOW = "/stop"

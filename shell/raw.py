@@ -11,7 +11,8 @@ from collections.abc import Callable, Iterator, Sequence
 from enum import Enum
 from typing import TYPE_CHECKING
 
-from multidrop.dialects import Diagnostic, Priority, Stopped
+from multidrop.base.errors import Diagnostic, Stopped
+from multidrop.dialects import Priority
 from multidrop.drives.events import Ended, Sent, Traffic
 from multidrop.drives.half_line import HalfLine
 from multidrop.shell.events import Bytes

@@ -9,7 +9,8 @@ from collections.abc import Callable, Mapping, Sequence
 from contextvars import ContextVar
 from weakref import WeakKeyDictionary
 
-from multidrop.dialects import DriveError, Priority
+from multidrop.base.errors import DriveError
+from multidrop.dialects import Priority
 from multidrop.dialects.codec import at_priority
 from multidrop.dialects.program_files import Held
 from multidrop.drives.bus import Bus

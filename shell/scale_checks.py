@@ -8,7 +8,8 @@ from contextlib import suppress
 from typing import TYPE_CHECKING
 from weakref import WeakKeyDictionary
 
-from multidrop.dialects import DriveError, Priority
+from multidrop.base.errors import DriveError
+from multidrop.dialects import Priority
 from multidrop.drives.events import Sample
 from multidrop.drives.recount import recount
 from multidrop.shell.events import OnBus, SessionEvent, SettingsRead

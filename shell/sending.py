@@ -10,8 +10,8 @@ import contextlib
 from collections.abc import AsyncIterator
 from dataclasses import dataclass
 
-from multidrop.dialects import Inexpressible, Refused, Started
-from multidrop.dialects.errors import Differs
+from multidrop.base.errors import Differs, Inexpressible, Refused
+from multidrop.dialects import Started
 from multidrop.drives.drive import Drive
 from multidrop.drives.port_journal import GLOBAL
 from multidrop.shell import at_rest

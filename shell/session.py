@@ -16,8 +16,8 @@ from contextvars import ContextVar
 from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any
 
-from multidrop.dialects import Diagnostic, DriveError, Refused, Stopped
-from multidrop.dialects.on_demand import imported
+from multidrop.base.errors import Diagnostic, DriveError, Refused, Stopped
+from multidrop.base.on_demand import imported
 from multidrop.drives.bus import Bus
 from multidrop.drives.drive import Drive
 from multidrop.drives.events import Restarted

@@ -5,14 +5,15 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 
-from multidrop.dialects import Diagnostic, DriveError, Stopped
+from multidrop.base import new_file
+from multidrop.base.errors import Diagnostic, DriveError, Stopped
+from multidrop.base.text import counted
 from multidrop.dialects.program_files import Held, Stored
-from multidrop.dialects.text import counted
 from multidrop.dialects.units import Scale
 from multidrop.dialects.values import Snapshot
 from multidrop.drives.bus import Bus
 from multidrop.drives.drive import Drive
-from multidrop.shell import new_file, program_listing
+from multidrop.shell import program_listing
 from multidrop.shell.channel import running, transferring
 from multidrop.shell.workspace import Workspace
 from multidrop.simulator import cells

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from datetime import datetime
 from typing import TypeVar
 
-from multidrop.dialects.text import counted
+from multidrop.base.text import counted
 
 LIMIT = 64 * 1024
 """The largest number of bytes that wait for a reader, except those to keep."""

@@ -16,8 +16,8 @@ from functools import partial
 from typing import TYPE_CHECKING, NamedTuple
 from weakref import WeakKeyDictionary
 
-from multidrop.dialects import Diagnostic, DriveError, Procedure, Refused
-from multidrop.dialects.errors import Differs
+from multidrop.base.errors import Diagnostic, Differs, DriveError, Refused
+from multidrop.dialects import Procedure
 from multidrop.dialects.units import (
     PLACES,
     SHORT,

@@ -14,8 +14,8 @@ from dataclasses import dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
-from multidrop.dialects import Diagnostic, DriveError, Motion, NoAnswer
-from multidrop.dialects.errors import Timeout
+from multidrop.base.errors import Diagnostic, DriveError, NoAnswer, Timeout
+from multidrop.dialects import Motion
 from multidrop.drives.bus import Bus
 from multidrop.drives.drive import REST, Check, Drive, Running, confirmed_motion
 from multidrop.shell.line_syntax import EVERYONE

@@ -15,8 +15,8 @@ from dataclasses import dataclass, field
 from functools import partial
 from typing import TYPE_CHECKING
 
-from multidrop.dialects import Diagnostic, NoAnswer
-from multidrop.dialects.text import acts_first
+from multidrop.base.errors import Diagnostic, NoAnswer
+from multidrop.base.text import acts_first
 from multidrop.drives.events import BusEvent, Changed, Conditioned, Lost, Notice, Sample, Unsolicited, isolated
 from multidrop.macros import MacroStore, Recorder
 from multidrop.shell import stop_report

@@ -12,9 +12,9 @@ from importlib.resources.abc import Traversable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from multidrop.dialects import Diagnostic
-from multidrop.dialects.files import toml_of, utf8_of
-from multidrop.dialects.text import NOT_FIRST, acts_first
+from multidrop.base.errors import Diagnostic
+from multidrop.base.files import toml_of, utf8_of
+from multidrop.base.text import NOT_FIRST, acts_first
 from multidrop.dialects.units import check_own
 from multidrop.simulator.cell.drive_keys import check_inside
 from multidrop.simulator.cell.spec import BusSpec, Cell, DriveSpec, Endpoint, Faults, MotorSpec

@@ -8,8 +8,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, NamedTuple
 
-from multidrop.dialects import Diagnostic
-from multidrop.dialects.on_demand import OnDemand
+from multidrop.base.errors import Diagnostic
+from multidrop.base.on_demand import OnDemand
 
 if TYPE_CHECKING:
     from multidrop.simulator.family import Family, Snapshots

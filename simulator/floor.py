@@ -11,8 +11,8 @@ from dataclasses import dataclass
 from functools import partial
 from random import Random
 
-from multidrop.dialects import Diagnostic
-from multidrop.dialects.text import whole
+from multidrop.base.errors import Diagnostic
+from multidrop.base.text import whole
 from multidrop.simulator import USAGES
 from multidrop.simulator.cell.spec import BusSpec, Cell, DriveSpec
 from multidrop.simulator.families import BY_PERSONALITY, family_of

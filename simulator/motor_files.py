@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 from itertools import pairwise
 
-from multidrop.dialects.files import LARGEST, split_lines
+from multidrop.base.files import LARGEST, split_lines
 from multidrop.simulator.cell.drive_keys import read_file
 from multidrop.simulator.cell.spec import DriveSpec, MotorSpec
 from multidrop.simulator.cell.table import Folder, Table, quoted

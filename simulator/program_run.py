@@ -8,7 +8,7 @@ from math import inf
 from types import MappingProxyType
 from typing import Any, NamedTuple, Protocol
 
-from multidrop.dialects import Diagnostic
+from multidrop.base.errors import Diagnostic
 from multidrop.dialects.program_files import Problem
 from multidrop.simulator.cell.spec import DriveSpec
 

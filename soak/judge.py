@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 from enum import Enum
 from typing import Any
 
-from multidrop.dialects import Refused
+from multidrop.base.errors import Refused
 from multidrop.simulator.lexium.device import MCodeDevice
 
 

@@ -21,7 +21,7 @@ from pathlib import Path
 from random import Random
 from typing import Any
 
-from multidrop.dialects import Diagnostic
+from multidrop.base.errors import Diagnostic
 from multidrop.macros import MacroStore
 from multidrop.shell.configuration import Settings
 from multidrop.shell.events import Notified

@@ -16,7 +16,7 @@ from pathlib import Path
 from random import Random
 from typing import Any
 
-from multidrop.dialects import DriveError
+from multidrop.base.errors import DriveError
 from multidrop.drives.events import Notice
 from multidrop.shell.configuration import Settings
 from multidrop.shell.connect.opening import open_port

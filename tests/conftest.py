@@ -13,7 +13,8 @@ from typing import Any
 import pytest
 from hypothesis import HealthCheck, settings
 
-from multidrop.dialects import DriveState, End, Procedure, Reply, Stopped
+from multidrop.base.errors import Stopped
+from multidrop.dialects import DriveState, End, Procedure, Reply
 from multidrop.dialects.families import family_of
 from multidrop.dialects.mcode.host.codec import MCode
 from multidrop.drives.events import Unsolicited

@@ -26,7 +26,7 @@ from textual.geometry import Size
 from textual.message import Message
 from textual.screen import Screen
 
-from multidrop.dialects import Diagnostic
+from multidrop.base.errors import Diagnostic
 from multidrop.drives.events import Unsolicited
 from multidrop.shell.broken_configuration import placed, placed_in_file
 from multidrop.shell.configuration import DEFAULT_LOOK, Look, Settings, parse

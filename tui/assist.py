@@ -9,7 +9,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
-from multidrop.dialects.on_demand import imported
+from multidrop.base.on_demand import imported
 from multidrop.shell.state.backups import Drafts
 from multidrop.tui.text import ago
 
@@ -81,7 +81,7 @@ class Assist:
 
     def lately(self) -> Sequence[StartEntry]:
         """URLs opened lately, the newest first; saved connections are listed themselves."""
-        from multidrop.shell.state.store import lately
+        from multidrop.shell.state.opened import lately
 
         now, saved = time.time(), self._settings.connections
         found = [each for each in lately(self._settings.state) if each.url not in saved]
@@ -89,7 +89,7 @@ class Assist:
 
     async def opened(self, url: str) -> None:
         """Keep a URL that was opened."""
-        from multidrop.shell.state.store import note
+        from multidrop.shell.state.opened import note
 
         await asyncio.to_thread(note, self._settings.state, url)
 

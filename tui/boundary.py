@@ -32,8 +32,8 @@ from textual.widget import Widget
 from textual.widgets import Static
 from textual.worker import WorkerFailed
 
+from multidrop.base.atomic import make_folder
 from multidrop.drives.events import LOG
-from multidrop.macros.atomic import make_folder
 
 T = TypeVar("T")
 

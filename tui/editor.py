@@ -15,7 +15,8 @@ from textual.binding import Binding, BindingType
 from textual.strip import Strip
 from textual.widgets import TextArea
 
-from multidrop.dialects import Diagnostic
+from multidrop.base import places
+from multidrop.base.errors import Diagnostic
 from multidrop.dialects.program_files import Entry, Part, Problem
 from multidrop.macros import parse_macro
 from multidrop.shell import configuration
@@ -76,7 +77,7 @@ Grammar = MacroGrammar | ProgramGrammar
 
 
 def grammar_of(file: str) -> Grammar:
-    if Path(file) == configuration.config_file().absolute():
+    if Path(file) == places.config_file().absolute():
         return ConfigurationGrammar(file)
     return MacroGrammar(file) if file.lower().endswith(".toml") else ProgramGrammar(file)
 

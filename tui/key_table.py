@@ -15,7 +15,7 @@ from typing import Any, ClassVar, NamedTuple
 
 from textual.binding import Binding, BindingType
 
-from multidrop.dialects.files import rows
+from multidrop.base.files import rows
 from multidrop.tui.text import key_words
 
 NONE = "no-key-"

@@ -16,8 +16,8 @@ from dataclasses import dataclass, field, replace
 from textual.binding import Binding, BindingType
 from textual.keys import Keys
 
-from multidrop.dialects import Diagnostic
-from multidrop.dialects.text import visible
+from multidrop.base.errors import Diagnostic
+from multidrop.base.text import visible
 from multidrop.macros import Macro, MacroStore
 from multidrop.macros.model import FIRST_PAGE, KEYS, describe_clash, page_order
 from multidrop.tui.key_table import NONE

@@ -12,8 +12,8 @@ from functools import partial
 
 from textual.driver import Driver
 
-from multidrop.dialects import Diagnostic
-from multidrop.dialects.on_demand import importing
+from multidrop.base.errors import Diagnostic
+from multidrop.base.on_demand import importing
 from multidrop.shell.automation import stop_key_trial
 from multidrop.shell.configuration import Settings
 from multidrop.shell.console import swallows

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 from textual.app import App
 
-from multidrop.dialects.text import counted
+from multidrop.base.text import counted
 from multidrop.shell.quitting import not_sent
 from multidrop.shell.session import Session
 from multidrop.tui.outbox import Outbox

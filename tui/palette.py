@@ -9,7 +9,7 @@ from typing import NamedTuple
 from rich.text import Text
 from textual.fuzzy import Matcher
 
-from multidrop.dialects.files import rows
+from multidrop.base.files import rows
 from multidrop.shell.session import Session
 from multidrop.tui.key_table import SHEETS, all_groups
 from multidrop.tui.keymap import FunctionKeys, Keymap

@@ -6,9 +6,9 @@ import asyncio
 from collections.abc import Sequence
 from datetime import datetime, timedelta
 
-from multidrop.dialects import Diagnostic
-from multidrop.dialects.text import counted, visible
-from multidrop.shell import new_file
+from multidrop.base import new_file
+from multidrop.base.errors import Diagnostic
+from multidrop.base.text import counted, visible
 from multidrop.shell.channel import Front
 from multidrop.shell.roles import Filter, Transcripts
 from multidrop.tui.actions import Actions, Parts

@@ -6,7 +6,7 @@ import re
 
 from rich.cells import cell_len, chop_cells, set_cell_size
 
-from multidrop.dialects.text import visible as written_out
+from multidrop.base.text import visible as written_out
 
 LONGEST = 4096
 """Greatest number of characters shown of one line; noise without line ends has any length."""

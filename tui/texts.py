@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
 
-from multidrop.dialects import Diagnostic
+from multidrop.base.errors import Diagnostic
 from multidrop.shell.programs.edited_file import EditedFile, real_text
 from multidrop.shell.state.backups import Copy, Drafts
 

@@ -13,8 +13,8 @@ import re
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
-from multidrop.dialects.files import split_lines
-from multidrop.dialects.text import counted
+from multidrop.base.files import split_lines
+from multidrop.base.text import counted
 from multidrop.shell.events import FAILURES
 from multidrop.shell.line_syntax import Place
 from multidrop.shell.session import Session

@@ -16,7 +16,8 @@ from pathlib import Path
 
 from textual.driver import Driver
 
-from multidrop.dialects import Diagnostic, Hints
+from multidrop.base.errors import Diagnostic
+from multidrop.dialects import Hints
 from multidrop.dialects.families import FAMILIES
 from multidrop.drives.bus import Bus
 from multidrop.drives.events import BusEvent

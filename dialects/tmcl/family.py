@@ -9,8 +9,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+from multidrop.base.files import rows
 from multidrop.dialects.family import ADDRESSES, EVERYONE, Family, Guard, Guards, to_all
-from multidrop.dialects.files import rows
 from multidrop.dialects.tmcl.host import codec, operations
 from multidrop.dialects.tmcl.host.codec import STOP_BYTES, Tmcl, TmclState
 from multidrop.dialects.tmcl.host.operations import identify

@@ -29,7 +29,7 @@ from multidrop.api.sessions import AsyncSession, Notice, log
 from multidrop.api.streams import AsyncStream
 from multidrop.api.telemetry import RATE, AsyncTelemetry, Sample, Samples
 from multidrop.api.threads import Ended, LoopThread, Notices
-from multidrop.dialects import Diagnostic
+from multidrop.base.errors import Diagnostic
 from multidrop.drives.telemetry import PERIOD
 from multidrop.shell.events import FAILURES
 from multidrop.transports import TransportLost

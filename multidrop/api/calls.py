@@ -17,7 +17,7 @@ from weakref import WeakKeyDictionary, WeakSet
 from multidrop.api.returns import Returns
 from multidrop.api.streams import AsyncStream
 from multidrop.api.telemetry import AsyncTelemetry
-from multidrop.dialects import Diagnostic, Stopped
+from multidrop.base.errors import Diagnostic, Stopped
 from multidrop.drives.conversations import refuse_stranger
 from multidrop.drives.drive import Drive
 from multidrop.shell import stop_report

@@ -16,8 +16,9 @@ from multidrop.api.fixed import Fixed
 from multidrop.api.pictures import table
 from multidrop.api.programs import AsyncParameters, AsyncPrograms
 from multidrop.api.values import seconds, short_text_of, text_of
-from multidrop.dialects import Diagnostic, DriveError, Family, Inexpressible, Motion, Refused
-from multidrop.dialects.text import visible
+from multidrop.base.errors import Diagnostic, DriveError, Inexpressible, Refused
+from multidrop.base.text import visible
+from multidrop.dialects import Family, Motion
 from multidrop.dialects.units import QUANTITY
 from multidrop.dialects.values import DISABLE, ENABLE, Conditions
 from multidrop.dialects.values import Value as Fact

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 
 from multidrop.api.calls import Calls
 from multidrop.api.fixed import Fixed
-from multidrop.shell import new_file, program_listing
+from multidrop.base import new_file
+from multidrop.shell import program_listing
 from multidrop.shell.params import file as files
 from multidrop.shell.params.work import Difference, Options, differences, restore
 from multidrop.shell.programs import transfers

@@ -14,7 +14,8 @@ import contextlib
 from collections.abc import Mapping
 from typing import NamedTuple
 
-from multidrop.dialects import DriveError, NoAnswer, Priority, Refused
+from multidrop.base.errors import DriveError, NoAnswer, Refused
+from multidrop.dialects import Priority
 from multidrop.dialects.values import Value, differing
 from multidrop.drives.bus import Bus
 from multidrop.drives.drive import Drive

@@ -20,8 +20,7 @@ from multidrop.api.pictures import drives_table, table
 from multidrop.api.returns import Returns
 from multidrop.api.telemetry import RATE, AsyncTelemetry
 from multidrop.api.values import seconds, text_of
-from multidrop.dialects import Diagnostic, DriveError
-from multidrop.dialects.errors import Timeout
+from multidrop.base.errors import Diagnostic, DriveError, Timeout
 from multidrop.drives.events import isolated
 from multidrop.drives.telemetry import PERIOD
 from multidrop.shell import stop_report, waits

@@ -8,7 +8,7 @@ from contextlib import AsyncExitStack
 from types import TracebackType
 
 from multidrop.api.threads import LoopThread
-from multidrop.dialects import Diagnostic
+from multidrop.base.errors import Diagnostic
 from multidrop.dialects.families import TABLE
 from multidrop.shell import configuration
 from multidrop.simulator import cells

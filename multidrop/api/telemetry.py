@@ -11,8 +11,8 @@ from typing import Any, NamedTuple, SupportsIndex, overload
 
 from multidrop.api.pictures import Curve, plot
 from multidrop.api.streams import AsyncStream
-from multidrop.dialects import Diagnostic
-from multidrop.dialects.files import why
+from multidrop.base.errors import Diagnostic
+from multidrop.base.files import why
 from multidrop.dialects.units import Takes
 from multidrop.drives.drive import Drive
 from multidrop.drives.events import Lost

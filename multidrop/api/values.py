@@ -6,7 +6,7 @@ import math
 import operator
 from typing import Any
 
-from multidrop.dialects import Diagnostic
+from multidrop.base.errors import Diagnostic
 from multidrop.macros import model
 from multidrop.shell.scripts.expression import written
 

@@ -9,13 +9,14 @@ from collections.abc import Awaitable, Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from multidrop.dialects import Diagnostic
+from multidrop.base import new_file
+from multidrop.base.errors import Diagnostic
+from multidrop.base.files import program_text_of
+from multidrop.base.new_file import STANDARD_OUTPUT
 from multidrop.dialects.families import correct_in, program_language_of, program_languages
-from multidrop.dialects.files import program_text_of
-from multidrop.shell import certificate, configuration, new_file, program_listing, snapshots
+from multidrop.shell import certificate, configuration, program_listing, snapshots
 from multidrop.shell.batch import runner
 from multidrop.shell.line_syntax import split_target
-from multidrop.shell.new_file import STANDARD_OUTPUT
 from multidrop.shell.params import file as files
 from multidrop.shell.params import replacement, work
 from multidrop.shell.params.work import Options, check_new, each, file_of, is_several, make_place, targets

@@ -9,8 +9,8 @@ from functools import partial
 from shlex import quote
 from typing import TYPE_CHECKING
 
-from multidrop.dialects import Diagnostic
-from multidrop.dialects.on_demand import importing
+from multidrop.base.errors import Diagnostic
+from multidrop.base.on_demand import importing
 
 if TYPE_CHECKING:
     from multidrop.dialects.family import Language

@@ -17,8 +17,8 @@ from dataclasses import replace as replaced
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from multidrop.dialects import Diagnostic
-from multidrop.dialects.text import counted, visible
+from multidrop.base.errors import Diagnostic
+from multidrop.base.text import counted, visible
 from multidrop.shell import configuration
 from multidrop.shell.line_syntax import join_target
 from multidrop.shell.log import files, steps

@@ -13,13 +13,14 @@ from datetime import date, datetime
 from importlib.metadata import PackageNotFoundError, requires, version
 from pathlib import Path
 
-from multidrop.dialects import Diagnostic
-from multidrop.dialects.files import bounded, opened, split_lines, toml_of, utf8_of, why
-from multidrop.dialects.text import visible
+from multidrop.base import places
+from multidrop.base.errors import Diagnostic
+from multidrop.base.files import bounded, opened, split_lines, toml_of, utf8_of, why
+from multidrop.base.new_file import STANDARD_OUTPUT
+from multidrop.base.text import visible
 from multidrop.macros import MacroStore
 from multidrop.shell import configuration
 from multidrop.shell.configuration import Settings
-from multidrop.shell.new_file import STANDARD_OUTPUT
 from multidrop.shell.secrets import HIDDEN, holds_password, toml_without_secrets, url_without_secrets, without_secrets
 from multidrop.shell.streams.stdout import write
 
@@ -48,14 +49,14 @@ def not_in_force(found: Settings) -> str:
 
 
 def path(chosen: argparse.Namespace) -> int:
-    write(sys.stdout, str(configuration.config_file()))
+    write(sys.stdout, str(places.config_file()))
     return 0
 
 
 def show(chosen: argparse.Namespace) -> int:
     """Print every setting as TOML; a remark marks those that the file does not set."""
     found = configuration.load()
-    for line in shown(found, _keys(found), _text(configuration.config_file())):
+    for line in shown(found, _keys(found), _text(places.config_file())):
         write(sys.stdout, line)
     return 0
 
@@ -73,7 +74,7 @@ def shown(found: Settings, keys: dict[str, str], text: str) -> list[str]:
         remarks = {key: REFUSED if key in refused else "" if key in has else "   # default" for key in values}
         return ["", f"[{table}]", *(f"{key} = {tomlkit.item(values[key]).as_string()}{remarks[key]}" for key in values)]
 
-    lines = [f"# {configuration.config_file()}" + ("" if text else " does not exist: all settings are the defaults")]
+    lines = [f"# {places.config_file()}" + ("" if text else " does not exist: all settings are the defaults")]
     for name, each in found.connections.items():
         url = url_without_secrets(each.url) if holds_password(each.url) else each.url
         lines += ["", f"[connections.{name}]", f"url = {tomlkit.item(url).as_string()}"]
@@ -96,14 +97,14 @@ def shown(found: Settings, keys: dict[str, str], text: str) -> list[str]:
 def check(chosen: argparse.Namespace) -> int:
     """Report what is wrong; exit code 0 if nothing is."""
     found = configuration.load(lenient=True)
-    text = _text(configuration.config_file())
+    text = _text(places.config_file())
     from multidrop.tui.app import look_troubles
 
-    troubles = look_troubles(found, text, str(configuration.config_file()))
+    troubles = look_troubles(found, text, str(places.config_file()))
     write(sys.stderr, *map(str, (*found.problems, *troubles)))
     if not (troubles or found.problems):
         state = "is right" if text else "does not exist: all settings are the defaults"
-        write(sys.stdout, f"{configuration.config_file()} {state}")
+        write(sys.stdout, f"{places.config_file()} {state}")
     return WRONG if troubles or found.problems else 0
 
 
@@ -207,7 +208,7 @@ def _terminal() -> Iterator[str]:
 
 
 def _configuration() -> Iterator[str]:
-    path = configuration.config_file()
+    path = places.config_file()
     yield str(path)
     try:
         with opened(path) as file:
@@ -231,7 +232,7 @@ def _configuration() -> Iterator[str]:
 
 def _macros() -> Iterator[str]:
     """The names of the macros; the problem of a file in place of its contents."""
-    store = MacroStore(configuration.config_folder() / "macros")
+    store = MacroStore(places.config_folder() / "macros")
     yield str(store.folder)
     try:
         names = store.names()
@@ -259,7 +260,7 @@ def _ports() -> Iterator[str]:
 
 def _state() -> Iterator[str]:
     """The files of the state folder. Their contents stay: the history has what was typed."""
-    folder = configuration.state_folder()
+    folder = places.state_folder()
     yield str(folder)
     try:
         files = sorted(path for path in folder.rglob("*") if path.is_file())

@@ -8,8 +8,8 @@ import sys
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
-from multidrop.dialects import Diagnostic
-from multidrop.dialects.files import bounded, utf8, why
+from multidrop.base.errors import Diagnostic
+from multidrop.base.files import bounded, utf8, why
 from multidrop.macros import Macro, MacroStore, format_macro, missing
 from multidrop.macros.store import begin_draft, finish_draft, listed
 from multidrop.shell import macro_changes

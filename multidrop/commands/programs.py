@@ -13,9 +13,9 @@ import time
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
-from multidrop.dialects import Diagnostic
+from multidrop.base.errors import Diagnostic
+from multidrop.base.text import counted
 from multidrop.dialects.program_files import errors
-from multidrop.dialects.text import counted
 from multidrop.shell.programs.checking import Checked, examine, rewrite, to_run
 from multidrop.shell.streams.stdout import fail, reader_left, shortened, write
 
@@ -134,7 +134,7 @@ SHOWN = 10
 
 def convert(chosen: argparse.Namespace) -> int:
     """Convert a file; 1: something cannot be converted, so nothing is written, or a run beside the original differs."""
-    from multidrop.shell import new_file
+    from multidrop.base import new_file
     from multidrop.shell.programs import checking
     from multidrop.shell.streams.stdout import StatusLine
 

@@ -26,8 +26,8 @@ import multidrop
 from multidrop import script
 from multidrop.api.blocking import Session
 from multidrop.api.sessions import Notice
-from multidrop.dialects import Diagnostic, Stopped
-from multidrop.dialects.files import bytes_of
+from multidrop.base.errors import Diagnostic, Stopped
+from multidrop.base.files import bytes_of
 from multidrop.shell.batch.report import Report
 from multidrop.shell.events import FAILURES, Entered, Output, Printed, SessionEvent
 from multidrop.shell.exit_codes import INTERRUPTED, exit_code

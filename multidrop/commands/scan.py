@@ -8,7 +8,7 @@ import shlex
 from dataclasses import replace
 from functools import partial
 
-from multidrop.dialects import Diagnostic
+from multidrop.base.errors import Diagnostic
 from multidrop.shell import configuration
 from multidrop.shell.batch import runner
 from multidrop.shell.connect.opening import open_buses

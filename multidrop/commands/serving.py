@@ -11,7 +11,7 @@ import signal
 import sys
 from types import FrameType
 
-from multidrop.dialects import Diagnostic
+from multidrop.base.errors import Diagnostic
 from multidrop.shell.streams.stdout import fail, write
 
 FILES = {"bash": "multidrop.bash", "zsh": "_multidrop", "fish": "multidrop.fish", "powershell": "multidrop.ps1"}
@@ -104,7 +104,7 @@ def relay(chosen: argparse.Namespace) -> int:
                 f"open ssh://THIS-HOST{chosen.port} on the other machine",
             )
         if chosen.port.startswith("screen:"):
-            from multidrop.shell.configuration import state_folder
+            from multidrop.base.places import state_folder
             from multidrop.shell.watching.join import connect, splice
 
             splice(connect(chosen.port.partition(":")[2], state_folder() / "screens"))

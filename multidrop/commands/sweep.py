@@ -16,10 +16,10 @@ from datetime import datetime
 from functools import partial
 from pathlib import Path
 
-from multidrop.dialects import Diagnostic
-from multidrop.dialects.files import why
-from multidrop.dialects.text import counted
-from multidrop.macros.atomic import write_atomically
+from multidrop.base.atomic import write_atomically
+from multidrop.base.errors import Diagnostic
+from multidrop.base.files import why
+from multidrop.base.text import counted
 from multidrop.shell import configuration
 from multidrop.shell.batch.report import Case as JUnitCase
 from multidrop.shell.batch.report import JUnitFile, check_place

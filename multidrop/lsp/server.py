@@ -17,7 +17,7 @@ from pygls.protocol import LanguageServerProtocol
 from pygls.protocol.json_rpc import RPCRequest
 
 import multidrop
-from multidrop.dialects import Diagnostic
+from multidrop.base.errors import Diagnostic
 from multidrop.dialects.program_files import Problem
 from multidrop.lsp import replies
 from multidrop.lsp.replies import DELAY, Document, Documents, Positions

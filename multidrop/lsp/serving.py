@@ -20,7 +20,7 @@ from types import FrameType
 from pygls.exceptions import JsonRpcException
 from pygls.io_ import run_async
 
-from multidrop.dialects import Diagnostic
+from multidrop.base.errors import Diagnostic
 from multidrop.lsp.server import Server
 from multidrop.shell.signals import SIGNALS
 from multidrop.transports.sockets import exposed

@@ -18,8 +18,8 @@ from collections.abc import AsyncIterator, Callable, Mapping, Sequence
 from concurrent.futures import Executor, ThreadPoolExecutor, wait
 from typing import TYPE_CHECKING, Any
 
-from multidrop.dialects import Diagnostic, DriveError, Stopped
-from multidrop.dialects.text import counted
+from multidrop.base.errors import Diagnostic, DriveError, Stopped
+from multidrop.base.text import counted
 from multidrop.shell import waits
 from multidrop.shell.automation import outcome, settled
 from multidrop.shell.events import By, Printed, SessionEvent

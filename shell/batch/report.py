@@ -16,11 +16,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 from xml.etree import ElementTree
 
-from multidrop.dialects import Diagnostic
-from multidrop.dialects.files import LARGEST_PROGRAM, bytes_of, why
-from multidrop.dialects.text import counted, visible
-from multidrop.macros.atomic import write_atomically
-from multidrop.shell import new_file
+from multidrop.base import new_file
+from multidrop.base.atomic import write_atomically
+from multidrop.base.errors import Diagnostic
+from multidrop.base.files import LARGEST_PROGRAM, bytes_of, why
+from multidrop.base.text import counted, visible
 from multidrop.shell.streams.stdout import fail, write
 from multidrop.shell.streams.stdout import report as described
 

@@ -12,7 +12,8 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
-from multidrop.dialects import Diagnostic, Family, Hints
+from multidrop.base.errors import Diagnostic
+from multidrop.dialects import Family, Hints
 from multidrop.dialects.families import DEFAULT, FAMILIES
 from multidrop.drives.bus import Bus
 from multidrop.drives.line import DEFAULT_TIMEOUT

@@ -17,7 +17,8 @@ import sys
 from collections.abc import Awaitable, Callable, Collection
 from typing import TYPE_CHECKING, NamedTuple
 
-from multidrop.dialects import DriveError, Hints, Stopped
+from multidrop.base.errors import DriveError, Stopped
+from multidrop.dialects import Hints
 from multidrop.drives.drive import confirmed_motion
 from multidrop.drives.events import Changed, isolated
 from multidrop.shell.connect import Pauses

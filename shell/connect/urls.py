@@ -13,9 +13,10 @@ from pathlib import PurePath
 from typing import Any
 from urllib.parse import unquote
 
-from multidrop.dialects import Diagnostic, Hints
+from multidrop.base.errors import Diagnostic
+from multidrop.base.text import acts_first, whole
+from multidrop.dialects import Hints
 from multidrop.dialects.families import TABLE
-from multidrop.dialects.text import acts_first, whole
 from multidrop.shell.configuration import SavedConnection
 from multidrop.shell.connect.url_forms import URL_FORMS, sentence
 from multidrop.shell.secrets import holds_password, url_without_secrets, without_secrets

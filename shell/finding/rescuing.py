@@ -9,9 +9,10 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Sequence
 
-from multidrop.dialects import Diagnostic, Procedure
+from multidrop.base.errors import Diagnostic
+from multidrop.base.text import counted
+from multidrop.dialects import Procedure
 from multidrop.dialects.families import FAMILIES, family_of
-from multidrop.dialects.text import counted
 from multidrop.drives.events import BusEvent, Traffic
 from multidrop.shell.finding.scanning import HAZARD, SO_FAR, FoundDrive, Scanning, Stage, listed
 from multidrop.shell.workspace import Workspace

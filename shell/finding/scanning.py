@@ -13,7 +13,8 @@ from contextlib import AsyncExitStack, asynccontextmanager, suppress
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
-from multidrop.dialects import Diagnostic, DriveState, Procedure
+from multidrop.base.errors import Diagnostic
+from multidrop.dialects import DriveState, Procedure
 from multidrop.dialects.families import DEFAULT, FAMILIES, spoken
 from multidrop.dialects.scanning import WINDOW, Reach, Scan
 from multidrop.drives.bus import Bus

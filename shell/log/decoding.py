@@ -7,11 +7,12 @@ from copy import copy
 from datetime import datetime
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from multidrop.dialects import DriveError, Priority, Procedure, Request
+from multidrop.base.errors import DriveError
+from multidrop.base.text import whole
+from multidrop.dialects import Priority, Procedure, Request
 from multidrop.dialects.codec import copy_with
 from multidrop.dialects.family import Family, Motion
 from multidrop.dialects.state import DriveState
-from multidrop.dialects.text import whole
 from multidrop.shell.log.steps import Exchange, Step
 
 if TYPE_CHECKING:

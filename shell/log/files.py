@@ -20,10 +20,10 @@ from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from multidrop.dialects import Diagnostic
-from multidrop.dialects.files import opened, why
-from multidrop.dialects.text import counted
-from multidrop.macros.atomic import private_folder, read_private, write_atomically
+from multidrop.base.atomic import private_folder, read_private, write_atomically
+from multidrop.base.errors import Diagnostic
+from multidrop.base.files import opened, why
+from multidrop.base.text import counted
 from multidrop.shell.configuration import Settings
 from multidrop.shell.secrets import without_secrets
 

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from datetime import UTC, datetime, timedelta
 from typing import NamedTuple
 
-from multidrop.dialects import Diagnostic
+from multidrop.base.errors import Diagnostic
 from multidrop.shell.events import By
 from multidrop.shell.line_syntax import EVERYONE, DriveLine, parse
 from multidrop.shell.log.files import BEGIN, Entry, Line

@@ -21,10 +21,10 @@ from itertools import islice, pairwise, product
 from pathlib import Path
 from typing import IO, NamedTuple, TypeVar
 
-from multidrop.dialects import Diagnostic
+from multidrop.base.errors import Diagnostic
+from multidrop.base.files import opened, why
 from multidrop.dialects.codec import copy_with
 from multidrop.dialects.families import FAMILIES
-from multidrop.dialects.files import opened, why
 from multidrop.shell.log import files
 from multidrop.shell.log.decoding import Assumed, Decoding, Measured
 from multidrop.shell.log.files import BEGIN, LONGEST, Entry, Line, entry_of, parts

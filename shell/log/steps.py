@@ -11,8 +11,8 @@ from dataclasses import dataclass, field
 from datetime import datetime
 from pathlib import Path
 
-from multidrop.dialects import Diagnostic
-from multidrop.dialects.text import real, visible
+from multidrop.base.errors import Diagnostic
+from multidrop.base.text import real, visible
 from multidrop.shell.line_syntax import WAITS
 from multidrop.shell.log.files import BEGIN, TRAFFIC, Entry, Line, whole
 from multidrop.shell.secrets import HIDDEN

@@ -10,9 +10,10 @@ from collections import deque
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
-from multidrop.dialects import Diagnostic, Kind, Priority, Request
-from multidrop.dialects.files import why
-from multidrop.dialects.text import counted, visible
+from multidrop.base.errors import Diagnostic
+from multidrop.base.files import why
+from multidrop.base.text import counted, visible
+from multidrop.dialects import Kind, Priority, Request
 from multidrop.drives.bus import Bus
 from multidrop.drives.events import BusEvent, Ended, Sent, Traffic, Unsolicited
 from multidrop.shell.events import (

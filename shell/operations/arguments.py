@@ -9,7 +9,7 @@ import argparse
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from multidrop.dialects.text import real
+from multidrop.base.text import real
 
 HOST = "127.0.0.1"
 KEYS = [f"F{number}" for number in range(2, 13)]
@@ -50,7 +50,7 @@ class Each(argparse.Action):
 
 def number(text: str, low: int, high: int, other: str = "") -> int:
     """Read a whole number; `other`: the words that are valid in place of one."""
-    from multidrop.dialects.text import whole
+    from multidrop.base.text import whole
 
     found = whole(text, low, high)
     if found is None:
@@ -124,7 +124,7 @@ def function_key(text: str) -> str:
 
 def address(text: str) -> tuple[str, int]:
     """Read `[HOST:]PORT`."""
-    from multidrop.dialects.text import whole
+    from multidrop.base.text import whole
 
     host, _, port = text.rpartition(":")
     found = whole(port, 0, 65535)

@@ -11,10 +11,10 @@ from collections.abc import Callable, Mapping, Sequence
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from multidrop.dialects.on_demand import imported
+from multidrop.base.on_demand import imported
 
 if TYPE_CHECKING:
-    from multidrop.dialects import Diagnostic
+    from multidrop.base.errors import Diagnostic
     from multidrop.shell.workspace import Workspace
 
 ACTIONS = "multidrop.shell.operations.arguments"
@@ -95,7 +95,7 @@ class Operation(NamedTuple):
 
     def wrong(self, message: str = "") -> Diagnostic:
         """A Diagnostic with the usage, and with the error if it is known."""
-        from multidrop.dialects import Diagnostic
+        from multidrop.base.errors import Diagnostic
 
         usage = f"usage: {self.usage}"
         return Diagnostic(message, self.name, usage) if message else Diagnostic(usage, self.name)

@@ -15,7 +15,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from functools import cache
 from typing import Any
 
-from multidrop.dialects.on_demand import imported
+from multidrop.base.on_demand import imported
 from multidrop.shell.operations import arguments, conditions
 from multidrop.shell.operations.operation import Operation
 
@@ -162,7 +162,7 @@ def find(name: str) -> Operation:
         return VERBS[name]
     import difflib
 
-    from multidrop.dialects import Diagnostic
+    from multidrop.base.errors import Diagnostic
 
     if name in SCRIPT_WORDS:
         raise Diagnostic(f"{name} is a verb of scripts", hint="multidrop run SCRIPT, or run - for standard input")

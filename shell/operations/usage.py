@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 from math import inf
 
-from multidrop.dialects import Diagnostic
+from multidrop.base.errors import Diagnostic
 
 
 @dataclass(frozen=True)

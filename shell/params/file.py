@@ -10,8 +10,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from multidrop.dialects import Diagnostic, DriveState
-from multidrop.dialects.files import escaped_toml, text_of, toml_of
+from multidrop.base.errors import Diagnostic
+from multidrop.base.files import escaped_toml, text_of, toml_of
+from multidrop.dialects import DriveState
 from multidrop.dialects.values import SECTIONS, VARIABLES, Readings, Value
 from multidrop.drives.drive import Drive
 from multidrop.shell.channel import running, transferring

@@ -12,9 +12,9 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from multidrop.dialects import Diagnostic, DriveError, Inexpressible, Refused
+from multidrop.base.errors import Diagnostic, DriveError, Inexpressible, Refused
+from multidrop.base.text import counted
 from multidrop.dialects.program_files import LOCKED
-from multidrop.dialects.text import counted
 from multidrop.dialects.values import Change, Permission, Plan, Readings, differing
 from multidrop.shell import snapshots
 from multidrop.shell.channel import transferring

@@ -15,9 +15,11 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from multidrop.dialects import Diagnostic, DriveError, NoAnswer, Refused, Stopped
-from multidrop.dialects.files import why
-from multidrop.dialects.text import counted
+from multidrop.base import new_file
+from multidrop.base.atomic import make_folder
+from multidrop.base.errors import Diagnostic, DriveError, NoAnswer, Refused, Stopped
+from multidrop.base.files import why
+from multidrop.base.text import counted
 from multidrop.dialects.values import (
     COMMUNICATION,
     IO,
@@ -31,8 +33,6 @@ from multidrop.dialects.values import (
     same,
 )
 from multidrop.drives.drive import Drive
-from multidrop.macros.atomic import make_folder
-from multidrop.shell import new_file
 from multidrop.shell.channel import running, transferring
 from multidrop.shell.line_syntax import split_target
 from multidrop.shell.params import file as files

@@ -10,7 +10,8 @@ from datetime import UTC
 from itertools import count
 from typing import NamedTuple
 
-from multidrop.dialects import Diagnostic, DriveError, Priority
+from multidrop.base.errors import Diagnostic, DriveError
+from multidrop.dialects import Priority
 from multidrop.drives.drive import Drive
 from multidrop.shell.batch import runner
 from multidrop.shell.params.work import targets

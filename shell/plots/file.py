@@ -17,7 +17,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from multidrop.dialects import Diagnostic
+from multidrop.base.errors import Diagnostic
 
 if sys.platform != "win32":
     import fcntl

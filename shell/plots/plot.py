@@ -14,8 +14,8 @@ from collections.abc import Callable, Iterator, Sequence
 from datetime import datetime
 from functools import partial
 
-from multidrop.dialects import Diagnostic
-from multidrop.dialects.text import counted
+from multidrop.base.errors import Diagnostic
+from multidrop.base.text import counted
 from multidrop.dialects.units import Takes
 from multidrop.dialects.values import UNREAD, Conditions
 from multidrop.drives.events import Conditioned, Lost, Sample, Unsolicited, Valued

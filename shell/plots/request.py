@@ -15,8 +15,8 @@ from ipaddress import ip_address
 from pathlib import Path
 from urllib.parse import urlsplit
 
-from multidrop.dialects import Diagnostic
-from multidrop.dialects.text import real
+from multidrop.base.errors import Diagnostic
+from multidrop.base.text import real
 from multidrop.drives.conversations import refuse_stranger
 from multidrop.drives.drive import Drive
 from multidrop.drives.telemetry import FASTEST, MODEST

@@ -21,8 +21,8 @@ from collections.abc import Iterable, Mapping, Sequence, Set
 from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
 
-from multidrop.dialects import Diagnostic
-from multidrop.dialects.files import why
+from multidrop.base.errors import Diagnostic
+from multidrop.base.files import why
 from multidrop.shell.plots.file import APPLICATION, FLUSH, GAP, RecordingFile, SinkBroken
 from multidrop.shell.plots.request import PlotTarget, bracketed
 from multidrop.shell.roles import DIFFERENCE

@@ -16,8 +16,8 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
-from multidrop.dialects import Diagnostic
-from multidrop.dialects.text import cell, visible
+from multidrop.base.errors import Diagnostic
+from multidrop.base.text import cell, visible
 from multidrop.shell.plots.file import GAP, Locked, SinkBroken, disk_full, pyarrow, synced
 from multidrop.shell.plots.request import PlotTarget
 from multidrop.shell.plots.rerun_calls import TWIN, Batch

@@ -18,9 +18,9 @@ from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, cast
 
-from multidrop.dialects import Diagnostic
+from multidrop.base.errors import Diagnostic
+from multidrop.base.files import encoded_program_of, program_text_of, split_lines, why
 from multidrop.dialects.families import correct_in, program_language_of, program_languages
-from multidrop.dialects.files import encoded_program_of, program_text_of, split_lines, why
 from multidrop.dialects.program_files import Conversion, Converter, Problem, errors, in_order, refuse
 from multidrop.simulator.cell.spec import DriveSpec
 from multidrop.simulator.families import PROGRAMS, TABLE
@@ -135,7 +135,7 @@ def rewrite(checked: Checked) -> None:
         return
     from pathlib import Path  # both are more than a mere check needs
 
-    from multidrop.macros.atomic import write_atomically
+    from multidrop.base.atomic import write_atomically
 
     if not os.path.isfile(checked.file):
         raise Diagnostic("is not a regular file", checked.file, "only a regular file is rewritten")

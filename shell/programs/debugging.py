@@ -11,7 +11,8 @@ import asyncio
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-from multidrop.dialects import Diagnostic, DriveError, Inexpressible, Procedure, Refused
+from multidrop.base.errors import Diagnostic, DriveError, Inexpressible, Refused
+from multidrop.dialects import Procedure
 from multidrop.dialects.debugging import Debugging, Look, Neighbours
 from multidrop.dialects.program_files import Stored
 from multidrop.drives.drive import Drive

@@ -11,10 +11,10 @@ import re
 from dataclasses import dataclass
 from pathlib import Path
 
-from multidrop.dialects import Diagnostic
-from multidrop.dialects.files import bytes_of, decoded, why
-from multidrop.dialects.text import ACTING
-from multidrop.shell.state.store import digest
+from multidrop.base.errors import Diagnostic
+from multidrop.base.files import bytes_of, decoded, why
+from multidrop.base.store import digest
+from multidrop.base.text import ACTING
 
 LARGEST = 512 * 1024
 """Bytes; many times what a drive holds, and as much as an editor takes with ease."""
@@ -101,7 +101,7 @@ class EditedFile:
 
         Raises ChangedMeanwhile, or Diagnostic where it cannot be written; the file is then as it was.
         """
-        from multidrop.macros.atomic import create_atomically, write_atomically
+        from multidrop.base.atomic import create_atomically, write_atomically
 
         data = self._encoded(text)
         now = _content(self.path)

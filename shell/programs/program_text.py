@@ -10,11 +10,11 @@ from functools import cached_property
 from os.path import commonprefix
 from typing import NamedTuple
 
-from multidrop.dialects import Diagnostic
+from multidrop.base.errors import Diagnostic
+from multidrop.base.files import split_lines
+from multidrop.base.text import counted
 from multidrop.dialects.families import program_language_of, program_languages
-from multidrop.dialects.files import split_lines
 from multidrop.dialects.program_files import Block, Entry, Offer, Part, Problem, Span, UserName, errors
-from multidrop.dialects.text import counted
 
 BYTE_ORDER_MARK = "\ufeff"
 

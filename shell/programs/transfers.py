@@ -14,12 +14,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from weakref import WeakSet
 
-from multidrop.dialects import Diagnostic, DriveError, Refused, SourceLine
-from multidrop.dialects.errors import Differs
+from multidrop.base.errors import Diagnostic, Differs, DriveError, Refused
+from multidrop.base.files import SourceLine, check_program_text, program_text_of
+from multidrop.base.text import counted
 from multidrop.dialects.families import correct_in, program_languages
-from multidrop.dialects.files import check_program_text, program_text_of
 from multidrop.dialects.program_files import LOCKED, Difference, Held, errors, in_order, refuse
-from multidrop.dialects.text import counted
 from multidrop.drives.drive import Drive, still
 from multidrop.shell import motions
 from multidrop.shell.channel import running, transferring

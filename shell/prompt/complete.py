@@ -12,7 +12,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from multidrop.dialects import Diagnostic
+from multidrop.base.errors import Diagnostic
 from multidrop.dialects.families import DEFAULT, FAMILIES
 from multidrop.drives.drive import Drive
 from multidrop.macros import KEYS

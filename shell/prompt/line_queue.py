@@ -20,10 +20,10 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from multidrop.dialects import Diagnostic
-from multidrop.dialects.files import lines_of
-from multidrop.dialects.text import counted, visible
-from multidrop.macros.atomic import open_private, private_folder, read_private, write_atomically
+from multidrop.base.atomic import open_private, private_folder, read_private, write_atomically
+from multidrop.base.errors import Diagnostic
+from multidrop.base.files import lines_of
+from multidrop.base.text import counted, visible
 from multidrop.shell.events import FAILURES
 from multidrop.shell.line_syntax import NOWHERE, DriveLine, Place, TypedLine, VerbLine, parse
 

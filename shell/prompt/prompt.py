@@ -33,8 +33,8 @@ from prompt_toolkit.search import stop_search
 from prompt_toolkit.styles import Style
 from prompt_toolkit.utils import is_dumb_terminal
 
-from multidrop.dialects import Diagnostic
-from multidrop.dialects.files import lines_of
+from multidrop.base.errors import Diagnostic
+from multidrop.base.files import lines_of
 from multidrop.shell import configuration, stop_report
 from multidrop.shell.automation import outcome, settled, stop_key_trial
 from multidrop.shell.channel import Front

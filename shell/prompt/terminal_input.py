@@ -13,10 +13,10 @@ from collections import deque
 from collections.abc import AsyncIterator, Awaitable, Callable, Iterable, Sequence
 from functools import partial
 
-from multidrop.dialects import Diagnostic
-from multidrop.dialects.comments import uncommented
-from multidrop.dialects.files import LARGEST, check_line, split_lines
-from multidrop.dialects.text import visible
+from multidrop.base.comments import uncommented
+from multidrop.base.errors import Diagnostic
+from multidrop.base.files import LARGEST, check_line, split_lines
+from multidrop.base.text import visible
 from multidrop.shell.channel import Ask, Field
 from multidrop.shell.prompt.keyboard import Keyboard, on_stop_key
 from multidrop.shell.quitting import say_unsent

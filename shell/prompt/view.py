@@ -25,7 +25,7 @@ from prompt_toolkit.formatted_text import StyleAndTextTuples
 from prompt_toolkit.history import History as PromptHistory
 from prompt_toolkit.output import ColorDepth, DummyOutput
 
-from multidrop.dialects.text import counted
+from multidrop.base.text import counted
 from multidrop.shell import stop_report
 from multidrop.shell.events import Progressed
 from multidrop.shell.openings import model

@@ -21,10 +21,10 @@ from functools import partial
 from typing import TYPE_CHECKING, Any, NamedTuple
 from urllib.parse import unquote, urlsplit
 
-from multidrop.dialects import Diagnostic
-from multidrop.dialects.files import why
-from multidrop.dialects.on_demand import importing
-from multidrop.dialects.text import visible
+from multidrop.base.errors import Diagnostic
+from multidrop.base.files import why
+from multidrop.base.on_demand import importing
+from multidrop.base.text import visible
 from multidrop.shell.configuration import MqttSettings
 from multidrop.shell.threads import in_thread
 from multidrop.transports import Unreachable

@@ -6,8 +6,8 @@ import asyncio
 import sys
 from collections.abc import Callable, Mapping, Sequence
 
-from multidrop.dialects import Diagnostic
-from multidrop.dialects.text import counted
+from multidrop.base.errors import Diagnostic
+from multidrop.base.text import counted
 from multidrop.drives.bus import Bus
 from multidrop.shell.batch import runner
 from multidrop.shell.events import FAILURES

@@ -16,8 +16,8 @@ from dataclasses import dataclass, field, replace
 from datetime import datetime
 from typing import Any
 
-from multidrop.dialects.on_demand import imported
-from multidrop.dialects.text import counted, visible
+from multidrop.base.on_demand import imported
+from multidrop.base.text import counted, visible
 from multidrop.drives.bus import Bus
 from multidrop.drives.events import Unsolicited
 from multidrop.shell.events import Entered, Failed, Notified, OnBus, Printed, SessionEvent

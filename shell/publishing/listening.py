@@ -8,8 +8,8 @@ from collections.abc import Callable
 from typing import NamedTuple
 from urllib.parse import urlsplit
 
-from multidrop.dialects import Diagnostic
-from multidrop.dialects.text import visible
+from multidrop.base.errors import Diagnostic
+from multidrop.base.text import visible
 from multidrop.transports import Unreachable
 from multidrop.transports.sockets import explain, exposed, host_port
 

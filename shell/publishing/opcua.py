@@ -13,8 +13,8 @@ from contextlib import suppress
 from datetime import UTC, datetime
 from typing import Any
 
-from multidrop.dialects import Diagnostic
-from multidrop.dialects.on_demand import imported, importing
+from multidrop.base.errors import Diagnostic
+from multidrop.base.on_demand import imported, importing
 from multidrop.shell.publishing.feed import escape
 from multidrop.shell.publishing.listening import Listening
 from multidrop.shell.publishing.registry import Key, Outlet, Registry, Value

@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 from urllib.parse import unquote
 
-from multidrop.dialects.text import visible
+from multidrop.base.text import visible
 from multidrop.shell.publishing.feed import UNNAMED
 from multidrop.shell.publishing.registry import AT_REST, BYE, LOST, MOVING, NO_CURRENT, ONLINE, SILENT
 

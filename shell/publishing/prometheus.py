@@ -6,8 +6,8 @@ import asyncio
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
-from multidrop.dialects import Diagnostic
-from multidrop.dialects.on_demand import importing
+from multidrop.base.errors import Diagnostic
+from multidrop.base.on_demand import importing
 from multidrop.shell.publishing.feed import escape
 from multidrop.shell.publishing.listening import Listening
 from multidrop.shell.publishing.registry import ONLINE, STATES, Outlet, Registry

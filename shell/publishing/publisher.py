@@ -12,8 +12,8 @@ import contextlib
 from collections import Counter, deque
 from collections.abc import Callable, Sequence
 
-from multidrop.dialects import Diagnostic
-from multidrop.dialects.text import counted
+from multidrop.base.errors import Diagnostic
+from multidrop.base.text import counted
 from multidrop.shell.connect import Pauses
 from multidrop.shell.publishing.broker import Connection, Message
 from multidrop.transports import TransportLost

@@ -12,8 +12,8 @@ from datetime import datetime
 from functools import partial
 from typing import NamedTuple
 
-from multidrop.dialects import Diagnostic
-from multidrop.dialects.text import real
+from multidrop.base.errors import Diagnostic
+from multidrop.base.text import real
 from multidrop.dialects.units import Takes
 from multidrop.dialects.values import UNREAD, Conditions
 from multidrop.drives.bus import Bus

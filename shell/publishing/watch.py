@@ -9,7 +9,7 @@ from collections import deque
 from collections.abc import Callable
 from datetime import datetime
 
-from multidrop.dialects.text import counted
+from multidrop.base.text import counted
 from multidrop.shell import configuration
 from multidrop.shell.configuration import Settings
 from multidrop.shell.events import FAILURES

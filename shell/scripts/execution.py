@@ -13,8 +13,8 @@ from dataclasses import dataclass, replace
 from functools import partial
 from typing import TypeVar
 
-from multidrop.dialects import Diagnostic, DriveError, Stopped
-from multidrop.dialects.text import counted
+from multidrop.base.errors import Diagnostic, DriveError, Stopped
+from multidrop.base.text import counted
 from multidrop.macros import checked_values, fill
 from multidrop.shell import waits
 from multidrop.shell.events import FAILURES, By, Failed

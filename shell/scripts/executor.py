@@ -12,8 +12,8 @@ from collections.abc import AsyncIterator, Collection, Iterator, Mapping, Sequen
 from dataclasses import replace
 from itertools import islice
 
-from multidrop.dialects import Diagnostic, NoAnswer, Stopped
-from multidrop.dialects.text import counted
+from multidrop.base.errors import Diagnostic, NoAnswer, Stopped
+from multidrop.base.text import counted
 from multidrop.drives.drive import Drive
 from multidrop.drives.events import Lost
 from multidrop.macros import Macro

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 
-from multidrop.dialects import Diagnostic, Inexpressible, NoAnswer
+from multidrop.base.errors import Diagnostic, Inexpressible, NoAnswer
 from multidrop.drives.drive import Drive
 from multidrop.macros import Macro, fill, value_names
 from multidrop.shell.automation import Claim, only_ends

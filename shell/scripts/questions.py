@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from multidrop.dialects import Diagnostic, DriveError
-from multidrop.dialects.text import counted
+from multidrop.base.errors import Diagnostic, DriveError
+from multidrop.base.text import counted
 from multidrop.drives.drive import Check, Drive
 from multidrop.shell.events import By
 from multidrop.shell.line_syntax import join_target, pinned, split_target

@@ -13,9 +13,9 @@ from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from functools import partial
 from typing import NamedTuple, TypeVar
 
-from multidrop.dialects import Diagnostic
-from multidrop.dialects.comments import uncommented
-from multidrop.dialects.files import bounded, bytes_of, lines_of, utf8, why
+from multidrop.base.comments import uncommented
+from multidrop.base.errors import Diagnostic
+from multidrop.base.files import bounded, bytes_of, lines_of, utf8, why
 from multidrop.macros import Macro, MacroStore, check_name, checked_values, fill, parse_macro, value_names
 from multidrop.macros.model import Parameter, plain, written
 from multidrop.macros.toml_format import in_text

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 from functools import cache
 from typing import TypeVar
 
-from multidrop.dialects import Diagnostic
+from multidrop.base.errors import Diagnostic
+from multidrop.base.text import whole
 from multidrop.dialects.families import FAMILIES
-from multidrop.dialects.text import whole
 from multidrop.macros import Macro
 from multidrop.shell import waits
 from multidrop.shell.line_syntax import ENDS, divided

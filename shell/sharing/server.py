@@ -14,8 +14,9 @@ from collections.abc import Callable, Coroutine, Sequence
 from functools import partial
 from typing import Any, cast
 
-from multidrop.dialects import Diagnostic, StopPiece
-from multidrop.dialects.text import counted
+from multidrop.base.errors import Diagnostic
+from multidrop.base.text import counted
+from multidrop.dialects import StopPiece
 from multidrop.shell import configuration
 from multidrop.shell.connect import Pauses
 from multidrop.shell.connect.opening import OpenedPort, open_port

@@ -10,7 +10,8 @@ import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from multidrop.dialects import Diagnostic, StopPiece
+from multidrop.base.errors import Diagnostic
+from multidrop.dialects import StopPiece
 from multidrop.dialects.families import DEFAULT, FAMILIES, TABLE
 from multidrop.drives.half_line import CR, LF, LONGEST
 

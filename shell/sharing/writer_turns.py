@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from multidrop.dialects.text import counted, visible
+from multidrop.base.text import counted, visible
 from multidrop.drives.half_line import HalfLine
 from multidrop.shell.sharing.client import Client, Input, Request
 from multidrop.shell.sharing.settling import Settling

@@ -11,11 +11,11 @@ from pathlib import Path
 from typing import Any, NamedTuple
 from urllib.parse import quote
 
-from multidrop.dialects import Diagnostic
-from multidrop.dialects.files import why
+from multidrop.base.atomic import create_atomically, make_folder
+from multidrop.base.errors import Diagnostic
+from multidrop.base.files import why
+from multidrop.base.store import Store, digest
 from multidrop.dialects.program_files import Held
-from multidrop.macros.atomic import create_atomically, make_folder
-from multidrop.shell.state.store import Store, digest
 
 
 class Copy(NamedTuple):

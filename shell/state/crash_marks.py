@@ -12,8 +12,8 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import quote
 
-from multidrop.macros.atomic import safe_name
-from multidrop.shell.state.store import Store
+from multidrop.base.atomic import safe_name
+from multidrop.base.store import Store
 
 if sys.platform == "win32":
     from multidrop.shell.console import runs

@@ -24,11 +24,11 @@ from pathlib import Path
 from typing import Any, TypeVar
 from urllib.parse import quote, unquote
 
+from multidrop.base.atomic import open_private, private_folder, safe_name, sync_folder
+from multidrop.base.store import Damaged, Store, digest
 from multidrop.dialects import DriveState, Owed
 from multidrop.dialects.state import Remembered
 from multidrop.drives.port_journal import Keeper
-from multidrop.macros.atomic import open_private, private_folder, safe_name, sync_folder
-from multidrop.shell.state.store import Damaged, Store, digest
 
 if sys.platform == "win32":
     import msvcrt

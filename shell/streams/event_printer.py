@@ -7,7 +7,7 @@ import sys
 import textwrap
 from typing import TextIO, cast
 
-from multidrop.dialects.text import visible
+from multidrop.base.text import visible
 from multidrop.drives.events import Unsolicited
 from multidrop.shell.events import Bytes, Failed, Notified, OnBus, Output, Printed, Progressed, SessionEvent
 from multidrop.shell.streams.output_streams import Colour, LineStream

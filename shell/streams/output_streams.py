@@ -19,7 +19,7 @@ from enum import Enum
 from functools import partial
 from typing import TextIO
 
-from multidrop.dialects.text import counted
+from multidrop.base.text import counted
 from multidrop.shell.threads import CHUNK, LIMIT, BoundedWriter, Loss
 
 if sys.platform == "win32":

@@ -20,7 +20,7 @@ from collections.abc import Callable
 from shutil import get_terminal_size
 from typing import TextIO
 
-from multidrop.dialects.text import visible
+from multidrop.base.text import visible
 from multidrop.shell.exit_codes import INTERRUPTED, READER_GONE, exit_code
 from multidrop.shell.streams import output_streams
 from multidrop.shell.streams.output_streams import Outlet

@@ -9,7 +9,7 @@ from decimal import Decimal
 from html import escape
 from itertools import groupby
 
-from multidrop.dialects.text import visible
+from multidrop.base.text import visible
 from multidrop.shell.sweeps.plan import Plan
 from multidrop.shell.sweeps.trial import MARGIN, Result, bench
 from multidrop.shell.sweeps.variation import SEED, spelled

@@ -13,7 +13,7 @@ import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 
-from multidrop.dialects.text import counted
+from multidrop.base.text import counted
 from multidrop.shell.sweeps.plan import Plan
 from multidrop.shell.sweeps.trial import DIED, Case, Result
 from multidrop.shell.sweeps.variation import SEED, Value, Values, simpler, spelled

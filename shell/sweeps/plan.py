@@ -16,7 +16,7 @@ from math import prod
 from pathlib import Path
 from random import Random
 
-from multidrop.dialects import Diagnostic
+from multidrop.base.errors import Diagnostic
 from multidrop.shell import configuration
 from multidrop.shell.programs.checking import to_run
 from multidrop.shell.sweeps.trial import Case, Job, Result, bench, version

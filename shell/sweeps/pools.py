@@ -19,7 +19,7 @@ from multiprocessing import connection
 from multiprocessing.context import BaseContext
 from typing import ParamSpec, TypeVar
 
-from multidrop.dialects.files import why
+from multidrop.base.files import why
 from multidrop.shell.signals import FROM_TERMINAL, SIGNALS, Interruption
 from multidrop.shell.streams.stdout import WATCHER
 from multidrop.shell.sweeps import trial

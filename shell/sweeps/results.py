@@ -17,11 +17,11 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-from multidrop.dialects import Diagnostic
-from multidrop.dialects.files import bytes_of, utf8, why
-from multidrop.dialects.text import cell, counted, of_cell, whole
-from multidrop.macros.atomic import write_atomically
-from multidrop.shell import new_file
+from multidrop.base import new_file
+from multidrop.base.atomic import write_atomically
+from multidrop.base.errors import Diagnostic
+from multidrop.base.files import bytes_of, utf8, why
+from multidrop.base.text import cell, counted, of_cell, whole
 from multidrop.shell.plots.file import pyarrow
 from multidrop.shell.sweeps.plan import Plan
 from multidrop.shell.sweeps.trial import CUT, DIED, HELD, MARGIN, REFUSED, Result, bench

@@ -18,8 +18,8 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import NamedTuple
 
-from multidrop.dialects import Diagnostic
-from multidrop.dialects.on_demand import imported
+from multidrop.base.errors import Diagnostic
+from multidrop.base.on_demand import imported
 from multidrop.shell.scripts.expression import (
     EQUAL,
     Comparison,

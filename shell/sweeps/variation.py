@@ -17,8 +17,8 @@ from difflib import get_close_matches
 from random import Random
 from typing import Any
 
-from multidrop.dialects import Diagnostic
-from multidrop.dialects.files import toml_of
+from multidrop.base.errors import Diagnostic
+from multidrop.base.files import toml_of
 from multidrop.simulator.cell.drive_keys import ENCODER_KEYS, WORLD_KEYS
 
 Value = int | float | str | list[Any]

@@ -17,7 +17,7 @@ from contextlib import contextmanager, suppress
 from itertools import islice
 from typing import TYPE_CHECKING, Any
 
-from multidrop.dialects import Diagnostic
+from multidrop.base.errors import Diagnostic
 from multidrop.shell.secrets import url_without_secrets
 from multidrop.shell.signals import Interruption
 from multidrop.shell.sweeps import trial

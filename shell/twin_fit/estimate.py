@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from math import inf, pi, sqrt
 from typing import Any, NamedTuple
 
-from multidrop.dialects import Diagnostic
+from multidrop.base.errors import Diagnostic
 from multidrop.simulator.cell.spec import MotorSpec, WorldSpec
 from multidrop.simulator.family import Effort
 from multidrop.simulator.torque import Torque

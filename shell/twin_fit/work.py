@@ -20,11 +20,11 @@ from math import inf
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from multidrop.dialects import Diagnostic, DriveError
-from multidrop.dialects.files import utf8_of, why
-from multidrop.dialects.text import counted, whole
+from multidrop.base.atomic import write_atomically
+from multidrop.base.errors import Diagnostic, DriveError
+from multidrop.base.files import utf8_of, why
+from multidrop.base.text import counted, whole
 from multidrop.drives.drive import Drive
-from multidrop.macros.atomic import write_atomically
 from multidrop.shell.batch.replay import targets
 from multidrop.shell.line_syntax import EVERYONE, join_target
 from multidrop.shell.log import files, steps

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from multidrop.dialects import Inexpressible
+from multidrop.base.errors import Inexpressible
 from multidrop.dialects.family import Motion
 from multidrop.dialects.values import Levels, Snapshot
 from multidrop.simulator import cells

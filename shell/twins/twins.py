@@ -6,7 +6,7 @@ import asyncio
 from functools import partial
 from typing import TYPE_CHECKING
 
-from multidrop.dialects import Diagnostic, DriveError, Stopped
+from multidrop.base.errors import Diagnostic, DriveError, Stopped
 from multidrop.shell.events import FAILURES, Agreed, Diverged, OnBus, TwinEvent
 from multidrop.shell.twins.comparing import LIMIT
 

@@ -6,8 +6,8 @@ import asyncio
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
-from multidrop.dialects import Diagnostic, Inexpressible, NoAnswer
-from multidrop.dialects.text import whole
+from multidrop.base.errors import Diagnostic, Inexpressible, NoAnswer
+from multidrop.base.text import whole
 from multidrop.dialects.units import Takes
 from multidrop.shell import configuration
 from multidrop.shell.events import By

@@ -7,11 +7,12 @@ import shlex
 from collections.abc import Sequence
 from typing import Any
 
-from multidrop.dialects import Diagnostic, Inexpressible, Procedure
+from multidrop.base.errors import Diagnostic, Inexpressible
+from multidrop.base.on_demand import imported
+from multidrop.base.text import whole
+from multidrop.dialects import Procedure
 from multidrop.dialects.families import FAMILIES, TABLE
 from multidrop.dialects.family import Registers
-from multidrop.dialects.on_demand import imported
-from multidrop.dialects.text import whole
 from multidrop.drives.drive import Drive
 from multidrop.shell import motions
 from multidrop.shell.events import By

@@ -5,8 +5,8 @@ from __future__ import annotations
 import shlex
 from dataclasses import replace
 
-from multidrop.dialects import Diagnostic, Stopped
-from multidrop.dialects.text import counted
+from multidrop.base.errors import Diagnostic, Stopped
+from multidrop.base.text import counted
 from multidrop.macros import FIRST_PAGE, KEYS, Macro, check_name, parse_macro
 from multidrop.macros.recorder import Offer, with_waits
 from multidrop.macros.store import listed

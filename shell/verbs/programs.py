@@ -6,12 +6,13 @@ import asyncio
 import shlex
 from math import inf
 
-from multidrop.dialects import Diagnostic, Inexpressible
+from multidrop.base import new_file
+from multidrop.base.errors import Diagnostic, Inexpressible
+from multidrop.base.text import counted
 from multidrop.dialects.families import program_language_of
 from multidrop.dialects.program_files import errors
-from multidrop.dialects.text import counted
 from multidrop.drives.drive import Drive
-from multidrop.shell import new_file, program_listing
+from multidrop.shell import program_listing
 from multidrop.shell.line_syntax import split_target
 from multidrop.shell.programs import debugging, transfers
 from multidrop.shell.programs.checking import examine

@@ -7,7 +7,8 @@ import difflib
 import re
 from typing import NamedTuple
 
-from multidrop.dialects import Diagnostic, Stopped
+from multidrop.base.errors import Diagnostic, Stopped
+from multidrop.base.new_file import STANDARD_OUTPUT
 from multidrop.dialects.families import DEFAULT, FAMILIES, languages, program_languages
 from multidrop.dialects.family import Language
 from multidrop.dialects.motions import Outcome
@@ -16,7 +17,6 @@ from multidrop.shell.events import By
 from multidrop.shell.log import files
 from multidrop.shell.log.writer import SessionLog
 from multidrop.shell.motions import OUTCOME
-from multidrop.shell.new_file import STANDARD_OUTPUT
 from multidrop.shell.operations.conditions import ON_SCREEN
 from multidrop.shell.operations.operation import Operation
 from multidrop.shell.operations.table import SCRIPT_VERBS, VERB_GROUPS, VERBS

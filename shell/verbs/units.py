@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from multidrop.dialects import Diagnostic
+from multidrop.base.errors import Diagnostic
 from multidrop.dialects.units import Takes, scale
 from multidrop.shell.verbs.call import Call
 

@@ -20,8 +20,8 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
-from multidrop.dialects import Diagnostic
-from multidrop.macros.atomic import make_folder
+from multidrop.base.atomic import make_folder
+from multidrop.base.errors import Diagnostic
 from multidrop.shell.threads import BoundedWriter, Loss
 from multidrop.shell.watching import wire
 

@@ -12,7 +12,7 @@ import threading
 import time
 from pathlib import Path
 
-from multidrop.dialects import Diagnostic
+from multidrop.base.errors import Diagnostic
 from multidrop.shell.watching import wire
 from multidrop.transports import Unreachable
 from multidrop.transports.ssh import RELAY, WORD, FarPort

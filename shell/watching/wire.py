@@ -17,8 +17,8 @@ from functools import cache
 from types import NoneType, UnionType
 from typing import Any, NamedTuple, get_args, get_origin, get_type_hints
 
-from multidrop.dialects.on_demand import imported
-from multidrop.dialects.text import visible
+from multidrop.base.on_demand import imported
+from multidrop.base.text import visible
 from multidrop.shell.secrets import without_secrets
 
 WORD = "multidrop-screen"

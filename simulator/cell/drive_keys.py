@@ -13,8 +13,8 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
-from multidrop.dialects import Diagnostic
-from multidrop.dialects.files import LARGEST_PROGRAM, bounded, program_of
+from multidrop.base.errors import Diagnostic
+from multidrop.base.files import LARGEST_PROGRAM, bounded, program_of
 from multidrop.dialects.units import STEP, Basis, Measure, Quantity, Scale, quantity, scale
 from multidrop.simulator.cell.spec import Identity, Scalar, Value, WorldSpec
 from multidrop.simulator.cell.table import Folder, Table, quoted

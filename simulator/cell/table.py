@@ -10,8 +10,8 @@ from math import inf, isfinite
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from multidrop.dialects import Diagnostic
-from multidrop.dialects.files import Way, toml_keys
+from multidrop.base.errors import Diagnostic
+from multidrop.base.files import Way, toml_keys
 
 Column = tuple[str, float, float]
 """A column of a row: its word, lowest and highest value; whole numbers only if the highest is an int."""

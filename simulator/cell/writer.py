@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import Any
 
-from multidrop.dialects.files import escaped_toml
-from multidrop.dialects.text import visible
+from multidrop.base.files import escaped_toml
+from multidrop.base.text import visible
 from multidrop.dialects.units import PLACES, Scale
 from multidrop.dialects.values import Reading, same
 from multidrop.simulator.cell.drive_keys import LONGEST

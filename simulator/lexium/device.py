@@ -10,9 +10,9 @@ from __future__ import annotations
 from functools import lru_cache
 from typing import NamedTuple
 
-from multidrop.dialects import Diagnostic
+from multidrop.base.errors import Diagnostic
+from multidrop.base.files import split_lines
 from multidrop.dialects.family import Motion
-from multidrop.dialects.files import split_lines
 from multidrop.dialects.mcode.manual.errors import text as error_text
 from multidrop.dialects.mcode.manual.grammar import LineError, parse, strip
 from multidrop.dialects.mcode.manual.program_file import bare, commented, remark_at

@@ -13,8 +13,9 @@ from contextlib import suppress
 from dataclasses import replace
 from math import inf
 
-from multidrop.dialects import Diagnostic
-from multidrop.dialects.files import split_lines
+from multidrop.base.errors import Diagnostic
+from multidrop.base.files import split_lines
+from multidrop.base.text import counted, whole
 from multidrop.dialects.mcode.manual import program_file
 from multidrop.dialects.mcode.manual.errors import ErrorNumber
 from multidrop.dialects.mcode.manual.errors import text as text_of_error
@@ -23,7 +24,6 @@ from multidrop.dialects.mcode.manual.help import remedy
 from multidrop.dialects.mcode.manual.program_file import ProgramLine
 from multidrop.dialects.mcode.manual.statements import size_of
 from multidrop.dialects.program_files import Problem, errors
-from multidrop.dialects.text import counted, whole
 from multidrop.simulator.cell.spec import DriveSpec
 from multidrop.simulator.lexium.device import MCodeDevice
 from multidrop.simulator.lexium.state.errors import CRLF, Failure, Fault

@@ -19,7 +19,7 @@ from __future__ import annotations
 
 import re
 
-from multidrop.dialects import Diagnostic
+from multidrop.base.errors import Diagnostic
 from multidrop.dialects.pmx.manual import program_file
 from multidrop.dialects.pmx.manual.table import PROBE, PROBED
 from multidrop.simulator.cell.spec import DriveSpec, WorldSpec

@@ -16,8 +16,8 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from fractions import Fraction
 
+from multidrop.base.files import split_lines
 from multidrop.dialects.family import Motion
-from multidrop.dialects.files import split_lines
 from multidrop.dialects.pmx.manual import program_file
 from multidrop.dialects.pmx.manual.program_file import Undecodable
 from multidrop.dialects.pmx.manual.script_compiler import ERASED

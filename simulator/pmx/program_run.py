@@ -13,12 +13,12 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 from math import inf
 
-from multidrop.dialects import Diagnostic
-from multidrop.dialects.files import SourceLine, split_lines
+from multidrop.base.errors import Diagnostic
+from multidrop.base.files import SourceLine, split_lines
+from multidrop.base.text import counted, whole
 from multidrop.dialects.pmx.manual import program_file, script_compiler
 from multidrop.dialects.pmx.manual.script_parser import PROGRAMS, VARIABLES
 from multidrop.dialects.pmx.manual.table import lookup
-from multidrop.dialects.text import counted, whole
 from multidrop.simulator.cell.spec import DriveSpec
 from multidrop.simulator.pmx.device import PmxDevice
 from multidrop.simulator.pmx.programs import Failure

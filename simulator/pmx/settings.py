@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from multidrop.dialects.files import rows
+from multidrop.base.files import rows
 from multidrop.dialects.pmx.manual.script_parser import KEPT_VARIABLES
 
 AXES = ("X", "Y")

@@ -15,9 +15,9 @@ from pathlib import Path
 from typing import TextIO
 from urllib.parse import urlsplit
 
-from multidrop.dialects import Diagnostic
-from multidrop.dialects.files import bounded, check_line
-from multidrop.dialects.text import visible
+from multidrop.base.errors import Diagnostic
+from multidrop.base.files import bounded, check_line
+from multidrop.base.text import visible
 from multidrop.simulator import cells
 from multidrop.simulator.floor import Floor
 from multidrop.simulator.serving.endpoints import Served, serve_bus

@@ -14,7 +14,7 @@ from contextlib import AsyncExitStack
 from dataclasses import dataclass
 from typing import cast
 
-from multidrop.dialects import Diagnostic
+from multidrop.base.errors import Diagnostic
 from multidrop.simulator.cell.spec import BusSpec, Endpoint
 from multidrop.simulator.serving.running import PIECE, Client, InputQueue, Listener, RunningFloor
 

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from types import MappingProxyType
 
-from multidrop.dialects import Diagnostic
+from multidrop.base.errors import Diagnostic
 from multidrop.dialects.units import Scale
 from multidrop.simulator import cells
 from multidrop.simulator.cell.spec import BusSpec, Cell

@@ -20,7 +20,7 @@ import termios
 import tty
 from pathlib import Path
 
-from multidrop.dialects import Diagnostic
+from multidrop.base.errors import Diagnostic
 from multidrop.simulator.serving.running import Client, InputQueue, RunningFloor
 from multidrop.simulator.wire import resample
 

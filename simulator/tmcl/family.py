@@ -16,8 +16,8 @@ from fractions import Fraction
 from functools import partial
 from struct import Struct
 
+from multidrop.base.files import SourceLine, split_lines
 from multidrop.dialects.family import Motion
-from multidrop.dialects.files import SourceLine, split_lines
 from multidrop.dialects.program_files import errors
 from multidrop.dialects.tmcl.manual import program_file
 from multidrop.dialects.tmcl.manual.commands import Axis, Call, Command, Global, Status, setting_name

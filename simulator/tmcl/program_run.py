@@ -10,9 +10,9 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 
-from multidrop.dialects import Diagnostic
-from multidrop.dialects.files import split_lines
-from multidrop.dialects.text import counted, whole
+from multidrop.base.errors import Diagnostic
+from multidrop.base.files import split_lines
+from multidrop.base.text import counted, whole
 from multidrop.dialects.tmcl.manual import program_file
 from multidrop.dialects.tmcl.manual.commands import Axis, Call, Command, Search
 from multidrop.dialects.tmcl.manual.instructions import Word

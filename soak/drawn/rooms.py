@@ -18,6 +18,7 @@ ROOMS = {
     "families": ("dialects/*/host/**/*.py",),
     "shell": ("shell/**/*.py",),
     "macros": ("macros/**/*.py",),
+    "base": ("base/**/*.py",),
     "multidrop": ("multidrop/*.py", "multidrop/commands/**/*.py", "multidrop/api/**/*.py", "multidrop/lsp/**/*.py"),
 }
 """The files of each room. `families`: the host's side of each language; a manual is facts, which tests compare."""

@@ -6,7 +6,7 @@ import json
 from collections.abc import Iterator
 from pathlib import Path
 
-from multidrop.dialects import Diagnostic
+from multidrop.base.errors import Diagnostic
 from multidrop.macros import MacroStore
 from multidrop.shell.log.files import ENDING, entry_of, whole
 from multidrop.shell.log.judge import judged

@@ -11,7 +11,7 @@ import contextlib
 from random import Random
 from typing import TYPE_CHECKING
 
-from multidrop.dialects import Diagnostic
+from multidrop.base.errors import Diagnostic
 from soak.simulation import acts_connections
 from soak.simulation.act import Act
 from soak.simulation.acts.automation import AUTOMATION

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from itertools import groupby
 
-from multidrop.dialects.text import visible
+from multidrop.base.text import visible
 from soak.simulation.history import Command, Executed
 from soak.simulation.world import World
 

@@ -6,7 +6,8 @@ from dataclasses import replace
 
 import pytest
 
-from multidrop.dialects import DriveState, NoAnswer, Refused
+from multidrop.base.errors import NoAnswer, Refused
+from multidrop.dialects import DriveState
 from multidrop.dialects.certifying import Occupied, owed, repaired
 from multidrop.dialects.mcode.host.codec import MCode
 

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import pytest
 
-from multidrop.dialects import Refused
+from multidrop.base.errors import Refused
 from multidrop.dialects.pmx.family import PMX
 from multidrop.dialects.pmx.host.codec import Pmx, PmxState
 from tests.support.dialogues import blocks, played, shown, written

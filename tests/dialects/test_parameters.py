@@ -2,7 +2,7 @@
 
 import pytest
 
-from multidrop.dialects import Diagnostic
+from multidrop.base.errors import Diagnostic
 from multidrop.dialects.families import family_of
 from multidrop.dialects.mcode.manual import parameters as mcode
 from multidrop.dialects.modbus.family import MODBUS

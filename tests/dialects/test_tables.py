@@ -4,7 +4,7 @@ import csv
 
 import pytest
 
-from multidrop.dialects.files import rows
+from multidrop.base.files import rows
 from tests.support.paths import ROOT
 
 TABLES = sorted(each for room in ("dialects", "simulator") for each in (ROOT / room).rglob("*.csv"))

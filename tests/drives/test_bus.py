@@ -5,7 +5,8 @@ from typing import Any
 
 import pytest
 
-from multidrop.dialects import End, Stopped
+from multidrop.base.errors import Stopped
+from multidrop.dialects import End
 from multidrop.dialects.mcode.host.framing import sealed
 from multidrop.dialects.mcode.manual import program_file
 from multidrop.drives.events import Changed, Ended, Lost, Notice, Sample

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from multidrop.dialects import Inexpressible, NoAnswer, Refused
+from multidrop.base.errors import Inexpressible, NoAnswer, Refused
 from multidrop.dialects.values import Part
 from multidrop.drives.events import Conditioned
 from multidrop.drives.readings import Running

@@ -6,7 +6,8 @@ from typing import Any
 
 import pytest
 
-from multidrop.dialects import Motion, NoAnswer, Started, Stopped
+from multidrop.base.errors import NoAnswer, Stopped
+from multidrop.dialects import Motion, Started
 from multidrop.drives import stopping
 from multidrop.drives.events import Sample
 from multidrop.drives.halts import Halt

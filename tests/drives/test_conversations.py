@@ -4,7 +4,8 @@ import asyncio
 
 import pytest
 
-from multidrop.dialects import DriveState, Priority, Procedure, Reply, Request, Stopped
+from multidrop.base.errors import Stopped
+from multidrop.dialects import DriveState, Priority, Procedure, Reply, Request
 from multidrop.dialects.mcode.host.codec import MCode
 from multidrop.dialects.state import Owed
 from multidrop.drives.conversations import Conversations

@@ -7,8 +7,8 @@ from typing import Any
 
 import pytest
 
-from multidrop.dialects import DriveError, Inexpressible, Motion, NoAnswer, Refused, Stopped
-from multidrop.dialects.errors import Unreferenced
+from multidrop.base.errors import DriveError, Inexpressible, NoAnswer, Refused, Stopped, Unreferenced
+from multidrop.dialects import Motion
 from multidrop.dialects.family import Referencing
 from multidrop.drives.drive import Drive, confirmed_motion, still
 from multidrop.drives.events import Changed

@@ -4,7 +4,8 @@ from dataclasses import dataclass, replace
 
 import pytest
 
-from multidrop.dialects import Decoded, DriveState, End, Kind, NoAnswer, Reply, Request, StopPiece
+from multidrop.base.errors import NoAnswer
+from multidrop.dialects import Decoded, DriveState, End, Kind, Reply, Request, StopPiece
 from multidrop.dialects.mcode.host.codec import MCode
 from multidrop.drives.events import Unsolicited
 from multidrop.drives.inbox import TAIL

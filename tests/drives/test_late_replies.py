@@ -9,7 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from multidrop.dialects import End, Kind, NoAnswer, Reply, Request
+from multidrop.base.errors import NoAnswer
+from multidrop.dialects import End, Kind, Reply, Request
 from multidrop.dialects.mcode.family import MCODE
 from multidrop.dialects.mcode.host.codec import MCode
 from multidrop.dialects.mcode.host.framing import sealed

@@ -11,7 +11,8 @@ from pymodbus import ModbusDeviceIdentification
 from pymodbus.server import ModbusTcpServer
 from pymodbus.simulator import DataType, SimData, SimDevice
 
-from multidrop.dialects import Hints, NoAnswer, Priority, Refused
+from multidrop.base.errors import NoAnswer, Refused
+from multidrop.dialects import Hints, Priority
 from multidrop.dialects.families import family_of
 from multidrop.dialects.modbus.host import framing
 from multidrop.dialects.modbus.manual.registers import REGISTERS

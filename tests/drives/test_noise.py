@@ -6,7 +6,7 @@ or as a program's, and nothing is executed twice. Without a checksum a digit may
 
 import pytest
 
-from multidrop.dialects import DriveError, NoAnswer
+from multidrop.base.errors import DriveError, NoAnswer
 from multidrop.dialects.mcode.family import MCODE
 from multidrop.simulator.cell.spec import Faults
 from tests.support.faults import disturb

@@ -5,7 +5,8 @@ from random import Random
 
 import pytest
 
-from multidrop.dialects import End, Hints, NoAnswer, Priority, Refused, Stopped, StopPiece
+from multidrop.base.errors import NoAnswer, Refused, Stopped
+from multidrop.dialects import End, Hints, Priority, StopPiece
 from multidrop.dialects.pmx.host.codec import GAP, Pmx
 from multidrop.drives.bus import Bus
 from multidrop.drives.events import Unsolicited

@@ -6,7 +6,8 @@ from typing import Any
 
 import pytest
 
-from multidrop.dialects import Inexpressible, Kind, Motion, NoAnswer, Priority, Refused, Reply, Request
+from multidrop.base.errors import Inexpressible, NoAnswer, Refused
+from multidrop.dialects import Kind, Motion, Priority, Reply, Request
 from multidrop.dialects.codec import End
 from multidrop.dialects.mcode.host.codec import MCode
 from multidrop.drives.events import Outcome, Sample, Silent, Transaction, Valued

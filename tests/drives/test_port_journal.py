@@ -4,7 +4,8 @@ import asyncio
 
 import pytest
 
-from multidrop.dialects import Hints, Owed, Stopped
+from multidrop.base.errors import Stopped
+from multidrop.dialects import Hints, Owed
 from multidrop.dialects.mcode.manual import program_file
 from multidrop.drives.port_journal import Keeper
 from multidrop.transports import TransportLost

@@ -8,7 +8,8 @@ from typing import Any
 
 import pytest
 
-from multidrop.dialects import DriveError, Hints, Motion, NoAnswer, Owed
+from multidrop.base.errors import DriveError, NoAnswer
+from multidrop.dialects import Hints, Motion, Owed
 from multidrop.dialects.families import FAMILIES
 from multidrop.dialects.mcode.host.codec import MCode
 from multidrop.dialects.mcode.host.state import MCodeState

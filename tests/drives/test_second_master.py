@@ -4,7 +4,8 @@ import asyncio
 
 import pytest
 
-from multidrop.dialects import DriveError, Hints, NoAnswer, Refused
+from multidrop.base.errors import DriveError, NoAnswer, Refused
+from multidrop.dialects import Hints
 from tests.support.cases import for_each
 from tests.support.cell_session import ETHERNET, drive, party, pmx
 from tests.support.simulated_bus import SimulatedBus

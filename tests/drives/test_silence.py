@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 
-from multidrop.dialects import NoAnswer
+from multidrop.base.errors import NoAnswer
 from multidrop.drives.echoes import Heard
 from multidrop.drives.silence import ECHO, NETWORK, NOISE, SERIAL, explained, reason
 

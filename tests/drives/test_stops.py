@@ -4,18 +4,8 @@ import asyncio
 
 import pytest
 
-from multidrop.dialects import (
-    DriveState,
-    End,
-    Kind,
-    NoAnswer,
-    Priority,
-    Refused,
-    Reply,
-    Request,
-    Stopped,
-    StopPiece,
-)
+from multidrop.base.errors import NoAnswer, Refused, Stopped
+from multidrop.dialects import DriveState, End, Kind, Priority, Reply, Request, StopPiece
 from multidrop.dialects.codec import copy_with
 from multidrop.dialects.mcode.manual import program_file
 from multidrop.drives.drive import confirmed_motion

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from multidrop.dialects.errors import Diagnostic
+from multidrop.base.errors import Diagnostic
 from multidrop.macros import MacroStore
 from multidrop.macros.store import begin_draft, finish_draft
 from tests.support.posix import has_mode

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from multidrop.dialects.errors import Diagnostic
+from multidrop.base.errors import Diagnostic
 from multidrop.macros import Macro, MacroStore, Step, format_macro, parse_macro
 from multidrop.macros.store import listed
 from multidrop.macros.toml_format import with_values

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from multidrop.dialects.errors import Diagnostic
+from multidrop.base.errors import Diagnostic
 from multidrop.macros import Macro, Step
 from multidrop.macros.vendor import REMARK, exported, imported
 

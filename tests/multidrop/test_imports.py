@@ -34,7 +34,7 @@ VERBS = {
     "difflib",
     "tempfile",
 }
-IDLE = "multidrop.dialects.errors", "shutil", "dataclasses", "json", "pathlib"
+IDLE = "multidrop.base.errors", "shutil", "dataclasses", "json", "pathlib"
 
 TABLE = {
     ("--version",): NO_LINE | {*IDLE, "multidrop.shell.streams.stdout"},

@@ -16,8 +16,8 @@ from lsprotocol import types
 from pytest_lsp import client_capabilities
 from pytest_lsp.client import make_test_lsp_client
 
+from multidrop.base.errors import Diagnostic
 from multidrop.cli import run
-from multidrop.dialects import Diagnostic
 from multidrop.lsp.server import Server
 from multidrop.lsp.serving import serve_port
 from multidrop.shell.operations.operation import add_arguments

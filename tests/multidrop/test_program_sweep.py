@@ -11,7 +11,7 @@ from xml.etree import ElementTree
 
 import pytest
 
-from multidrop.dialects import Diagnostic
+from multidrop.base.errors import Diagnostic
 from multidrop.shell.batch.report import Case, JUnitFile
 from multidrop.shell.sweeps import trial
 from tests.support.cell_session import bus, drive

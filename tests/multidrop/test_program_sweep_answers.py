@@ -16,8 +16,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from multidrop.dialects import Diagnostic
-from multidrop.macros import atomic
+from multidrop.base import atomic
+from multidrop.base.errors import Diagnostic
 from multidrop.shell.sweeps import plan, results, trial
 from multidrop.shell.sweeps.answers import _words
 from multidrop.shell.sweeps.trial import Result

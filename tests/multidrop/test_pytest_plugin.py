@@ -91,7 +91,7 @@ def test_folders_of_a_persons_own_and_a_fault_of_a_cell(
 ) -> None:
     for name, value in environment(pytester.path).items():
         monkeypatch.setenv(name, value)
-    for room in ("drives", "shell", "simulator", "dialects", "macros", "transports", "tui"):
+    for room in ("drives", "shell", "simulator", "dialects", "macros", "transports", "tui", "base"):
         pytester.mkpydir(room).joinpath("__init__.py").write_text("raise ImportError('of a person')")
     pytester.makepyfile(test_with_drives=TESTS, test_broken=BROKEN)
     monkeypatch.setenv("PYTEST_DISABLE_PLUGIN_AUTOLOAD", "1")

@@ -10,7 +10,7 @@ import pytest
 
 import multidrop as api
 from multidrop import Diagnostic
-from multidrop.dialects import Inexpressible
+from multidrop.base.errors import Inexpressible
 from tests.multidrop.test_macro_play import put
 from tests.support.foreign_device import LEXIUM, PLC, Device, device
 from tests.support.front_door import Command

@@ -16,15 +16,16 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from multidrop.__main__ import main
-from multidrop.dialects import Diagnostic, End
+from multidrop.base.errors import Diagnostic
+from multidrop.base.files import toml_of
+from multidrop.base.text import whole
+from multidrop.dialects import End
 from multidrop.dialects.families import languages
 from multidrop.dialects.family import Language
-from multidrop.dialects.files import toml_of
 from multidrop.dialects.mcode.host.classify import INTEGER
 from multidrop.dialects.mcode.host.codec import MCode
 from multidrop.dialects.mcode.host.state import MCodeState
 from multidrop.dialects.pmx.host.operations import INTEGER as PMX_INTEGER
-from multidrop.dialects.text import whole
 from multidrop.macros import parse_macro
 from multidrop.shell import configuration
 from multidrop.shell.configuration import Settings

@@ -20,7 +20,7 @@ from hypothesis.stateful import (
     run_state_machine_as_test,
 )
 
-from multidrop.dialects import Diagnostic, DriveError
+from multidrop.base.errors import Diagnostic, DriveError
 from multidrop.macros import Macro
 from multidrop.macros.model import Step
 from multidrop.shell.scripts.executor import play

@@ -9,7 +9,8 @@ from typing import Any
 
 import pytest
 
-from multidrop.dialects import Motion, NoAnswer, Priority
+from multidrop.base.errors import NoAnswer
+from multidrop.dialects import Motion, Priority
 from multidrop.dialects.families import FAMILIES
 from multidrop.dialects.motions import Outcome
 from multidrop.drives.drive import Drive, still

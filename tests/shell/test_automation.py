@@ -4,7 +4,7 @@ import asyncio
 
 import pytest
 
-from multidrop.dialects import DriveError, Refused, Stopped
+from multidrop.base.errors import DriveError, Refused, Stopped
 from multidrop.macros import Macro, Step
 from multidrop.shell.events import By
 from multidrop.shell.prompt.terminal_input import run_lines

@@ -9,7 +9,8 @@ from typing import Any
 
 import pytest
 
-from multidrop.dialects import Diagnostic, DriveError, Started
+from multidrop.base.errors import Diagnostic, DriveError
+from multidrop.dialects import Started
 from multidrop.shell.automation import Automation, Sent, is_automation, outcome, sequence
 from tests.support.cell_session import CellSession, bus, party
 

@@ -11,7 +11,7 @@ from unittest import mock
 
 import pytest
 
-from multidrop.dialects import Diagnostic, NoAnswer, Refused, Stopped
+from multidrop.base.errors import Diagnostic, NoAnswer, Refused, Stopped
 from multidrop.dialects.certifying import BYTES, ERROR, FITS, MODE, MOVES, NOTHING, owed
 from multidrop.dialects.families import FAMILIES
 from multidrop.dialects.tmcl.manual import commands

@@ -7,7 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from multidrop.dialects import Diagnostic
+from multidrop.base import places
+from multidrop.base.errors import Diagnostic
 from multidrop.shell import configuration
 
 
@@ -142,7 +143,7 @@ def test_a_file_that_cannot_be_read_is_named(folder):
 def test_without_the_variables_the_platform_says_where(monkeypatch):
     monkeypatch.delenv("MULTIDROP_CONFIG_DIR", raising=False)
     monkeypatch.setenv("XDG_CONFIG_HOME", "/somewhere")
-    assert configuration.config_file() == Path("/somewhere/multidrop/multidrop.toml")
+    assert places.config_file() == Path("/somewhere/multidrop/multidrop.toml")
 
 
 @pytest.mark.parametrize("label", ["-rf", "=1+1", "+1", "@x", "\x1b[31mred", "left\u202e", "a\x9b2J"])

@@ -2,7 +2,7 @@
 
 import pytest
 
-from multidrop.dialects import NoAnswer, Refused
+from multidrop.base.errors import NoAnswer, Refused
 from multidrop.simulator.cells import read
 from multidrop.simulator.floor import Floor
 from tests.support.cell_session import ETHERNET, bus, drive, session_on

@@ -7,7 +7,7 @@ import random
 
 import pytest
 
-from multidrop.dialects import DriveError, NoAnswer, Refused
+from multidrop.base.errors import DriveError, NoAnswer, Refused
 from multidrop.shell.configuration import Settings
 from multidrop.shell.events import Printed
 from multidrop.shell.session import Session

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from multidrop.dialects import Diagnostic
+from multidrop.base.errors import Diagnostic
 from multidrop.macros import Macro, Step, checked_values
 from multidrop.shell.operations.table import VERBS
 from multidrop.shell.scripts import words

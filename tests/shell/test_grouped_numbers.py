@@ -6,7 +6,7 @@ import asyncio
 
 import pytest
 
-from multidrop.dialects import Diagnostic, DriveError, Inexpressible
+from multidrop.base.errors import Diagnostic, DriveError, Inexpressible
 from multidrop.dialects.mcode.manual import program_checker, program_file
 from multidrop.dialects.mcode.manual.grammar import LineError, check_groups
 from multidrop.dialects.modbus.host.codec import Modbus, ModbusState

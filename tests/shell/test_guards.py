@@ -5,7 +5,7 @@ from contextlib import asynccontextmanager
 
 import pytest
 
-from multidrop.dialects import Diagnostic, Stopped
+from multidrop.base.errors import Diagnostic, Stopped
 from multidrop.macros import Macro, Step
 from multidrop.shell import configuration
 from multidrop.shell.events import By

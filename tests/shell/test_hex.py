@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from multidrop.dialects import Diagnostic
+from multidrop.base.errors import Diagnostic
 from multidrop.shell.events import Bytes
 from multidrop.shell.streams.event_printer import Printer
 from tests.support.cell_session import CellSession, bus

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from multidrop.dialects import Refused
+from multidrop.base.errors import Refused
 from multidrop.shell.events import Output
 from multidrop.shell.prompt import complete
 from multidrop.shell.session import Session

@@ -7,7 +7,7 @@ from contextlib import AsyncExitStack
 
 import pytest
 
-from multidrop.dialects import Diagnostic, DriveError, Inexpressible, Refused, Stopped
+from multidrop.base.errors import Diagnostic, DriveError, Inexpressible, Refused, Stopped
 from multidrop.drives.events import Sample, Traffic, Unsolicited
 from multidrop.shell.configuration import Settings
 from multidrop.shell.events import FAILURES, By, Notified, OnBus, Output, Printed

@@ -11,8 +11,8 @@ from pathlib import Path
 
 import pytest
 
-from multidrop.dialects import DriveError, NoAnswer, Procedure, Refused
-from multidrop.dialects.errors import MotionFailed
+from multidrop.base.errors import DriveError, MotionFailed, NoAnswer, Refused
+from multidrop.dialects import Procedure
 from multidrop.dialects.motions import Ending
 from multidrop.shell import motions
 from multidrop.shell.events import Failed, Notified, Output

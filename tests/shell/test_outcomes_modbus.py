@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from multidrop.dialects.errors import MotionFailed
+from multidrop.base.errors import MotionFailed
 from multidrop.drives.events import Conditioned, Traffic
 from multidrop.shell.configuration import Settings
 from multidrop.shell.events import OnBus, SessionEvent

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from multidrop.dialects.errors import MotionFailed
+from multidrop.base.errors import MotionFailed
 from multidrop.shell.events import Notified
 from multidrop.shell.session import Session
 from tests.support.cell_session import bus, drive, pmx, session_on

@@ -6,8 +6,7 @@ import asyncio
 
 import pytest
 
-from multidrop.dialects import Diagnostic, Refused, Stopped
-from multidrop.dialects.errors import MotionFailed
+from multidrop.base.errors import Diagnostic, MotionFailed, Refused, Stopped
 from multidrop.drives.events import Sample
 from multidrop.shell.events import By, Notified, OnBus, Output, Printed
 from multidrop.shell.prompt.complete import complete, hint

@@ -8,18 +8,19 @@ from pathlib import Path
 
 import pytest
 
-from multidrop.dialects import Diagnostic
-from multidrop.macros.atomic import open_private, private_folder, read_private, write_atomically
+from multidrop.base.atomic import open_private, private_folder, read_private, write_atomically
+from multidrop.base.errors import Diagnostic
+from multidrop.base.file_owners import other_writer
+from multidrop.base.store import Store
 from multidrop.shell import configuration
 from multidrop.shell.configuration import Settings
 from multidrop.shell.connect.urls import parse
-from multidrop.shell.file_owners import other_writer
 from multidrop.shell.log import files
 from multidrop.shell.prompt.line_queue import History
 from multidrop.shell.state import crash_marks
 from multidrop.shell.state.backups import Copy, Drafts
+from multidrop.shell.state.opened import lately, note
 from multidrop.shell.state.port_state import PortState
-from multidrop.shell.state.store import Store, lately, note
 from tests.support.front_door import Command, Home
 
 pytestmark = pytest.mark.fork

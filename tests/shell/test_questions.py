@@ -4,7 +4,7 @@ import asyncio
 
 import pytest
 
-from multidrop.dialects import Diagnostic, Stopped
+from multidrop.base.errors import Diagnostic, Stopped
 from multidrop.shell.configuration import Settings
 from multidrop.shell.prompt.terminal_input import PAUSE, Answer, at_keyboard
 from multidrop.shell.session import Session

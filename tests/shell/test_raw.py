@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from multidrop.dialects import Diagnostic, NoAnswer, Stopped
+from multidrop.base.errors import Diagnostic, NoAnswer, Stopped
 from multidrop.macros import Macro, Step
 from multidrop.shell.configuration import Settings
 from multidrop.shell.events import By, Bytes

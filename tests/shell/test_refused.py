@@ -4,7 +4,7 @@ import asyncio
 
 import pytest
 
-from multidrop.dialects import Diagnostic, DriveError, NoAnswer, Refused
+from multidrop.base.errors import Diagnostic, DriveError, NoAnswer, Refused
 from multidrop.drives import stopping
 from multidrop.drives.stop_readings import read_activity
 from multidrop.drives.stopping import Fate

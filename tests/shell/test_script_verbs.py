@@ -2,7 +2,7 @@
 
 import pytest
 
-from multidrop.dialects import Diagnostic
+from multidrop.base.errors import Diagnostic
 from multidrop.dialects.families import FAMILIES
 from multidrop.shell.operations.table import SCRIPT_VERBS, VERBS, find
 from multidrop.shell.verbs.session import described, explained, overview

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from multidrop.__main__ import main
-from multidrop.dialects import Diagnostic
+from multidrop.base.errors import Diagnostic
 from multidrop.shell.connect.urls import parse
 from multidrop.shell.plots.request import parse_target as plot_target
 from multidrop.shell.publishing.broker import parse_target as broker

@@ -7,8 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from multidrop.dialects import Inexpressible, NoAnswer, Refused, Stopped
-from multidrop.dialects.errors import Differs
+from multidrop.base.errors import Differs, Inexpressible, NoAnswer, Refused, Stopped
 from multidrop.drives.drive import Drive
 from multidrop.shell.sending import sending
 from multidrop.shell.session import Session

@@ -14,7 +14,7 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from multidrop.dialects import Diagnostic, DriveError, Inexpressible
+from multidrop.base.errors import Diagnostic, DriveError, Inexpressible
 from multidrop.dialects.codec import Procedure, Request
 from multidrop.dialects.families import FAMILIES
 from multidrop.dialects.mcode.manual.grammar import Number, parsed

@@ -6,7 +6,7 @@ import re
 
 import pytest
 
-from multidrop.dialects import Diagnostic, DriveError, Inexpressible, NoAnswer, Refused, Stopped
+from multidrop.base.errors import Diagnostic, DriveError, Inexpressible, NoAnswer, Refused, Stopped
 from multidrop.drives.events import Notice, Sent, Unsolicited
 from multidrop.macros import Macro, Step
 from multidrop.shell.channel import Front

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from multidrop.api.telemetry import AsyncTelemetry
-from multidrop.dialects import DriveError
+from multidrop.base.errors import DriveError
 from multidrop.dialects.tmcl.manual.commands import Axis, Call, Command
 from multidrop.drives.events import Sample
 from multidrop.shell import setting_units, snapshots

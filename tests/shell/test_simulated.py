@@ -4,7 +4,7 @@ import asyncio
 
 import pytest
 
-from multidrop.dialects import DriveError, Inexpressible, NoAnswer, Refused, Stopped
+from multidrop.base.errors import DriveError, Inexpressible, NoAnswer, Refused, Stopped
 from multidrop.drives.events import Traffic
 from multidrop.shell.configuration import SavedConnection, Settings
 from multidrop.shell.events import Failed, Notified, OnBus, Output, Printed

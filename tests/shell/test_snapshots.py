@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from multidrop.dialects import Diagnostic, DriveError, Stopped
+from multidrop.base.errors import Diagnostic, DriveError, Stopped
 from multidrop.shell import snapshots
 from multidrop.shell.configuration import Settings
 from multidrop.shell.events import Notified

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from multidrop.dialects import Diagnostic
+from multidrop.base.errors import Diagnostic
 from multidrop.dialects.mcode.manual.table import words
 from multidrop.shell import snapshots
 from multidrop.simulator import cells

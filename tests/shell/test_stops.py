@@ -5,7 +5,8 @@ from dataclasses import replace
 
 import pytest
 
-from multidrop.dialects import Diagnostic, DriveError, Motion, Stopped
+from multidrop.base.errors import Diagnostic, DriveError, Stopped
+from multidrop.dialects import Motion
 from multidrop.drives.drive import confirmed_motion
 from multidrop.drives.stopping import Fate
 from multidrop.shell import stop_report

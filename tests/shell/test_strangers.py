@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from multidrop.dialects import Diagnostic, Inexpressible
+from multidrop.base.errors import Diagnostic, Inexpressible
 from multidrop.drives.stopping import Fate
 from multidrop.drives.telemetry import Value
 from multidrop.shell.channel import Front

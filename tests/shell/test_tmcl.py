@@ -7,7 +7,7 @@ import itertools
 
 import pytest
 
-from multidrop.dialects import DriveError, Inexpressible, NoAnswer, Refused, Stopped
+from multidrop.base.errors import DriveError, Inexpressible, NoAnswer, Refused, Stopped
 from multidrop.dialects.families import TABLE
 from multidrop.dialects.tmcl.manual import instructions
 from multidrop.drives.events import Sample, Unsolicited

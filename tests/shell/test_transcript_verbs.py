@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from multidrop.dialects import Diagnostic
+from multidrop.base.errors import Diagnostic
 from multidrop.shell import configuration
 from multidrop.shell.events import Notified
 from multidrop.shell.roles import EVERYTHING, Filter

@@ -6,8 +6,7 @@ from contextlib import asynccontextmanager
 
 import pytest
 
-from multidrop.dialects import Diagnostic, DriveError, Inexpressible, Refused, Stopped
-from multidrop.dialects.errors import Differs
+from multidrop.base.errors import Diagnostic, Differs, DriveError, Inexpressible, Refused, Stopped
 from multidrop.macros import Macro, Step
 from multidrop.shell.events import By, Notified
 from multidrop.shell.scripts.executor import play, run_script

@@ -6,8 +6,7 @@ import asyncio
 
 import pytest
 
-from multidrop.dialects import Diagnostic
-from multidrop.dialects.errors import Differs
+from multidrop.base.errors import Diagnostic, Differs
 from multidrop.dialects.units import Takes, scale
 from tests.support.cell_session import CellSession, bus, drive, party, pmx
 from tests.support.said import said

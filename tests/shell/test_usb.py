@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 
-from multidrop.dialects import NoAnswer, Refused
+from multidrop.base.errors import NoAnswer, Refused
 from multidrop.drives.events import Sample
 from multidrop.drives.stopping import Fate
 from multidrop.shell.connect.opening import port_name

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from multidrop.dialects import Diagnostic, DriveError
+from multidrop.base.errors import Diagnostic, DriveError
 from multidrop.shell.line_syntax import each_names_one_drive
 from multidrop.shell.session import Session
 from multidrop.shell.waits import condition

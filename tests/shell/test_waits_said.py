@@ -9,8 +9,8 @@ from typing import Any
 
 import pytest
 
-from multidrop.dialects import Diagnostic, DriveError, Motion
-from multidrop.dialects.errors import Timeout
+from multidrop.base.errors import Diagnostic, DriveError, Timeout
+from multidrop.dialects import Motion
 from multidrop.shell.waits import SIGNS, Condition, Standing, condition, in_motion, seconds, standings, wait
 from tests.support.cell_session import CellSession, bus, party, pmx
 

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from multidrop.dialects import Diagnostic
+from multidrop.base.errors import Diagnostic
 from multidrop.simulator import cells as cell
 from multidrop.simulator.cell.spec import BusSpec, Cell, DriveSpec, Faults, WorldSpec
 from multidrop.simulator.families import BY_PERSONALITY

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from multidrop.dialects import Diagnostic
+from multidrop.base.errors import Diagnostic
 from multidrop.simulator import cells
 from multidrop.simulator import cells as cell
 from multidrop.simulator.cell.writer import BusText, DriveText, Entry, plain, write

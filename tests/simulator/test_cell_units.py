@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from multidrop.dialects import Diagnostic
+from multidrop.base.errors import Diagnostic
 from multidrop.dialects.units import Scale, scale
 from multidrop.simulator import cells
 from multidrop.simulator.cell.spec import DriveSpec, WorldSpec

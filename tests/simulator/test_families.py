@@ -9,7 +9,7 @@ from struct import Struct
 
 import pytest
 
-from multidrop.dialects import Diagnostic
+from multidrop.base.errors import Diagnostic
 from multidrop.simulator.cell.drive_keys import WORLD_KEYS, common_keys, read_worlds
 from multidrop.simulator.cell.spec import DriveSpec, WorldSpec
 from multidrop.simulator.cell.table import Table

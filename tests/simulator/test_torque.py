@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from multidrop.dialects import Diagnostic
+from multidrop.base.errors import Diagnostic
 from multidrop.simulator import cells
 from multidrop.simulator.cell.spec import MotorSpec, WorldSpec
 from multidrop.simulator.kinematics import LINEAR, SINUSOIDAL, TRIANGLE, Pace, Profile, Shape, move, slew

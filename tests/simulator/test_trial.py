@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from multidrop.dialects import Diagnostic
+from multidrop.base.errors import Diagnostic
 from multidrop.dialects.mcode.manual import program_file
 from multidrop.simulator.cell.spec import DriveSpec, WorldSpec
 from multidrop.simulator.lexium.program_run import ProgramRun

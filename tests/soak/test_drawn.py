@@ -120,7 +120,7 @@ def test_every_mark_is_of_a_mutant_that_there_is() -> None:
 
 
 def test_the_tests_of_a_line_are_those_that_executed_it_the_fast_ones_first(tmp_path: Path) -> None:
-    path = "macros/atomic.py"
+    path = "base/atomic.py"
     name, first, last = next(functions((rooms.ROOT / path).read_bytes()))
     with closing(sqlite3.connect(tmp_path / "data")) as data, data:
         data.execute("create table context (id, context)")

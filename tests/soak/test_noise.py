@@ -2,7 +2,7 @@
 
 import pytest
 
-from multidrop.dialects import NoAnswer, Refused
+from multidrop.base.errors import NoAnswer, Refused
 from multidrop.simulator.cells import read
 from multidrop.simulator.floor import Floor
 from multidrop.transports import TransportLost

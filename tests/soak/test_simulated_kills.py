@@ -14,13 +14,13 @@ from random import Random
 
 import pytest
 
-from multidrop.macros.atomic import create_atomically, make_folder, write_atomically
+from multidrop.base.atomic import create_atomically, make_folder, write_atomically
+from multidrop.base.store import Store
 from multidrop.shell import threads
 from multidrop.shell.configuration import Settings
 from multidrop.shell.log import files
 from multidrop.shell.prompt.line_queue import History
 from multidrop.shell.state.backups import write_backup
-from multidrop.shell.state.store import Store
 from soak.simulation.climate import Climate
 from soak.simulation.clock import SimulatedLoop
 from soak.simulation.disk import Disk

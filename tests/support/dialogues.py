@@ -26,9 +26,9 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
-from multidrop.dialects import End, Reply, Request, Stopped
+from multidrop.base.errors import Diagnostic, DriveError, Stopped
+from multidrop.dialects import End, Reply, Request
 from multidrop.dialects.codec import Codec, copy_with
-from multidrop.dialects.errors import Diagnostic, DriveError
 from multidrop.dialects.state import DriveState
 from tests.support.procedure import ProcedureRunner
 

@@ -17,7 +17,8 @@ from typing import Any
 
 from textual.pilot import Pilot
 
-from multidrop.dialects import Diagnostic, DriveError, DriveState, Stopped
+from multidrop.base.errors import Diagnostic, DriveError, Stopped
+from multidrop.dialects import DriveState
 from multidrop.dialects.families import FAMILIES
 from multidrop.dialects.family import Family
 from multidrop.dialects.units import Basis

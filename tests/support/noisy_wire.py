@@ -12,7 +12,8 @@ from dataclasses import dataclass, field
 from random import Random
 from typing import Any
 
-from multidrop.dialects import DriveError, DriveState, End, Priority
+from multidrop.base.errors import DriveError
+from multidrop.dialects import DriveState, End, Priority
 from multidrop.dialects.families import family_of
 from multidrop.dialects.mcode.host.codec import MCode
 from multidrop.dialects.mcode.host.state import MCodeState

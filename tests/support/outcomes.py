@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from multidrop.dialects.errors import MotionFailed
+from multidrop.base.errors import MotionFailed
 from multidrop.shell.session import Session
 
 

@@ -6,7 +6,7 @@ import os
 import re
 from pathlib import Path
 
-from multidrop.dialects import Diagnostic, DriveError
+from multidrop.base.errors import Diagnostic, DriveError
 from multidrop.shell.events import By, Failed, Notified, Output, Printed
 from multidrop.transports import TransportLost
 from tests.support.cell_session import CellSession

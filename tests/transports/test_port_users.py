@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from multidrop.dialects import DriveError
+from multidrop.base.errors import DriveError
 from multidrop.shell.configuration import Settings
 from multidrop.shell.session import Session
 from multidrop.transports import port_users, serial_pipe

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from multidrop.dialects import Diagnostic
+from multidrop.base.errors import Diagnostic
 from multidrop.dialects.families import program_languages
 from multidrop.dialects.program_files import Part
 from multidrop.shell.programs.program_text import ProgramGrammar

@@ -11,7 +11,7 @@ import pytest
 from textual import events
 from textual.pilot import Pilot
 
-from multidrop.dialects.files import rows
+from multidrop.base.files import rows
 from multidrop.shell.channel import Field as Wanted
 from multidrop.tui import palette
 from multidrop.tui.actions import Actions

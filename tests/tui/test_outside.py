@@ -13,7 +13,7 @@ import pytest
 from textual import events
 from textual.pilot import Pilot
 
-from multidrop.dialects import Diagnostic
+from multidrop.base.errors import Diagnostic
 from multidrop.shell.events import Phase, ProgramRead, ProgramSeen
 from multidrop.shell.programs.edited_file import EditedFile, Outside
 from multidrop.shell.state.backups import Copy, Drafts

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from textual.pilot import Pilot
 
-from multidrop.dialects import Diagnostic
+from multidrop.base.errors import Diagnostic
 from multidrop.dialects.families import FAMILIES
 from multidrop.dialects.values import IO, VARIABLES, Reading, Readings
 from multidrop.shell.events import SettingsRead

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from multidrop.dialects import Diagnostic
+from multidrop.base.errors import Diagnostic
 from multidrop.drives.events import Lost, Sample, Valued
 from multidrop.shell.events import By, OnBus
 from multidrop.shell.roles import Series

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 from textual.pilot import Pilot
 
-from multidrop.dialects import Diagnostic
+from multidrop.base.errors import Diagnostic
 from multidrop.drives.events import Unsolicited
 from multidrop.shell.events import By, Entered, OnBus, Printed
 from multidrop.shell.roles import Filter

@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from multidrop.dialects import Stopped
+from multidrop.base.errors import Stopped
 from multidrop.macros import Macro, Step
 from multidrop.shell.events import By
 from multidrop.tui import sharing

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from multidrop.dialects import Diagnostic
+from multidrop.base.errors import Diagnostic
 from multidrop.shell.configuration import Settings
 from multidrop.shell.connect import opening
 from multidrop.shell.finding import scanning
@@ -111,10 +111,11 @@ async def test_a_url_that_cannot_be_opened_keeps_its_tab_with_its_reason(tmp_pat
 async def test_a_wrong_configuration_is_edited_at_its_line_with_one_key(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, key: str, urls: list[str]
 ) -> None:
+    from multidrop.base import places
     from multidrop.shell import configuration
 
     monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path))
-    file = configuration.config_file()
+    file = places.config_file()
     file.parent.mkdir(parents=True, exist_ok=True)
     file.write_text('[screen]\ntheme = "multidrop-dark"\n\n[log]\nfiles = "x"\nbytes = "y"\n')
     settings = configuration.load(lenient=True)

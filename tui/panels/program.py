@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from multidrop.dialects.text import counted
+from multidrop.base.text import counted
 from multidrop.shell.events import Phase
 from multidrop.tui.panels.view import Glance, View
 from multidrop.tui.readout import Readout

@@ -7,7 +7,7 @@ from collections.abc import Awaitable, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
-from multidrop.dialects.text import visible
+from multidrop.base.text import visible
 from multidrop.shell.roles import Series
 from multidrop.tui.panels.drive import SIGN, alarm_words, program_words, trouble_of
 from multidrop.tui.panels.drives import STATE, short_words, spark

@@ -20,7 +20,7 @@ from textual.screen import ModalScreen
 from textual.widgets import Input, OptionList, Static
 from textual.widgets.option_list import Option
 
-from multidrop.dialects.text import visible
+from multidrop.base.text import visible
 from multidrop.shell.channel import Field as Wanted
 from multidrop.tui.key_table import Keyed, hint
 from multidrop.tui.widgets.bars import StopSign

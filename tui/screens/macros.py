@@ -6,7 +6,7 @@ import asyncio
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from multidrop.dialects import Diagnostic
+from multidrop.base.errors import Diagnostic
 from multidrop.macros import Macro, MacroStore
 from multidrop.shell.playing import Playing
 from multidrop.tui.panels.view import View

@@ -15,8 +15,8 @@ from textual.app import ComposeResult
 from textual.containers import Vertical
 from textual.screen import Screen
 
-from multidrop.dialects import Diagnostic
-from multidrop.dialects.on_demand import imported
+from multidrop.base.errors import Diagnostic
+from multidrop.base.on_demand import imported
 from multidrop.macros import Macro
 from multidrop.shell.line_syntax import Place, showing
 from multidrop.shell.session import Session

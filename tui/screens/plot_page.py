@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from math import isfinite
 
-from multidrop.dialects import Diagnostic
+from multidrop.base.errors import Diagnostic
 from multidrop.shell.plots.plot import write
 from multidrop.shell.plots.request import PlotTarget, parse_target
 from multidrop.shell.plots.rerun_calls import Batch, Curve

@@ -1,7 +1,7 @@
 """The program page: an editor of a text file, and the drive: download, run, trace, step and break point.
 
 A text is opened, checked as it is typed, and saved. It stays when the page is left, after a stop and when the line is
-lost. Soon after an edit a copy of it is on the disk (`shell.state.store`), which survives a crash.
+lost. Soon after an edit a copy of it is on the disk (`base.store`), which survives a crash.
 
 Every line that it sends is a typed line, which a dialog shows before it is sent, and the transcript afterwards.
 """
@@ -17,7 +17,7 @@ from functools import partial
 from textual.app import ComposeResult
 from textual.containers import Horizontal, Vertical
 
-from multidrop.dialects import Diagnostic
+from multidrop.base.errors import Diagnostic
 from multidrop.dialects.program_files import Entry, Problem, in_order
 from multidrop.shell.programs.checking import ending_of
 from multidrop.shell.programs.edited_file import real_text

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple, Protocol
 
 from textual.app import App
 
-from multidrop.dialects import Diagnostic
+from multidrop.base.errors import Diagnostic
 from multidrop.shell.programs.edited_file import ChangedMeanwhile, Outside
 from multidrop.tui.editor import ConfigurationGrammar, Grammar
 from multidrop.tui.screens.dialogs import Confirm

@@ -11,9 +11,9 @@ from typing import NamedTuple
 
 from rich.text import Text
 
+from multidrop.base.text import counted
 from multidrop.dialects.families import program_languages
 from multidrop.dialects.program_files import Entry, Part, Problem, errors, in_order
-from multidrop.dialects.text import counted
 from multidrop.shell.line_syntax import join_target
 from multidrop.shell.programs.edited_file import real_text
 from multidrop.shell.programs.program_text import ProgramGrammar

@@ -15,7 +15,7 @@ from textual.containers import Vertical
 from textual.widgets import Static
 from textual.widgets.option_list import Option
 
-from multidrop.dialects.text import visible
+from multidrop.base.text import visible
 from multidrop.shell.events import FAILURES
 from multidrop.shell.session import Session
 from multidrop.tui.assist import EDIT, Assist, StartEntry

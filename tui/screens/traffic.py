@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from itertools import islice
 
-from multidrop.dialects.text import counted
+from multidrop.base.text import counted
 from multidrop.tui.panels.table import piece_rows
 from multidrop.tui.panels.view import View, names_on
 from multidrop.tui.screen_model import TrafficStore

@@ -10,7 +10,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from operator import attrgetter
 
-from multidrop.dialects import Diagnostic
+from multidrop.base.errors import Diagnostic
 from multidrop.drives.drive import Drive
 from multidrop.shell.roles import Series
 from multidrop.tui.panels.drive import LIMITS, drive_rows

@@ -21,8 +21,8 @@ from textual.reactive import Reactive
 from textual.widgets import Input
 from textual.widgets.input import Selection
 
-from multidrop.dialects import Diagnostic
-from multidrop.dialects.files import lines_of
+from multidrop.base.errors import Diagnostic
+from multidrop.base.files import lines_of
 from multidrop.tui.text import fit
 from multidrop.tui.widgets.lines import Row
 

@@ -18,7 +18,7 @@ from textual.geometry import Region, Size
 from textual.strip import Strip
 from textual.widget import Widget
 
-from multidrop.dialects.text import visible
+from multidrop.base.text import visible
 
 T = TypeVar("T")
 Span = tuple[str, str]

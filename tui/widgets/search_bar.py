@@ -14,7 +14,7 @@ from textual.geometry import Size
 from textual.reactive import Reactive
 from textual.widgets import Input
 
-from multidrop.dialects.text import counted
+from multidrop.base.text import counted
 from multidrop.tui.key_table import Keyed, hint
 from multidrop.tui.widgets.lines import Lines, Row, spread, width_of
 from multidrop.tui.widgets.transcript import Transcript

@@ -22,7 +22,7 @@ from textual.driver import Driver
 from textual.filter import LineFilter
 from textual.theme import BUILTIN_THEMES, Theme
 
-from multidrop.dialects.text import visible
+from multidrop.base.text import visible
 from multidrop.shell.configuration import Look
 from multidrop.tui.curves.raster import INKS, Ink
 

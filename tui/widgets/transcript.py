@@ -12,7 +12,7 @@ from typing import NamedTuple
 from rich.cells import cell_len, chop_cells
 from textual import events
 
-from multidrop.dialects.text import counted
+from multidrop.base.text import counted
 from multidrop.shell.raw import Form
 from multidrop.shell.roles import Filter
 from multidrop.shell.streams.event_printer import laid_out

@@ -10,8 +10,8 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TypeVar
 
+from multidrop.base.errors import Inexpressible, NoAnswer
 from multidrop.dialects.codec import End, Kind, Procedure, Request
-from multidrop.dialects.errors import Inexpressible, NoAnswer
 from multidrop.dialects.exchange import limited, unanswered
 from multidrop.dialects.mcode.host import classify
 from multidrop.dialects.mcode.host.codec import MCode

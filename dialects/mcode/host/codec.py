@@ -11,8 +11,8 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import ClassVar
 
+from multidrop.base.errors import Inexpressible
 from multidrop.dialects.codec import Codec, Decoded, End, Kind, Reply, Request, Started, StopPiece
-from multidrop.dialects.errors import Inexpressible
 from multidrop.dialects.mcode.host import classify, framing
 from multidrop.dialects.mcode.host.reply_parser import ENDLESS, ReplyLines, ReplyParser, divided
 from multidrop.dialects.mcode.manual.program_file import LONGEST, commented, spaced, unsendable

@@ -15,9 +15,9 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
+from multidrop.base.errors import Diagnostic, Inexpressible, NoAnswer, Refused
 from multidrop.dialects.codec import Decoded, End, Kind, Procedure, Reply, Request
 from multidrop.dialects.debugging import Debugging, Look, Neighbours, Stepped
-from multidrop.dialects.errors import Diagnostic, Inexpressible, NoAnswer, Refused
 from multidrop.dialects.mcode.host.codec import MCode
 from multidrop.dialects.mcode.host.exchange import printed_value
 from multidrop.dialects.mcode.host.framing import printable

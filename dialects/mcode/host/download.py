@@ -15,10 +15,11 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 
+from multidrop.base.errors import DriveError, Inexpressible, NoAnswer, Refused, Stopped
+from multidrop.base.files import SourceLine
+from multidrop.base.text import counted
 from multidrop.dialects.codec import End, Kind, Procedure, Request
-from multidrop.dialects.errors import DriveError, Inexpressible, NoAnswer, Refused, Stopped
 from multidrop.dialects.family import Progress
-from multidrop.dialects.files import SourceLine
 from multidrop.dialects.mcode.host import classify
 from multidrop.dialects.mcode.host.before_request import before_request
 from multidrop.dialects.mcode.host.exchange import REPEATS, ends_in_program_mode, leave_program, read_error, take_out
@@ -40,7 +41,6 @@ from multidrop.dialects.mcode.host.state import MCodeState, described, who
 from multidrop.dialects.mcode.manual.program_checker import slips
 from multidrop.dialects.mcode.manual.program_file import ProgramLine
 from multidrop.dialects.program_files import LOCKED, Held
-from multidrop.dialects.text import counted
 
 WHOLE = {"", "0", "1", "S"}
 """The parameters with which CP clears all programs."""

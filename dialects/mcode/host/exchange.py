@@ -7,8 +7,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from functools import lru_cache
 
+from multidrop.base.errors import DriveError, Inexpressible, NoAnswer, Refused, Stopped
 from multidrop.dialects.codec import End, Kind, Priority, Procedure, Reply, Request
-from multidrop.dialects.errors import DriveError, Inexpressible, NoAnswer, Refused, Stopped
 from multidrop.dialects.exchange import unanswered
 from multidrop.dialects.mcode.host import classify
 from multidrop.dialects.mcode.host.classify import INTEGER, NOTHING

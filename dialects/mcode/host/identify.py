@@ -21,8 +21,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
+from multidrop.base.errors import Inexpressible, NoAnswer
 from multidrop.dialects.codec import Kind, Procedure, Reply, Request
-from multidrop.dialects.errors import Inexpressible, NoAnswer
 from multidrop.dialects.family import Hints
 from multidrop.dialects.mcode.host.codec import NOBODY, TO_PARTY, MCode
 from multidrop.dialects.mcode.host.identity import (

@@ -15,8 +15,8 @@ import re
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
+from multidrop.base.errors import NoAnswer, Refused
 from multidrop.dialects.codec import Kind, Priority, Procedure, Reply, Request
-from multidrop.dialects.errors import NoAnswer, Refused
 from multidrop.dialects.mcode.host import classify
 from multidrop.dialects.mcode.host.classify import NOTHING, Setting
 from multidrop.dialects.mcode.host.codec import NOBODY, PONG, SLOWEST, MCode, pongs

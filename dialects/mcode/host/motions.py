@@ -14,8 +14,8 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Generic, TypeVar
 
+from multidrop.base.errors import DriveError
 from multidrop.dialects.codec import Procedure
-from multidrop.dialects.errors import DriveError
 from multidrop.dialects.mcode.host import classify, exchange, operations
 from multidrop.dialects.mcode.host.before_request import before_request, value_of
 from multidrop.dialects.mcode.host.classify import INTEGER

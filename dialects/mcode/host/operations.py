@@ -7,9 +7,9 @@ from collections.abc import Sequence
 from dataclasses import replace
 from functools import lru_cache, partial
 
+from multidrop.base.errors import DriveError, Inexpressible, NoAnswer, Refused, Stopped
 from multidrop.dialects.certifying import repaired
 from multidrop.dialects.codec import End, Kind, Priority, Procedure, Reply, Request
-from multidrop.dialects.errors import DriveError, Inexpressible, NoAnswer, Refused, Stopped
 from multidrop.dialects.exchange import unsent_if_stopped
 from multidrop.dialects.family import Motion
 from multidrop.dialects.mcode.host import classify, exchange

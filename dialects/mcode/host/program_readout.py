@@ -8,10 +8,10 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import TypeVar
 
+from multidrop.base.errors import Diagnostic, NoAnswer, Refused
+from multidrop.base.files import SourceLine, split_lines
 from multidrop.dialects.codec import Procedure
-from multidrop.dialects.errors import Diagnostic, NoAnswer, Refused
 from multidrop.dialects.family import Progress
-from multidrop.dialects.files import SourceLine, split_lines
 from multidrop.dialects.mcode.host import classify
 from multidrop.dialects.mcode.host.codec import EVERY_DRIVE
 from multidrop.dialects.mcode.host.exchange import REPEATS

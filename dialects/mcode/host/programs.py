@@ -7,11 +7,12 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from itertools import zip_longest
 
+from multidrop.base.errors import Refused
+from multidrop.base.files import SourceLine
+from multidrop.base.text import counted, real
 from multidrop.dialects.certifying import Certifying, Occupied
 from multidrop.dialects.codec import Procedure
-from multidrop.dialects.errors import Refused
 from multidrop.dialects.family import Programs
-from multidrop.dialects.files import SourceLine
 from multidrop.dialects.mcode.host import classify, operations, program_readout
 from multidrop.dialects.mcode.host.before_request import value_of
 from multidrop.dialects.mcode.host.download import clears_itself, download
@@ -24,7 +25,6 @@ from multidrop.dialects.mcode.manual.mnemonic import ETHERNET, EXPANDED
 from multidrop.dialects.mcode.manual.statements import canonical
 from multidrop.dialects.mcode.manual.table import lookup
 from multidrop.dialects.program_files import Difference, Held, Stored, first_difference
-from multidrop.dialects.text import counted, real
 
 HOLDING = ("variable", "flag")
 """The kinds of words that hold a value."""

@@ -6,8 +6,8 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
+from multidrop.base.errors import NoAnswer
 from multidrop.dialects.codec import Kind, Procedure, Request
-from multidrop.dialects.errors import NoAnswer
 from multidrop.dialects.mcode.host.codec import NOBODY, MCode, pongs
 from multidrop.dialects.mcode.host.framing import NAK, sealed
 from multidrop.dialects.mcode.host.identity import BRIEF, PROGRAM_PROMPT, find, overflow, write_stop

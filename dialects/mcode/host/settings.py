@@ -6,8 +6,8 @@ import re
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
 
+from multidrop.base.errors import NoAnswer, Refused
 from multidrop.dialects.codec import End, Kind, Priority, Procedure, Request
-from multidrop.dialects.errors import NoAnswer, Refused
 from multidrop.dialects.mcode.host.before_request import before_request
 from multidrop.dialects.mcode.host.codec import EVERY_DRIVE
 from multidrop.dialects.mcode.host.exchange import (

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
-from multidrop.dialects.errors import Refused
+from multidrop.base.errors import Refused
 from multidrop.dialects.exchange import Looking
 from multidrop.dialects.mcode.host.codec import MCode
 from multidrop.dialects.mcode.manual import errors

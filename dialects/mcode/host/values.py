@@ -7,8 +7,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 
+from multidrop.base.errors import Diagnostic, NoAnswer, Refused
 from multidrop.dialects.codec import End, Priority, Procedure
-from multidrop.dialects.errors import Diagnostic, NoAnswer, Refused
 from multidrop.dialects.mcode.host import debugging
 from multidrop.dialects.mcode.host.before_request import before_request, value_of
 from multidrop.dialects.mcode.host.codec import EVERY_DRIVE

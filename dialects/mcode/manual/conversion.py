@@ -15,8 +15,8 @@ from itertools import product as combinations
 from random import Random
 from typing import Any
 
-from multidrop.dialects.errors import Diagnostic
-from multidrop.dialects.files import rows, split_lines
+from multidrop.base.errors import Diagnostic
+from multidrop.base.files import rows, split_lines
 from multidrop.dialects.mcode.manual import program_file
 from multidrop.dialects.mcode.manual.grammar import Number, Statement, parsed, statement_tokens
 from multidrop.dialects.mcode.manual.help import out_of_range

@@ -6,8 +6,8 @@ from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
 from functools import lru_cache
 from typing import NamedTuple
 
-from multidrop.dialects.errors import Diagnostic
-from multidrop.dialects.files import split_lines
+from multidrop.base.errors import Diagnostic
+from multidrop.base.files import split_lines
 from multidrop.dialects.mcode.manual import help
 from multidrop.dialects.mcode.manual.grammar import NAME_FORM, Token, divided, is_name, statement_tokens, tokens
 from multidrop.dialects.mcode.manual.mnemonic import EVERY, Mnemonic

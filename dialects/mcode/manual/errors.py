@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from enum import IntEnum
 
-from multidrop.dialects.files import rows
+from multidrop.base.files import rows
 
 
 class ErrorNumber(IntEnum):

@@ -20,7 +20,7 @@ from functools import lru_cache
 from math import inf
 from typing import NamedTuple
 
-from multidrop.dialects.comments import grouped_at
+from multidrop.base.comments import grouped_at
 from multidrop.dialects.mcode.manual.errors import ErrorNumber
 from multidrop.dialects.mcode.manual.table import MDRIVE, MNEMONICS, lookup
 

@@ -13,8 +13,8 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Mapping
 
+from multidrop.base.files import rows
 from multidrop.dialects.family import ADDRESSES, EVERYONE, Guard, Protection, to_all
-from multidrop.dialects.files import rows
 from multidrop.dialects.mcode.manual.grammar import LineError, Name, Number, Text, parse, parsed
 from multidrop.dialects.mcode.manual.mnemonic import ETHERNET
 from multidrop.dialects.mcode.manual.program_file import bare

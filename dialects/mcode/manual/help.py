@@ -9,8 +9,8 @@ import re
 from collections.abc import Mapping
 from functools import cache
 
-from multidrop.dialects.errors import Diagnostic
-from multidrop.dialects.files import rows
+from multidrop.base.errors import Diagnostic
+from multidrop.base.files import rows
 from multidrop.dialects.mcode.manual import errors
 from multidrop.dialects.mcode.manual.errors import ErrorNumber
 from multidrop.dialects.mcode.manual.grammar import LineError, Number, Statement, parse, parsed, tokens

@@ -10,7 +10,7 @@ from collections.abc import Collection, Iterable, Mapping
 from itertools import combinations
 from math import ceil
 
-from multidrop.dialects.errors import Diagnostic
+from multidrop.base.errors import Diagnostic
 from multidrop.dialects.mcode.manual import parameters as manual
 from multidrop.dialects.mcode.manual.mnemonic import CLOSED_LOOP, EXPANDED, MDRIVE_PLUS
 from multidrop.dialects.mcode.manual.parameters import CLOCKS, COUNTED, SHARED, TORQUE, TRIPS, WIRE, writable

@@ -13,7 +13,7 @@ from enum import Enum
 from functools import lru_cache
 from math import isfinite
 
-from multidrop.dialects.errors import Diagnostic
+from multidrop.base.errors import Diagnostic
 from multidrop.dialects.mcode.manual.grammar import is_name
 from multidrop.dialects.mcode.manual.mnemonic import (
     CLOSED_LOOP,

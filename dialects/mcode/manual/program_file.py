@@ -15,8 +15,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from math import inf
 
-from multidrop.dialects.comments import outside
-from multidrop.dialects.files import SourceLine, split_lines, wrong_characters
+from multidrop.base.comments import outside
+from multidrop.base.files import SourceLine, split_lines, wrong_characters
 from multidrop.dialects.mcode.manual.grammar import LineError, Token, check_groups, parse, tokens
 from multidrop.dialects.mcode.manual.statements import canonical
 from multidrop.dialects.mcode.manual.table import lookup

@@ -15,7 +15,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from multidrop.dialects.files import rows
+from multidrop.base.files import rows
 from multidrop.dialects.mcode.manual.mnemonic import EVERY, LEXIUM, MDRIVE_PLUS, READ_ONLY, Mnemonic, Number
 
 

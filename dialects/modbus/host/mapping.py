@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from multidrop.dialects.errors import Inexpressible, Refused
+from multidrop.base.errors import Inexpressible, Refused
 from multidrop.dialects.mcode.manual import errors
 from multidrop.dialects.mcode.manual.errors import ErrorNumber
 from multidrop.dialects.mcode.manual.grammar import Argument, Name, Number, Statement

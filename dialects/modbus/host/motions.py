@@ -8,9 +8,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
+from multidrop.base.errors import Refused
+from multidrop.base.files import split_lines
 from multidrop.dialects.codec import Procedure
-from multidrop.dialects.errors import Refused
-from multidrop.dialects.files import split_lines
 from multidrop.dialects.mcode.host.motions import Access, motions, starts_program
 from multidrop.dialects.modbus.host.codec import ModbusState
 from multidrop.dialects.modbus.host.operations import PRODUCT, error_number, printed, value

@@ -9,9 +9,9 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Mapping, Sequence
 
+from multidrop.base.errors import Inexpressible, NoAnswer, Refused
 from multidrop.dialects.certifying import Certifying
 from multidrop.dialects.codec import End, Kind, Priority, Procedure, Reply, Request
-from multidrop.dialects.errors import Inexpressible, NoAnswer, Refused
 from multidrop.dialects.exchange import unanswered
 from multidrop.dialects.family import Hints, Motion
 from multidrop.dialects.mcode.host.classify import starts_motion

@@ -11,8 +11,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 
+from multidrop.base.errors import Diagnostic, Inexpressible, NoAnswer, Refused
 from multidrop.dialects.codec import Priority, Procedure, Request
-from multidrop.dialects.errors import Diagnostic, Inexpressible, NoAnswer, Refused
 from multidrop.dialects.mcode.host import units
 from multidrop.dialects.mcode.host.classify import WHOLE
 from multidrop.dialects.mcode.host.motions import cause

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 
-from multidrop.dialects.errors import Diagnostic
+from multidrop.base.errors import Diagnostic
 from multidrop.dialects.mcode.manual import help as mcode
 from multidrop.dialects.mcode.manual.mnemonic import ETHERNET, INT_HIGH, INT_LOW, Mnemonic
 from multidrop.dialects.mcode.manual.table import lookup, words

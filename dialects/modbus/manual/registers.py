@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
-from multidrop.dialects.files import rows
+from multidrop.base.files import rows
 
 INT32 = (-(2**31), 2**31 - 1)
 

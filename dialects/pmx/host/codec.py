@@ -10,8 +10,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
+from multidrop.base.errors import Inexpressible
 from multidrop.dialects.codec import Codec, Decoded, End, Kind, Reply, Request, Started, StopPiece
-from multidrop.dialects.errors import Inexpressible
 from multidrop.dialects.pmx.manual.table import AXES, MOTIONS, PROGRAMS, axes_of, lookup, reads, starts_motion
 from multidrop.dialects.state import DriveState
 

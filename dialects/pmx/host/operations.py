@@ -6,9 +6,9 @@ import re
 from collections.abc import Sequence
 from dataclasses import replace
 
+from multidrop.base.errors import Inexpressible, NoAnswer, Refused
 from multidrop.dialects.certifying import Certifying
 from multidrop.dialects.codec import End, Kind, Priority, Procedure, Reply, Request
-from multidrop.dialects.errors import Inexpressible, NoAnswer, Refused
 from multidrop.dialects.exchange import Exchange
 from multidrop.dialects.family import Hints, Motion, Referencing
 from multidrop.dialects.pmx.host.codec import FACTORY, Pmx, PmxState

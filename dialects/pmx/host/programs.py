@@ -10,11 +10,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
+from multidrop.base.errors import Diagnostic, DriveError, NoAnswer, Refused, Stopped
+from multidrop.base.files import SourceLine, lines_of_text
+from multidrop.base.text import whole
 from multidrop.dialects.codec import End, Procedure
 from multidrop.dialects.debugging import Debugging, Look, Neighbours, lacking
-from multidrop.dialects.errors import Diagnostic, DriveError, NoAnswer, Refused, Stopped
 from multidrop.dialects.family import Programs, Progress
-from multidrop.dialects.files import SourceLine, lines_of_text
 from multidrop.dialects.pmx.host.codec import PmxState
 from multidrop.dialects.pmx.host.operations import OK, PROGRAMS, answered, moving, number, perform, who
 from multidrop.dialects.pmx.manual import program_file, script_checker
@@ -23,7 +24,6 @@ from multidrop.dialects.pmx.manual.script_compiler import EMPTY, ERASED, LINES
 from multidrop.dialects.pmx.manual.script_parser import VARIABLES
 from multidrop.dialects.pmx.manual.table import PROBE, PROBED, lookup
 from multidrop.dialects.program_files import Difference, Held, Stored, first_difference
-from multidrop.dialects.text import whole
 
 RUNS = (1, 2)
 """The states of a program that runs or waits to go on."""

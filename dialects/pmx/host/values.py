@@ -17,8 +17,8 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 
+from multidrop.base.errors import Diagnostic, Inexpressible
 from multidrop.dialects.codec import Priority, Procedure, Request
-from multidrop.dialects.errors import Diagnostic, Inexpressible
 from multidrop.dialects.pmx.host.codec import PmxState
 from multidrop.dialects.pmx.host.operations import (
     LATER,

@@ -9,8 +9,8 @@ import re
 from collections.abc import Container, Iterable, Iterator, Sequence
 from dataclasses import replace
 
-from multidrop.dialects.errors import Diagnostic
-from multidrop.dialects.files import split_lines
+from multidrop.base.errors import Diagnostic
+from multidrop.base.files import split_lines
 from multidrop.dialects.pmx.manual import script_parser
 from multidrop.dialects.pmx.manual.script_parser import Statement, Value, parse
 from multidrop.dialects.program_files import Block, Offer, Span, UserName, Word, replaced

@@ -5,7 +5,7 @@ from __future__ import annotations
 import difflib
 from dataclasses import replace
 
-from multidrop.dialects.errors import Diagnostic
+from multidrop.base.errors import Diagnostic
 from multidrop.dialects.pmx.manual import script_parser
 from multidrop.dialects.pmx.manual.table import (
     COMMANDS,

@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Mapping, Sequence
 
-from multidrop.dialects.files import SourceLine, split_lines, wrong_characters
+from multidrop.base.files import SourceLine, split_lines, wrong_characters
 from multidrop.dialects.pmx.manual import script_checker, script_compiler, script_parser
 from multidrop.dialects.pmx.manual.script_compiler import EMPTY, ERASED, LINES
 from multidrop.dialects.pmx.manual.script_parser import AXES, WORDS, parse

@@ -13,7 +13,7 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from multidrop.dialects.files import rows, split_lines
+from multidrop.base.files import rows, split_lines
 from multidrop.dialects.pmx.manual.table import ELSEWHERE, Command, grouped, lookup
 from multidrop.dialects.program_files import BLANKS, Entry, Part, Problem, Word
 

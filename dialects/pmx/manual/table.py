@@ -12,7 +12,7 @@ import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
-from multidrop.dialects.files import rows
+from multidrop.base.files import rows
 
 AXES = ("X", "Y")
 SIGNS = ("+", "-")

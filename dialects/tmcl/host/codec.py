@@ -15,8 +15,8 @@ from dataclasses import dataclass, field, replace
 from struct import Struct
 from typing import ClassVar, NamedTuple
 
+from multidrop.base.errors import Inexpressible
 from multidrop.dialects.codec import Codec, Decoded, End, Kind, Reply, Request, Started, StopPiece
-from multidrop.dialects.errors import Inexpressible
 from multidrop.dialects.state import DriveState, Owed
 from multidrop.dialects.tmcl.manual import commands
 from multidrop.dialects.tmcl.manual.commands import Call, Command, Move, Search, Status, Version, accepted

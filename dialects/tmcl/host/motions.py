@@ -13,8 +13,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 
+from multidrop.base.errors import Refused
 from multidrop.dialects.codec import Procedure
-from multidrop.dialects.errors import Refused
 from multidrop.dialects.motions import NOTHING, Effect, Ending, Evidence, Motions, Move, MoveKind, Outcome, Signs
 from multidrop.dialects.tmcl.host.codec import MOST_MOTORS, TmclState
 from multidrop.dialects.tmcl.host.operations import busy, motors, read

@@ -8,9 +8,9 @@ from __future__ import annotations
 from dataclasses import replace
 from functools import partial
 
+from multidrop.base.errors import Inexpressible, NoAnswer, Refused, Stopped
 from multidrop.dialects.certifying import Certifying, repaired
 from multidrop.dialects.codec import End, Kind, Priority, Procedure, Reply, Request
-from multidrop.dialects.errors import Inexpressible, NoAnswer, Refused, Stopped
 from multidrop.dialects.exchange import Exchange
 from multidrop.dialects.family import ADDRESSES, Hints, Motion, Referencing
 from multidrop.dialects.tmcl.host.codec import (

@@ -13,13 +13,13 @@ from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from typing import Any
 
+from multidrop.base.errors import Diagnostic, DriveError, Inexpressible, Refused, Stopped
+from multidrop.base.files import SourceLine, lines_of_text
+from multidrop.base.text import counted, whole
 from multidrop.dialects.codec import Procedure
 from multidrop.dialects.debugging import Debugging, Look, Neighbours, Stepped, lacking
-from multidrop.dialects.errors import Diagnostic, DriveError, Inexpressible, Refused, Stopped
 from multidrop.dialects.family import Programs, Progress
-from multidrop.dialects.files import SourceLine, lines_of_text
 from multidrop.dialects.program_files import Difference, Held, Stored, first_difference, numbered
-from multidrop.dialects.text import counted, whole
 from multidrop.dialects.tmcl.host.codec import TmclState, call_of, line_in, parse_reply
 from multidrop.dialects.tmcl.host.operations import LACKS, answered, busy, moving, perform, read, store, who
 from multidrop.dialects.tmcl.manual import program_file

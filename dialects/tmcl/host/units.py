@@ -11,8 +11,8 @@ import re
 from collections.abc import Collection, Sequence
 from fractions import Fraction
 
+from multidrop.base.errors import Refused
 from multidrop.dialects.codec import Procedure, Request
-from multidrop.dialects.errors import Refused
 from multidrop.dialects.tmcl.host.codec import TmclState, call_of
 from multidrop.dialects.tmcl.host.operations import read
 from multidrop.dialects.tmcl.manual import commands

@@ -10,8 +10,8 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 
+from multidrop.base.errors import Diagnostic, Refused
 from multidrop.dialects.codec import Priority, Procedure
-from multidrop.dialects.errors import Diagnostic, Refused
 from multidrop.dialects.program_files import Held
 from multidrop.dialects.tmcl.host.codec import TmclState
 from multidrop.dialects.tmcl.host.motions import DRIVER_FAULTS

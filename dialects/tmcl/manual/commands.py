@@ -14,8 +14,8 @@ from dataclasses import dataclass
 from enum import IntEnum
 from functools import lru_cache
 
-from multidrop.dialects.files import rows
-from multidrop.dialects.text import counted
+from multidrop.base.files import rows
+from multidrop.base.text import counted
 
 
 class Command(IntEnum):

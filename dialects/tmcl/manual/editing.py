@@ -9,8 +9,8 @@ import re
 from bisect import bisect_right
 from collections.abc import Container, Iterable, Iterator, Sequence
 
-from multidrop.dialects.errors import Diagnostic
-from multidrop.dialects.files import split_lines
+from multidrop.base.errors import Diagnostic
+from multidrop.base.files import split_lines
 from multidrop.dialects.program_files import Block, Offer, Span, UserName, Word, replaced
 from multidrop.dialects.tmcl.manual import help, instructions
 from multidrop.dialects.tmcl.manual.program_file import NAME, Divided, Piece, divided, negated, remark_at

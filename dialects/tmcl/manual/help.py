@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from multidrop.dialects.errors import Diagnostic
+from multidrop.base.errors import Diagnostic
 from multidrop.dialects.tmcl.manual import instructions
 from multidrop.dialects.tmcl.manual.commands import REFUSALS, WORDS, Command, Row
 from multidrop.dialects.tmcl.manual.modules import RELATIVE_FROM, Parameter, module_of

@@ -15,7 +15,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import IntEnum
 
-from multidrop.dialects.files import rows
+from multidrop.base.files import rows
 from multidrop.dialects.tmcl.manual import commands
 from multidrop.dialects.tmcl.manual.commands import BYTE, INT32, MOTOR, STARTING_PARAMETERS, TYPE, VALUE, Call, Command
 

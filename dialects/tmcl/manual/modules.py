@@ -12,7 +12,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
-from multidrop.dialects.files import rows
+from multidrop.base.files import rows
 from multidrop.dialects.tmcl.manual.commands import INT32, Axis, Status
 
 MIRRORED, INVERTED = 64, 128

@@ -21,7 +21,8 @@ from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
-from multidrop.dialects.files import SourceLine, split_lines, wrong_characters
+from multidrop.base.files import SourceLine, split_lines, wrong_characters
+from multidrop.base.text import counted
 from multidrop.dialects.program_files import (
     Entry,
     Part,
@@ -35,7 +36,6 @@ from multidrop.dialects.program_files import (
     respelled,
     walk,
 )
-from multidrop.dialects.text import counted
 from multidrop.dialects.tmcl.manual import instructions
 from multidrop.dialects.tmcl.manual.commands import BLANKS, Call, Command
 from multidrop.dialects.tmcl.manual.instructions import (

@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from types import MappingProxyType
 from typing import NamedTuple
 
-from multidrop.dialects.files import rows
+from multidrop.base.files import rows
 
 STEP_DIRECTION, QUADRATURE, UP_DOWN = "step and direction", "quadrature", "up and down"
 

@@ -12,7 +12,7 @@ import re
 from collections.abc import Awaitable
 from typing import TYPE_CHECKING, Any
 
-from multidrop.dialects import Diagnostic, DriveError
+from multidrop.base.errors import Diagnostic, DriveError
 from multidrop.drives.stop_forms import stop_forms
 from multidrop.shell.events import By
 from multidrop.shell.line_syntax import DriveLine, VerbLine

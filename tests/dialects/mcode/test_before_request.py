@@ -5,7 +5,8 @@ from dataclasses import replace
 
 import pytest
 
-from multidrop.dialects import DriveError, Hints, NoAnswer, Owed
+from multidrop.base.errors import DriveError, NoAnswer
+from multidrop.dialects import Hints, Owed
 from multidrop.dialects.mcode.host import identify
 from multidrop.dialects.mcode.host.codec import MCode
 from multidrop.simulator.cell.spec import Faults

@@ -5,7 +5,8 @@ The simulated drives are the witnesses: what was executed or refused is read fro
 
 import pytest
 
-from multidrop.dialects import DriveError, End, NoAnswer, Refused, Reply
+from multidrop.base.errors import DriveError, NoAnswer, Refused
+from multidrop.dialects import End, Reply
 from multidrop.dialects.mcode.family import MCODE
 from multidrop.dialects.mcode.host import classify
 from multidrop.dialects.mcode.host.codec import MCode

@@ -2,7 +2,7 @@
 
 import pytest
 
-from multidrop.dialects import NoAnswer, Refused
+from multidrop.base.errors import NoAnswer, Refused
 from multidrop.dialects.mcode.host.operations import written
 from tests.support.mcode_drives import Desk
 

@@ -6,7 +6,7 @@ import re
 
 import pytest
 
-from multidrop.dialects import Diagnostic
+from multidrop.base.errors import Diagnostic
 from multidrop.dialects.mcode.manual.conversion import convert, source, worlds
 from tests.support.cases import for_each
 

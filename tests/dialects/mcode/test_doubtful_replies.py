@@ -4,7 +4,8 @@ from dataclasses import replace
 
 import pytest
 
-from multidrop.dialects import End, Kind, NoAnswer, Priority, Reply
+from multidrop.base.errors import NoAnswer
+from multidrop.dialects import End, Kind, Priority, Reply
 from multidrop.dialects.mcode.family import MCODE
 from multidrop.dialects.mcode.host.codec import MCode
 from multidrop.dialects.mcode.host.exchange import fresh

@@ -4,7 +4,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from multidrop.dialects import DriveError, End, Hints, NoAnswer, Priority, Refused
+from multidrop.base.errors import DriveError, NoAnswer, Refused
+from multidrop.dialects import End, Hints, Priority
 from multidrop.dialects.mcode.family import MCODE
 from multidrop.dialects.mcode.host import identify
 from multidrop.dialects.mcode.host.codec import MCode

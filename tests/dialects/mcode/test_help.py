@@ -2,7 +2,7 @@
 
 import pytest
 
-from multidrop.dialects.errors import Diagnostic
+from multidrop.base.errors import Diagnostic
 from multidrop.dialects.mcode.manual import help as mcode_help
 from multidrop.dialects.mcode.manual.table import MNEMONICS
 from tests.support.cases import for_each

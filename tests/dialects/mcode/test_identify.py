@@ -4,7 +4,8 @@ from dataclasses import replace
 
 import pytest
 
-from multidrop.dialects import Hints, Inexpressible, NoAnswer, Reply
+from multidrop.base.errors import Inexpressible, NoAnswer
+from multidrop.dialects import Hints, Reply
 from multidrop.dialects.mcode.host import identify, identity
 from multidrop.dialects.mcode.host.codec import MCode
 from multidrop.drives.line import Line

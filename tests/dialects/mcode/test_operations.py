@@ -4,7 +4,8 @@ import re
 
 import pytest
 
-from multidrop.dialects import DriveState, End, Kind, NoAnswer, Owed, Priority, Refused, Reply, Stopped
+from multidrop.base.errors import NoAnswer, Refused, Stopped
+from multidrop.dialects import DriveState, End, Kind, Owed, Priority, Reply
 from multidrop.dialects.mcode.family import MCODE
 from multidrop.dialects.mcode.host import identify
 from multidrop.dialects.mcode.host.codec import MCode

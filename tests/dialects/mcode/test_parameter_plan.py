@@ -4,7 +4,7 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from multidrop.dialects import Diagnostic
+from multidrop.base.errors import Diagnostic
 from multidrop.dialects.mcode.family import MCODE
 from multidrop.dialects.values import Permission, differing
 from tests.support.direct_drive import DirectDrive

@@ -7,7 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from multidrop.dialects import DriveState, NoAnswer
+from multidrop.base.errors import NoAnswer
+from multidrop.dialects import DriveState
 from multidrop.dialects.mcode.family import MCODE
 from multidrop.dialects.mcode.host import classify
 from multidrop.dialects.mcode.host.codec import MCode

@@ -8,9 +8,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from multidrop.dialects.errors import Diagnostic
+from multidrop.base.errors import Diagnostic
+from multidrop.base.files import program_text_of
 from multidrop.dialects.families import program_language_of, program_languages
-from multidrop.dialects.files import program_text_of
 from multidrop.dialects.mcode.manual import program_file
 from multidrop.dialects.mcode.manual.program_checker import check
 from multidrop.dialects.mcode.manual.program_file import ProgramLine, read

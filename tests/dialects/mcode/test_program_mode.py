@@ -2,7 +2,8 @@
 
 import pytest
 
-from multidrop.dialects import DriveError, Inexpressible, Priority, Refused, Stopped, StopPiece
+from multidrop.base.errors import DriveError, Inexpressible, Refused, Stopped
+from multidrop.dialects import Priority, StopPiece
 from multidrop.dialects.mcode.family import MCODE
 from multidrop.dialects.mcode.host.codec import MCode
 from multidrop.dialects.mcode.host.state import MCodeState

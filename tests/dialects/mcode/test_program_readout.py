@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from multidrop.dialects.errors import NoAnswer
+from multidrop.base.errors import NoAnswer
 from multidrop.dialects.mcode.family import MCODE
 from multidrop.dialects.mcode.host import program_readout as listings
 from multidrop.dialects.mcode.host.codec import MCode

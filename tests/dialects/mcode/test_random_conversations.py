@@ -4,7 +4,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from multidrop.dialects import DriveError, Priority
+from multidrop.base.errors import DriveError
+from multidrop.dialects import Priority
 from multidrop.dialects.mcode.family import MCODE
 from multidrop.simulator.cell.spec import Faults
 from tests.conftest import Bench

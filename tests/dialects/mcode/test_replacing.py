@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from multidrop.dialects import NoAnswer, Refused
+from multidrop.base.errors import NoAnswer, Refused
 from multidrop.dialects.mcode.family import MCODE
 from multidrop.dialects.mcode.host.download import plan
 from multidrop.dialects.mcode.host.program_readout import GLOBAL, LABEL, LOCAL

@@ -8,7 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from multidrop.dialects import Decoded, End, Inexpressible, Kind, Reply
+from multidrop.base.errors import Inexpressible
+from multidrop.dialects import Decoded, End, Kind, Reply
 from multidrop.dialects.mcode.host.codec import MCode, only_strays, short_reply, without_end
 from multidrop.dialects.mcode.host.framing import checksum, pieces, printable, sealed, unasked, unsealed
 from multidrop.dialects.mcode.host.reply_parser import ReplyParser

@@ -2,7 +2,8 @@
 
 import pytest
 
-from multidrop.dialects import End, NoAnswer, Reply
+from multidrop.base.errors import NoAnswer
+from multidrop.dialects import End, Reply
 from multidrop.dialects.mcode.host import operations, values
 from multidrop.dialects.mcode.host.codec import MCode
 from multidrop.dialects.mcode.host.state import MCodeState

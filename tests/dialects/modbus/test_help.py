@@ -7,7 +7,7 @@ import re
 
 import pytest
 
-from multidrop.dialects.errors import Diagnostic
+from multidrop.base.errors import Diagnostic
 from multidrop.dialects.families import FAMILIES
 from multidrop.dialects.mcode.manual.help import ACCESS
 from multidrop.dialects.modbus.manual import help

@@ -7,7 +7,7 @@ import re
 from hypothesis import given
 from hypothesis import strategies as st
 
-from multidrop.dialects import NoAnswer, Refused
+from multidrop.base.errors import NoAnswer, Refused
 from multidrop.dialects.modbus.family import MODBUS
 from multidrop.dialects.modbus.host.codec import Modbus, ModbusState
 from multidrop.dialects.modbus.manual.registers import REGISTERS, ROWS

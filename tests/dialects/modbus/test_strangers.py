@@ -6,7 +6,8 @@ from typing import Any
 
 import pytest
 
-from multidrop.dialects import End, Hints, Inexpressible, NoAnswer, Refused, Reply
+from multidrop.base.errors import Inexpressible, NoAnswer, Refused
+from multidrop.dialects import End, Hints, Reply
 from multidrop.dialects.modbus.family import MODBUS
 from multidrop.dialects.modbus.host import framing
 from multidrop.dialects.modbus.host.codec import Modbus, ModbusState

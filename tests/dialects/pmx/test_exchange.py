@@ -6,7 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from multidrop.dialects import Diagnostic, End, Hints, Inexpressible, NoAnswer, Priority, Refused, Reply
+from multidrop.base.errors import Diagnostic, Inexpressible, NoAnswer, Refused
+from multidrop.dialects import End, Hints, Priority, Reply
 from multidrop.dialects.codec import copy_with
 from multidrop.dialects.pmx.family import PMX
 from multidrop.dialects.pmx.host.codec import Pmx, PmxState

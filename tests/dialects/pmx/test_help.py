@@ -7,7 +7,7 @@ import re
 
 import pytest
 
-from multidrop.dialects.errors import Diagnostic
+from multidrop.base.errors import Diagnostic
 from multidrop.dialects.families import correct_in
 from multidrop.dialects.pmx.family import PMX
 from multidrop.dialects.pmx.host.values import NAMES, RANGES, base

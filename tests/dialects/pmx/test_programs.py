@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from multidrop.dialects import Diagnostic, NoAnswer, Refused
+from multidrop.base.errors import Diagnostic, NoAnswer, Refused
+from multidrop.base.files import SourceLine, program_text_of
 from multidrop.dialects.codec import End, Reply
-from multidrop.dialects.files import SourceLine, program_text_of
 from multidrop.dialects.pmx.host import programs
 from multidrop.dialects.pmx.host.codec import Pmx, PmxState
 from multidrop.dialects.pmx.manual import program_file

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from multidrop.dialects import Diagnostic
+from multidrop.base.errors import Diagnostic
 from multidrop.dialects.pmx.manual import program_file, script_checker
 from multidrop.dialects.pmx.manual.program_file import canonical
 from multidrop.dialects.pmx.manual.script_compiler import compile_

@@ -4,8 +4,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from multidrop.base.errors import Inexpressible
 from multidrop.dialects.codec import End
-from multidrop.dialects.errors import Inexpressible
 from multidrop.dialects.tmcl.host.codec import STOP_BYTES, Tmcl, replies_in
 from multidrop.dialects.tmcl.manual.commands import parse
 

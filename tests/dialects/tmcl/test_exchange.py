@@ -6,8 +6,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from multidrop.base.errors import Diagnostic, Inexpressible, NoAnswer, Refused, Stopped
 from multidrop.dialects.codec import Priority
-from multidrop.dialects.errors import Diagnostic, Inexpressible, NoAnswer, Refused, Stopped
 from multidrop.dialects.family import Hints
 from multidrop.dialects.state import Owed
 from multidrop.dialects.tmcl.family import TMCL

@@ -10,8 +10,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from multidrop.base.files import SourceLine
 from multidrop.dialects.families import correct_in, program_language_of
-from multidrop.dialects.files import SourceLine
 from multidrop.dialects.program_files import errors
 from multidrop.dialects.tmcl.manual import editing, instructions, program_file
 from multidrop.dialects.tmcl.manual.commands import Call

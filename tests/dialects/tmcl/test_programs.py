@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from multidrop.dialects.errors import Inexpressible, NoAnswer, Refused, Stopped
-from multidrop.dialects.files import SourceLine
+from multidrop.base.errors import Inexpressible, NoAnswer, Refused, Stopped
+from multidrop.base.files import SourceLine
 from multidrop.dialects.tmcl.family import TMCL
 from multidrop.dialects.tmcl.host import programs
 from multidrop.dialects.tmcl.manual import instructions, program_file

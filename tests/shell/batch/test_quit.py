@@ -6,7 +6,7 @@ import signal
 
 import pytest
 
-from multidrop.dialects import Stopped
+from multidrop.base.errors import Stopped
 from multidrop.drives.drive import confirmed_motion
 from tests.support.cell_session import CellSession, bus, party, pmx
 from tests.support.front_door import read_to_end

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from multidrop.dialects import Diagnostic, DriveError, Stopped
+from multidrop.base.errors import Diagnostic, DriveError, Stopped
 from multidrop.shell.batch.replay import replay
 from multidrop.shell.log.files import BEGIN, KINDS, Entry, line_of
 from multidrop.shell.log.steps import compared, read

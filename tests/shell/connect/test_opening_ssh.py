@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from multidrop.dialects import DriveError
+from multidrop.base.errors import DriveError
 from multidrop.drives.bus import Bus
 from multidrop.shell.configuration import Settings
 from multidrop.shell.connect.opening import Opened

@@ -4,7 +4,8 @@ import asyncio
 
 import pytest
 
-from multidrop.dialects import Diagnostic, Hints, NoAnswer
+from multidrop.base.errors import Diagnostic, NoAnswer
+from multidrop.dialects import Hints
 from multidrop.shell import stop_report
 from multidrop.shell.configuration import Settings
 from multidrop.shell.connect.opening import Opened

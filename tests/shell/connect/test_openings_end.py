@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from multidrop.dialects import DriveError
+from multidrop.base.errors import DriveError
 from multidrop.shell.configuration import Settings
 from multidrop.shell.connect import opening
 from multidrop.shell.session import Session

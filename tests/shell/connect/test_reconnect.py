@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from multidrop.dialects import Diagnostic
+from multidrop.base.errors import Diagnostic
 from multidrop.drives.events import Sample
 from multidrop.macros import Macro, Step
 from multidrop.shell.events import OnBus

@@ -13,7 +13,7 @@ from typing import Any
 
 import pytest
 
-from multidrop.dialects import Diagnostic
+from multidrop.base.errors import Diagnostic
 from multidrop.shell.configuration import Settings
 from multidrop.shell.connect.reconnect import Absent, SerialAgain
 from multidrop.shell.events import Notified, Printed

@@ -8,7 +8,7 @@ from random import Random
 
 import pytest
 
-from multidrop.dialects import DriveError
+from multidrop.base.errors import DriveError
 from multidrop.transports import TransportLost
 from tests.support.cell_session import ETHERNET, CellSession, bus, party
 from tests.support.mcode_drives import Witness

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from multidrop.dialects import Diagnostic, DriveError, NoAnswer, Refused
+from multidrop.base.errors import Diagnostic, DriveError, NoAnswer, Refused
 from multidrop.dialects.families import FAMILIES
 from multidrop.drives.drive import Drive
 from multidrop.shell.events import ProgramRead, ProgramSeen, SettingsRead

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from multidrop.dialects import DriveError
+from multidrop.base.errors import DriveError
 from multidrop.dialects.families import seen
 from multidrop.dialects.state import Remembered
 from multidrop.shell.configuration import Settings

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from multidrop.dialects import NoAnswer
+from multidrop.base.errors import NoAnswer
 from multidrop.dialects.families import FAMILIES, seen
 from multidrop.shell.channel import Front
 from multidrop.shell.configuration import Settings

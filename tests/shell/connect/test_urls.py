@@ -2,7 +2,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from multidrop.dialects import Diagnostic, Hints
+from multidrop.base.errors import Diagnostic
+from multidrop.dialects import Hints
 from multidrop.shell.configuration import SavedConnection
 from multidrop.shell.connect.opening import port_name
 from multidrop.shell.connect.urls import KEYS, SCHEMES, parse

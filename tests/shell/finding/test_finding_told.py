@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from multidrop.dialects import Diagnostic, NoAnswer
+from multidrop.base.errors import Diagnostic, NoAnswer
 from multidrop.shell.connect.urls import parse
 from multidrop.shell.finding.rescuing import Rescue
 from multidrop.shell.finding.scanning import NothingFound, Scanning

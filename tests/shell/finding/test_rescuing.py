@@ -5,7 +5,7 @@ from itertools import product
 
 import pytest
 
-from multidrop.dialects import Diagnostic, Stopped
+from multidrop.base.errors import Diagnostic, Stopped
 from multidrop.shell.connect.urls import parse
 from multidrop.shell.finding.rescuing import Rescue
 from multidrop.shell.finding.scanning import NothingFound, Scanning

@@ -4,7 +4,7 @@ import asyncio
 
 import pytest
 
-from multidrop.dialects import Diagnostic, NoAnswer, Stopped
+from multidrop.base.errors import Diagnostic, NoAnswer, Stopped
 from multidrop.dialects.state import Remembered
 from multidrop.shell.configuration import Settings
 from multidrop.shell.connect import opening

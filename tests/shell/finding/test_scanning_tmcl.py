@@ -4,7 +4,7 @@ import asyncio
 
 import pytest
 
-from multidrop.dialects import Diagnostic, Stopped
+from multidrop.base.errors import Diagnostic, Stopped
 from multidrop.dialects.tmcl.host.codec import frame_of
 from multidrop.dialects.tmcl.manual.commands import Call
 from multidrop.shell.connect.urls import parse

@@ -10,7 +10,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from multidrop.dialects import Diagnostic, Kind, Priority
+from multidrop.base.errors import Diagnostic
+from multidrop.dialects import Kind, Priority
 from multidrop.drives.events import Ended, Sent, Traffic, Unsolicited
 from multidrop.shell.configuration import LogSettings, Settings, parse
 from multidrop.shell.events import By, Entered, Failed, Notified, OnBus, Output, Printed, StateChanged

@@ -13,7 +13,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from multidrop.dialects import Diagnostic
+from multidrop.base.errors import Diagnostic
 from multidrop.shell.log import moments
 from multidrop.shell.log.files import Entry, Line, line_of, lines
 from multidrop.shell.log.moments import BACK, Known, Run, first_difference, moment

@@ -13,7 +13,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from multidrop.dialects import DriveError, Priority
+from multidrop.base.errors import DriveError
+from multidrop.dialects import Priority
 from multidrop.dialects.families import FAMILIES
 from multidrop.drives.drive import Drive
 from multidrop.shell.batch.replay import ReplayReport, replay

@@ -7,7 +7,7 @@ from typing import cast as typed
 
 import pytest
 
-from multidrop.dialects import Diagnostic
+from multidrop.base.errors import Diagnostic
 from multidrop.drives.bus import Bus
 from multidrop.macros import Macro, Step
 from multidrop.shell.channel import Field

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from multidrop.__main__ import main
-from multidrop.dialects import Diagnostic, DriveError
+from multidrop.base.errors import Diagnostic, DriveError
 from multidrop.macros import Macro, MacroStore
 from multidrop.shell.events import By, Notified, Output
 from multidrop.shell.line_syntax import showing

@@ -2,7 +2,7 @@
 
 import pytest
 
-from multidrop.dialects import Diagnostic
+from multidrop.base.errors import Diagnostic
 from multidrop.shell.configuration import Settings
 from multidrop.shell.events import By
 from multidrop.shell.session import Session

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from multidrop.__main__ import main
-from multidrop.dialects import Diagnostic
+from multidrop.base.errors import Diagnostic
 from multidrop.shell.events import Notified, Output
 from multidrop.shell.session import Session
 

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from multidrop.dialects import Diagnostic, DriveError
+from multidrop.base.errors import Diagnostic, DriveError
 from multidrop.macros import Macro, MacroStore, Step
 from multidrop.shell.events import Progressed
 from multidrop.shell.scripts.executor import run_script

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from multidrop.dialects import Diagnostic, DriveError, Refused, Stopped
+from multidrop.base.errors import Diagnostic, DriveError, Refused, Stopped
 from multidrop.drives.events import Traffic
 from multidrop.shell.batch.report import Report
 from multidrop.shell.events import Notified, OnBus

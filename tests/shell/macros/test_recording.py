@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from multidrop.dialects import Refused
+from multidrop.base.errors import Refused
 from multidrop.shell.configuration import Settings
 from multidrop.shell.events import Notified
 from multidrop.shell.session import Session

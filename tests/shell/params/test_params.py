@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import pytest
 
-from multidrop.dialects import Diagnostic, DriveError, NoAnswer, Refused, Stopped
+from multidrop.base.errors import Diagnostic, DriveError, NoAnswer, Refused, Stopped
 from multidrop.drives.events import Traffic
 from multidrop.shell.configuration import Settings
 from multidrop.shell.events import Notified, OnBus, Output

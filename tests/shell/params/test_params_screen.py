@@ -6,7 +6,7 @@ import asyncio
 
 import pytest
 
-from multidrop.dialects import Diagnostic
+from multidrop.base.errors import Diagnostic
 from multidrop.drives.events import Conditioned
 from multidrop.shell.events import Notified, OnBus, SettingsRead
 from tests.support.cell_session import ETHERNET, CellSession, bus, party, pmx

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from multidrop.dialects import Diagnostic, DriveError, Refused, Stopped
+from multidrop.base.errors import Diagnostic, DriveError, Refused, Stopped
 from multidrop.drives.events import Traffic
 from multidrop.shell import snapshots
 from multidrop.shell.params import replacement

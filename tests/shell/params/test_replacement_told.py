@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from multidrop.dialects import Diagnostic, DriveError, Refused, Stopped
+from multidrop.base.errors import Diagnostic, DriveError, Refused, Stopped
 from multidrop.drives.events import Traffic
 from multidrop.shell.events import Notified, Output
 from multidrop.shell.params import replacement

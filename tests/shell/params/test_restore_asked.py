@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from multidrop.dialects import Refused, Stopped
+from multidrop.base.errors import Refused, Stopped
 from multidrop.drives.events import Traffic
 from tests.support.cell_session import CellSession, bus, party
 from tests.support.said import said, texts

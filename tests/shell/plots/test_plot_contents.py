@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from multidrop import read_rrd
-from multidrop.dialects import Diagnostic
+from multidrop.base.errors import Diagnostic
 from multidrop.drives.events import Sample, Valued
 from multidrop.shell.events import Predicted
 from multidrop.shell.plots.plot import Plot, attach

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from multidrop.dialects import Diagnostic, Refused
+from multidrop.base.errors import Diagnostic, Refused
 from multidrop.drives.events import Sample, Valued
 from multidrop.drives.telemetry import Value
 from multidrop.shell.events import OnBus

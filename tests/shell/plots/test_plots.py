@@ -16,7 +16,7 @@ from typing import Any
 
 import pytest
 
-from multidrop.dialects import Diagnostic
+from multidrop.base.errors import Diagnostic
 from multidrop.drives.events import Sample
 from multidrop.shell.plots.plot import Plot
 from multidrop.shell.plots.request import PlotTarget, parse_target

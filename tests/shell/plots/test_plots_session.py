@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 
-from multidrop.dialects import Diagnostic
+from multidrop.base.errors import Diagnostic
 from multidrop.dialects.values import Conditions, Lamp
 from multidrop.drives.events import BusEvent, Conditioned, Ended, Sample, Sent, Unsolicited, Valued
 from multidrop.drives.telemetry import Value

@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from multidrop.dialects import Diagnostic
+from multidrop.base.errors import Diagnostic
 from multidrop.drives.events import Sample, Valued
 from multidrop.shell.plots import table
 from multidrop.shell.plots.plot import Plot, write

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from multidrop.dialects import Diagnostic, Inexpressible
-from multidrop.macros import atomic
+from multidrop.base import atomic
+from multidrop.base.errors import Diagnostic, Inexpressible
 from multidrop.shell.configuration import Settings
 from multidrop.shell.events import Notified, Output
 from multidrop.shell.programs.checking import examine, rewrite

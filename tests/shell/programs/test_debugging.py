@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from multidrop.dialects import Diagnostic, Inexpressible, Refused, Stopped
+from multidrop.base.errors import Diagnostic, Inexpressible, Refused, Stopped
 from tests.support.cell_session import CellSession
 from tests.support.debugged import ROUND, cell, ethernet, keys, run, serial, shown
 

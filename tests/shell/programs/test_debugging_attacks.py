@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from multidrop.dialects import DriveError, Inexpressible, NoAnswer, Refused, Stopped
+from multidrop.base.errors import DriveError, Inexpressible, NoAnswer, Refused, Stopped
 from multidrop.dialects.mcode.host.debugging import traced
 from multidrop.drives.stopping import Fate
 from multidrop.shell.events import FAILURES, By

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from multidrop.dialects import Diagnostic, Inexpressible, Refused
+from multidrop.base.errors import Diagnostic, Inexpressible, Refused
 from tests.support.cell_session import CellSession, bus, pmx
 from tests.support.debugged import out, run
 

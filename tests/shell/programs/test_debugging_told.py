@@ -6,7 +6,7 @@ import asyncio
 
 import pytest
 
-from multidrop.dialects import Stopped
+from multidrop.base.errors import Stopped
 from tests.support.debugged import cell, ethernet, serial
 from tests.support.said import said, texts
 

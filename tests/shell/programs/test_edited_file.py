@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from multidrop.dialects import Diagnostic
+from multidrop.base.errors import Diagnostic
 from multidrop.shell.programs.edited_file import ChangedMeanwhile, EditedFile, edited, real_text
 from multidrop.shell.state.backups import Copy, Drafts
 

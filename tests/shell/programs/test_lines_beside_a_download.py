@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from multidrop.dialects import Diagnostic
+from multidrop.base.errors import Diagnostic
 from multidrop.shell.events import By
 from tests.support.cell_session import CellSession, bus, party
 from tests.support.transfers import FILE

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from multidrop.dialects import Diagnostic, DriveError
+from multidrop.base.errors import Diagnostic, DriveError
 from multidrop.dialects.mcode.manual import program_checker
 from multidrop.shell.events import By
 from tests.support.cases import for_each

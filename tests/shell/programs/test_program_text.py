@@ -11,9 +11,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from multidrop.dialects import Diagnostic
+from multidrop.base.errors import Diagnostic
+from multidrop.base.files import split_lines
 from multidrop.dialects.families import program_languages
-from multidrop.dialects.files import split_lines
 from multidrop.dialects.mcode.manual.grammar import LineError, Statement, parse
 from multidrop.dialects.mcode.manual.program_file import scan
 from multidrop.dialects.mcode.manual.statements import canonical

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from multidrop.dialects import Diagnostic
+from multidrop.base.errors import Diagnostic
 from multidrop.shell.events import ProgramRead, Progressed
 from multidrop.shell.line_syntax import showing
 from multidrop.shell.state.backups import write_backup

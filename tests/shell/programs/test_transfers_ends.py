@@ -9,8 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from multidrop.dialects import Diagnostic, Refused, Stopped
-from multidrop.dialects.errors import Differs
+from multidrop.base.errors import Diagnostic, Differs, Refused, Stopped
 from multidrop.transports import TransportLost
 from tests.support.cell_session import CellSession, bus, pmx
 from tests.support.transfers import FILE, LONG, RUNNING, SLOW, kept, load, shop_with
@@ -25,7 +24,7 @@ async def test_without_a_backup_nothing_is_sent(tmp_path: Path, monkeypatch: pyt
         raise OSError(why, os.strerror(why))
 
     async with shop_with(tmp_path) as shop:
-        monkeypatch.setattr("multidrop.macros.atomic.os.fsync", fails)
+        monkeypatch.setattr("multidrop.base.atomic.os.fsync", fails)
         with pytest.raises(Diagnostic, match="the backup cannot be written: .*; nothing was sent"):
             await load(shop, tmp_path)
         assert b"PG" not in shop.written("line") and not kept(tmp_path)

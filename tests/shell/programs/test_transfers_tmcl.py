@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from multidrop.dialects import Stopped
+from multidrop.base.errors import Stopped
 from tests.support.cell_session import CellSession, bus, drive
 from tests.support.transfers import kept
 

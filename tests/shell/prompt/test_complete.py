@@ -4,8 +4,8 @@ from types import SimpleNamespace
 import pytest
 
 from multidrop import cli
+from multidrop.base.on_demand import imported
 from multidrop.dialects.families import FAMILIES
-from multidrop.dialects.on_demand import imported
 from multidrop.shell.channel import Front
 from multidrop.shell.connect.url_forms import URL_FORMS
 from multidrop.shell.connect.urls import KEYS

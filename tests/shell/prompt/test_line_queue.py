@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 
-from multidrop.dialects import Refused
+from multidrop.base.errors import Refused
 from multidrop.shell.line_syntax import Place, TypedLine
 from multidrop.shell.prompt.line_queue import BURST, SHOWN, LineQueue
 

@@ -7,7 +7,7 @@ import io
 import pytest
 from prompt_toolkit.output import ColorDepth
 
-from multidrop.dialects import Diagnostic, Stopped
+from multidrop.base.errors import Diagnostic, Stopped
 from multidrop.macros import Macro, Step
 from multidrop.shell.events import Failed, Progressed
 from multidrop.shell.macro_arguments import value_fields

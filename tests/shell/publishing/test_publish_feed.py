@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from multidrop import __version__
-from multidrop.dialects import Diagnostic
+from multidrop.base.errors import Diagnostic
 from multidrop.drives.events import Unsolicited
 from multidrop.shell.configuration import Settings
 from multidrop.shell.events import Notified, OnBus

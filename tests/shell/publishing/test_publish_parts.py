@@ -14,7 +14,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from multidrop.dialects import Diagnostic
+from multidrop.base.errors import Diagnostic
 from multidrop.dialects.values import UNREAD, Conditions
 from multidrop.drives.events import Conditioned, Sample
 from multidrop.shell import configuration

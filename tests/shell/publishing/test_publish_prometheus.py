@@ -14,7 +14,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from prometheus_client.parser import text_string_to_metric_families
 
-from multidrop.dialects import Diagnostic
+from multidrop.base.errors import Diagnostic
 from multidrop.shell.publishing import prometheus
 from multidrop.shell.publishing.listening import Listening, parse_listening
 from multidrop.shell.publishing.prometheus import CLIENTS, Endpoint

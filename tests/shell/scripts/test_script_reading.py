@@ -6,9 +6,9 @@ import select
 
 import pytest
 
-from multidrop.dialects import Diagnostic
-from multidrop.dialects.comments import uncommented
-from multidrop.dialects.files import LARGEST
+from multidrop.base.comments import uncommented
+from multidrop.base.errors import Diagnostic
+from multidrop.base.files import LARGEST
 from multidrop.shell.prompt.terminal_input import stream_lines
 from multidrop.shell.scripts.reading import read_script
 from tests.support.until import PATIENCE

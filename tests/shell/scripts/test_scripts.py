@@ -7,7 +7,7 @@ from xml.etree import ElementTree
 
 import pytest
 
-from multidrop.dialects import Diagnostic, DriveError, Stopped
+from multidrop.base.errors import Diagnostic, DriveError, Stopped
 from multidrop.macros import Macro, Step
 from multidrop.shell.batch.report import Report
 from multidrop.shell.exit_codes import exit_code

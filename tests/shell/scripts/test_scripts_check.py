@@ -9,7 +9,7 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from multidrop.dialects import Diagnostic
+from multidrop.base.errors import Diagnostic
 from multidrop.macros import Macro, MacroStore, Step
 from multidrop.shell.scripts.expression import (
     LARGEST,

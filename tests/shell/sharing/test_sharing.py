@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from multidrop.dialects.text import visible
+from multidrop.base.text import visible
 from multidrop.shell.sharing.stop_bytes import stop_bytes
 from multidrop.shell.sharing.writer_turns import SILENT, Close, Exchange, Send, Stop, Write
 from multidrop.transports import telnet

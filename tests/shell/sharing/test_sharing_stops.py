@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from multidrop.dialects import Codec, Diagnostic
+from multidrop.base.errors import Diagnostic
+from multidrop.dialects import Codec
 from multidrop.dialects.mcode.host.codec import MCode
 from multidrop.dialects.pmx.host.codec import Pmx
 from multidrop.dialects.tmcl.host.codec import Tmcl

@@ -7,7 +7,7 @@ import sys
 
 import pytest
 
-from multidrop.dialects import Diagnostic, DriveError, Inexpressible, NoAnswer, Refused, Stopped
+from multidrop.base.errors import Diagnostic, DriveError, Inexpressible, NoAnswer, Refused, Stopped
 from multidrop.drives.events import Unsolicited
 from multidrop.shell.events import Failed, Notified, OnBus, Output, Printed
 from multidrop.shell.exit_codes import exit_code

@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from multidrop.dialects import Diagnostic
+from multidrop.base.errors import Diagnostic
 from multidrop.shell.signals import Interruption
 from multidrop.shell.sweeps import trial, workers
 from multidrop.shell.sweeps.trial import Case, Job, Result

@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from multidrop.dialects import Diagnostic
+from multidrop.base.errors import Diagnostic
 from multidrop.shell.sweeps.trial import Outcome, parse_condition
 
 SEEN = Outcome(51198, (86, 81), ("at 51200", "7"), 1.5, "E")

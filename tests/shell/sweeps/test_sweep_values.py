@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from multidrop.dialects import Diagnostic
+from multidrop.base.errors import Diagnostic
 from multidrop.shell.sweeps.failures import RUNS, shrunk
 from multidrop.shell.sweeps.trial import HELD, REFUSED, Case, Result
 from multidrop.shell.sweeps.variation import parse_key, parse_values, simpler, spelled

@@ -13,8 +13,8 @@ from random import Random
 
 import pytest
 
+from multidrop.base.errors import Diagnostic, DriveError
 from multidrop.commands.drives import twin_fit
-from multidrop.dialects import Diagnostic, DriveError
 from multidrop.shell.batch import runner
 from multidrop.shell.log.files import Entry, line_of
 from multidrop.shell.log.writer import SessionLog

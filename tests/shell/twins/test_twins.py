@@ -8,7 +8,7 @@ from random import Random
 
 import pytest
 
-from multidrop.dialects import DriveError
+from multidrop.base.errors import DriveError
 from multidrop.shell.events import Agreed, Diverged, Predicted
 from multidrop.simulator.serving.in_process import SimPipe
 from tests.support.cell_session import CellSession, bus, party

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from multidrop.dialects import Diagnostic, DriveError, NoAnswer, Refused
+from multidrop.base.errors import Diagnostic, DriveError, NoAnswer, Refused
 from multidrop.drives.events import Sent
 from multidrop.shell.events import Diverged, Notified, OnBus, Predicted, TwinEnded
 from tests.support.cell_session import ETHERNET, CellSession, bus, party, pmx

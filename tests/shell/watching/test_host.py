@@ -17,7 +17,7 @@ from types import SimpleNamespace
 import pytest
 
 import multidrop
-from multidrop.dialects import Diagnostic
+from multidrop.base.errors import Diagnostic
 from multidrop.shell.watching import host as host_side
 from multidrop.shell.watching.host import MOST, WAITING, Calls, Gate, Watcher
 from multidrop.shell.watching.join import Stops, connect, joined

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from multidrop.dialects import Diagnostic
+from multidrop.base.errors import Diagnostic
 from multidrop.simulator import cells
 from multidrop.simulator.cell.spec import WorldSpec
 from multidrop.simulator.world import World

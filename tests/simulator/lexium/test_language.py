@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from multidrop.dialects.errors import Diagnostic
+from multidrop.base.errors import Diagnostic
 from multidrop.simulator.cell.spec import DriveSpec, WorldSpec
 from multidrop.simulator.lexium.device import MCodeDevice
 from multidrop.simulator.world import World

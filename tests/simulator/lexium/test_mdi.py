@@ -6,7 +6,7 @@ import re
 
 import pytest
 
-from multidrop.dialects import Diagnostic
+from multidrop.base.errors import Diagnostic
 from multidrop.simulator.cells import read
 from multidrop.simulator.floor import Floor
 from tests.support.mdrive_unit import Unit

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from multidrop.dialects import Diagnostic
+from multidrop.base.errors import Diagnostic
 from multidrop.simulator.cells import load
 from multidrop.simulator.floor import Floor
 from tests.support.cases import for_each

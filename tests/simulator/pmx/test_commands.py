@@ -227,7 +227,7 @@ def test_lines_are_stored_and_given_back() -> None:
 
 
 def test_a_wrong_setting_in_a_cell_is_named() -> None:
-    from multidrop.dialects import Diagnostic
+    from multidrop.base.errors import Diagnostic
 
     with pytest.raises(Diagnostic, match=r"set SLRX = 0 is refused: \?Invalid Answer"):
         Bench("set = { SLRX = 0 }")

@@ -6,7 +6,7 @@ import asyncio
 
 import pytest
 
-from multidrop.dialects import Diagnostic
+from multidrop.base.errors import Diagnostic
 from multidrop.simulator.cells import read
 from multidrop.simulator.floor import Floor
 from multidrop.simulator.serving.running import LATEST, LONGEST_HELD, Listener, RunningFloor

@@ -17,7 +17,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from multidrop.dialects import Diagnostic
+from multidrop.base.errors import Diagnostic
 from multidrop.simulator.cells import read
 from multidrop.simulator.floor import Floor
 from multidrop.simulator.serving.command import reachable

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from multidrop.dialects import Diagnostic
+from multidrop.base.errors import Diagnostic
 from multidrop.simulator.cells import load, read
 from multidrop.simulator.floor import Floor
 from multidrop.simulator.serving.command import attaching, reachable

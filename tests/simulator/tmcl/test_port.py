@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from multidrop.dialects import Diagnostic
+from multidrop.base.errors import Diagnostic
 from multidrop.dialects.tmcl.host import codec
 from multidrop.dialects.tmcl.manual.commands import Call, Command, Global
 from multidrop.simulator.cells import read

@@ -6,8 +6,8 @@ import os
 from collections.abc import Callable
 from pathlib import Path
 
-from multidrop.dialects import Diagnostic
-from multidrop.dialects.files import why
+from multidrop.base.errors import Diagnostic
+from multidrop.base.files import why
 
 STANDARD_OUTPUT = "-"
 """The file that is standard output, wherever a text is written."""
@@ -39,7 +39,7 @@ def check_space(path: str, size: int) -> None:
     check(path, printed=True)
     if path == STANDARD_OUTPUT:
         return
-    from multidrop.macros.atomic import create_atomically
+    from multidrop.base.atomic import create_atomically
 
     probe = Path(path).with_name(f".{os.path.basename(path)}.{os.urandom(4).hex()}")
     try:
@@ -67,7 +67,7 @@ def write(path: str | Path, text: str, output: Callable[[str], None] | None = No
             output(line)
         return
     check(path)
-    from multidrop.macros.atomic import create_atomically  # more than most commands need
+    from multidrop.base.atomic import create_atomically  # more than most commands need
 
     try:
         create_atomically(Path(path), text.encode())

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from multidrop.dialects import Diagnostic
-from multidrop.shell import new_file
+from multidrop.base import new_file
+from multidrop.base.errors import Diagnostic
 
 
 def test_a_full_disk_leaves_no_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -5,8 +5,8 @@ from collections.abc import Iterator
 
 import pytest
 
-from multidrop.dialects import on_demand
-from multidrop.dialects.on_demand import imported, importing
+from multidrop.base import on_demand
+from multidrop.base.on_demand import imported, importing
 
 
 @pytest.fixture(autouse=True)
@@ -50,4 +50,4 @@ def test_what_is_frozen_stays_frozen() -> None:
 
 def test_what_is_imported_already_leaves_the_collector_alone(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delattr(on_demand, "importing")
-    assert imported("multidrop.dialects.on_demand:imported") is imported
+    assert imported("multidrop.base.on_demand:imported") is imported

@@ -1,19 +1,14 @@
-"""Small files of the state folder: JSON, replaced as a whole, and read as if it were absent where it is damaged.
-
-Besides the class for all of them: the URLs opened last. `shell.state.backups` has the texts.
-"""
+"""Small files of the state folder: JSON, replaced as a whole, and read as if it were absent where it is damaged."""
 
 from __future__ import annotations
 
 import contextlib
 import json
-import time
 from collections.abc import Callable
-from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, TypeVar
 
-from multidrop.macros.atomic import read_private, write_atomically
+from multidrop.base.atomic import read_private, write_atomically
 
 T = TypeVar("T")
 
@@ -62,32 +57,3 @@ def digest(text: str, length: int) -> str:
     import hashlib  # most sessions name no file by its content
 
     return hashlib.sha256(text.encode("utf-8", "surrogateescape")).hexdigest()[:length]
-
-
-# The URLs opened last
-
-MOST_OPENED = 12
-OPENED = "opened.json"
-
-
-@dataclass(frozen=True)
-class Opened:
-    """A URL as it was typed, or the name of a saved connection, and when it was opened (s since 1970)."""
-
-    url: str
-    at: float
-
-
-def lately(folder: Path) -> list[Opened]:
-    """The URLs opened last, the newest first."""
-
-    def parse(found: Any) -> list[Opened]:
-        return [Opened(str(row["url"]), float(row["at"])) for row in found["opened"]][:MOST_OPENED]
-
-    return Store(folder).find(OPENED, parse) or []
-
-
-def note(folder: Path, url: str) -> None:
-    rows = [Opened(url, time.time()), *(each for each in lately(folder) if each.url != url)][:MOST_OPENED]
-    with contextlib.suppress(OSError):
-        Store(folder).write(OPENED, {"opened": list(map(asdict, rows))}, 1)

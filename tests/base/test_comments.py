@@ -8,9 +8,9 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from multidrop.dialects import Diagnostic
-from multidrop.dialects.comments import grouped_at, uncommented, unsent
-from multidrop.dialects.files import toml_of
+from multidrop.base.comments import grouped_at, uncommented, unsent
+from multidrop.base.errors import Diagnostic
+from multidrop.base.files import toml_of
 from multidrop.dialects.mcode.manual import program_checker, program_file
 from multidrop.dialects.pmx.manual import program_file as pmx_file
 from multidrop.dialects.program_files import Problem

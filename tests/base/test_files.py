@@ -10,8 +10,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from multidrop.dialects import Diagnostic
-from multidrop.dialects.files import (
+from multidrop.base.errors import Diagnostic
+from multidrop.base.files import (
     DEEPEST,
     LARGEST,
     MOST_LINES,
@@ -24,9 +24,9 @@ from multidrop.dialects.files import (
     text_of,
     toml_of,
 )
+from multidrop.base.text import visible
 from multidrop.dialects.mcode.manual import program_file
 from multidrop.dialects.pmx.manual import program_file as pmx_file
-from multidrop.dialects.text import visible
 from multidrop.macros import MacroStore
 from multidrop.macros.toml_format import parse_macro
 from multidrop.macros.vendor import imported

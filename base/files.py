@@ -14,8 +14,8 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import IO, TYPE_CHECKING, Any
 
-from multidrop.dialects.comments import behind_number, grouped_at
-from multidrop.dialects.errors import Diagnostic
+from multidrop.base.comments import behind_number, grouped_at
+from multidrop.base.errors import Diagnostic
 
 if TYPE_CHECKING:
     from pathlib import Path

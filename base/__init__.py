@@ -1,0 +1,1 @@
+"""What every room stands on: errors, text, files, places, records by name. It knows no drive, no line and no screen."""
