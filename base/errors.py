@@ -1,4 +1,4 @@
-"""The errors that a person reads: a refusal, a missing reply, a stop, or wrong input."""
+"""The errors that a person reads: a refusal, a missing reply, a stop, a lost connection, or wrong input."""
 
 from __future__ import annotations
 
@@ -62,6 +62,19 @@ class Unreferenced(DriveError):
     """A drive may have been restarted or moved while its line was lost, so nothing that moves it was sent."""
 
 
+class TransportLost(Exception):
+    """The pipe broke, or could not be opened. The text names the pipe and the reason."""
+
+    unproven = ""
+    """The command of which it is not known whether it was executed."""
+    executed = ""
+    """The last command that is known to be executed, where no other one is in doubt."""
+
+    def again(self) -> TransportLost:
+        """The same loss for another caller: places are noted on what each one is raised."""
+        return type(self)(*self.args)
+
+
 class Diagnostic(Exception):
     """Text that a person wrote is wrong: what, where (`file:line`, bus, verb) and the remedy."""
 
@@ -86,6 +99,7 @@ PUBLIC = (
     MotionFailed,
     Unreferenced,
     Diagnostic,
+    TransportLost,
 )
 for _each in PUBLIC:
     _each.__module__ = "multidrop"  # a traceback shows the name by which a program catches it

@@ -6,6 +6,7 @@ import asyncio
 from collections.abc import Iterable
 from typing import TypeVar
 
+from multidrop.base.errors import TransportLost
 from multidrop.dialects import DriveState, Hints, Procedure
 from multidrop.dialects.families import DEFAULT, FAMILIES
 from multidrop.drives.conversations import Conversations
@@ -17,7 +18,7 @@ from multidrop.drives.port_journal import Keeper
 from multidrop.drives.roster import Roster
 from multidrop.drives.stopping import Halt, Stopping
 from multidrop.drives.telemetry import Telemetry
-from multidrop.transports import Transport, TransportLost
+from multidrop.transports import Transport
 
 T = TypeVar("T")
 

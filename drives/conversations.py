@@ -16,13 +16,12 @@ from dataclasses import replace
 from typing import Any, Generic, TypeVar
 from weakref import WeakKeyDictionary
 
-from multidrop.base.errors import Inexpressible, NoAnswer, Refused, Stopped
+from multidrop.base.errors import Inexpressible, NoAnswer, Refused, Stopped, TransportLost
 from multidrop.dialects import DriveState, End, Kind, Owed, Procedure, Request
 from multidrop.drives.events import Concluded, Outcome, Transaction, Witnesses
 from multidrop.drives.link import Link, LostInFlight
 from multidrop.drives.port_journal import GLOBAL, Keeper
 from multidrop.drives.silence import explained
-from multidrop.transports import TransportLost
 
 T = TypeVar("T")
 A = TypeVar("A")

@@ -14,6 +14,7 @@ from multidrop.base.errors import (
     NoAnswer,
     Refused,
     Stopped,
+    TransportLost,
     Unreferenced,
 )
 from multidrop.base.files import SourceLine
@@ -34,7 +35,6 @@ from multidrop.drives.protected_units import Values, protection, silent
 from multidrop.drives.readings import REST as REST
 from multidrop.drives.readings import Judged, Seen
 from multidrop.drives.readings import Running as Running
-from multidrop.transports import TransportLost
 
 T = TypeVar("T")
 NOT_SENT = (Refused, Inexpressible, Differs, MotionFailed)

@@ -7,47 +7,15 @@ the others nor the caller (`isolated`).
 
 from __future__ import annotations
 
-import logging
 from collections import deque
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from types import TracebackType
 from typing import Any, Generic, NamedTuple, TypeVar
 
+from multidrop.base.errors import TransportLost
+from multidrop.base.isolation import isolated
 from multidrop.dialects import DriveState, Reply, Request
 from multidrop.dialects.values import Conditions
-from multidrop.transports import TransportLost
-
-LOG = logging.getLogger("multidrop")
-
-
-class isolated:  # noqa: N801
-    """Isolate a step: add the text of what it raises to `failed`, and write a defect to the log.
-
-    This is the one place that takes any exception: after the step, other drives are still to be stopped. A class, not
-    a generator: each event of a bus passes here, and this takes a third of the time.
-    """
-
-    __slots__ = ("_failed", "_what")
-
-    def __init__(self, what: str, failed: list[str] | None = None) -> None:
-        self._what, self._failed = what, failed
-
-    def __enter__(self) -> None:
-        return None
-
-    def __exit__(
-        self, kind: type[BaseException] | None, failure: BaseException | None, _: TracebackType | None
-    ) -> bool:
-        if not isinstance(failure, Exception):
-            return False
-        text = str(failure)
-        if not isinstance(failure, TransportLost | OSError):  # a defect, of whatever kind
-            text = f"a defect: {type(failure).__name__}"
-            LOG.error("%s failed", self._what, exc_info=failure)
-        if self._failed is not None:
-            self._failed.append(text)
-        return True
 
 
 class Transaction(NamedTuple):

@@ -10,13 +10,15 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from math import inf, nextafter
 
+from multidrop.base.errors import TransportLost
+from multidrop.base.isolation import isolated
 from multidrop.dialects import End, Kind, Priority, Request, StopPiece
 from multidrop.drives import events
 from multidrop.drives.echoes import TERMINATORS, Heard
 from multidrop.drives.inbox import Debris, Leftovers
 from multidrop.drives.line import EchoFound, Finished, Line, Write, divided
 from multidrop.drives.port_journal import GLOBAL, Departure, Keeper
-from multidrop.transports import Transport, TransportLost
+from multidrop.transports import Transport
 from multidrop.transports.pipe import running_loop
 
 OnAnswer = Callable[[events.Transaction | TransportLost], None]
@@ -92,7 +94,7 @@ class Link:
         self._news = events.EventQueue(name)
         self.watch, self.publish = self._news.subscribe, self._news.publish
         self._timer: asyncio.TimerHandle | None = None
-        self._answering = events.isolated(f"a conversation on {name}")
+        self._answering = isolated(f"a conversation on {name}")
 
     def start(self) -> None:
         self._opened_at = self.now()
@@ -363,7 +365,7 @@ class Link:
         if self._orderly and self.line.inbox.codec.stop_replies:
             self._rest = self.line.owed_pieces()
         elif self._orderly and (repeats := self.line.take_repeats()):
-            with events.isolated(f"the stop of {self.name}"):
+            with isolated(f"the stop of {self.name}"):
                 self.transport.write(repeats)
         self._lose(self.lost or TransportLost(f"{self.transport.name} is closed"))
 
@@ -373,7 +375,7 @@ class Link:
         for piece in divided(self._rest)[0]:
             due = self.line.transmitted + piece.quiet + len(piece.data) * self.line.byte_time
             await asyncio.sleep(max(0.0, due - self.now()))
-            with events.isolated(f"the stop of {self.name}"):
+            with isolated(f"the stop of {self.name}"):
                 self.transport.write(piece.data)
                 self.line.wrote(piece.data, self.now())
         await self.transport.close()

@@ -12,13 +12,13 @@ from dataclasses import dataclass
 from math import inf
 from typing import Any, Generic, TypeVar
 
-from multidrop.base.errors import DriveError, NoAnswer, Refused
+from multidrop.base.errors import DriveError, NoAnswer, Refused, TransportLost
+from multidrop.base.isolation import isolated
 from multidrop.dialects import End
 from multidrop.drives.conversations import Conversation, OnOver
 from multidrop.drives.drive import Drive
-from multidrop.drives.events import Outcome, isolated
+from multidrop.drives.events import Outcome
 from multidrop.drives.roster import Roster
-from multidrop.transports import TransportLost
 
 MOST_SILENCES = 5
 """Most polls without an answer in a row that make the pause longer."""

@@ -17,18 +17,18 @@ from dataclasses import replace
 from functools import partial
 from typing import Any
 
-from multidrop.base.errors import DriveError, NoAnswer
+from multidrop.base.errors import DriveError, NoAnswer, TransportLost
+from multidrop.base.isolation import isolated
 from multidrop.dialects import DriveState, Family, Hints, Motion, StopPiece
 from multidrop.dialects.families import FAMILIES, family_of
 from multidrop.dialects.values import Value
 from multidrop.drives.conversations import Conversations
 from multidrop.drives.drive import Drive, still
-from multidrop.drives.events import Restarted, isolated
+from multidrop.drives.events import Restarted
 from multidrop.drives.link import Link
 from multidrop.drives.port_journal import GLOBAL, Keeper
 from multidrop.drives.protected_units import protection, silent
 from multidrop.drives.silence import explained
-from multidrop.transports import TransportLost
 
 SLOW = 1.0
 """The time that a slow drive gets to reply before its silence is given a cause, s."""

@@ -17,9 +17,9 @@ from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import partial
 
+from multidrop.base.isolation import isolated
 from multidrop.dialects import StopPiece
 from multidrop.drives import pacing
-from multidrop.drives.events import isolated
 from multidrop.drives.line import PAUSE, merged
 from multidrop.drives.link import Link
 from multidrop.drives.stop_forms import StopForms

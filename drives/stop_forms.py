@@ -6,9 +6,9 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from itertools import zip_longest
 
+from multidrop.base.isolation import isolated
 from multidrop.dialects import Codec, Started, StopPiece
 from multidrop.drives.drive import Drive
-from multidrop.drives.events import isolated
 from multidrop.drives.line import divided
 from multidrop.drives.roster import Roster
 

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from multidrop.base.errors import DriveError, Stopped
+from multidrop.base.errors import DriveError, Stopped, TransportLost
 from multidrop.drives.drive import Drive
 from multidrop.drives.events import Sample
-from multidrop.transports import TransportLost
 
 
 class Activity(NamedTuple):

@@ -17,9 +17,10 @@ from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from functools import partial
 
+from multidrop.base.isolation import isolated
 from multidrop.dialects import DriveState, Started, StopPiece
 from multidrop.drives.drive import Drive
-from multidrop.drives.events import Traffic, isolated
+from multidrop.drives.events import Traffic
 from multidrop.drives.halts import Fate as Fate
 from multidrop.drives.halts import Halt as Halt
 from multidrop.drives.port_journal import GLOBAL

@@ -23,7 +23,7 @@ from functools import partial
 from math import inf
 from typing import Any, NamedTuple
 
-from multidrop.base.errors import DriveError, NoAnswer, Refused
+from multidrop.base.errors import DriveError, NoAnswer, Refused, TransportLost
 from multidrop.dialects import Motion, Priority
 from multidrop.dialects.values import Part
 from multidrop.dialects.values import Value as Fact
@@ -33,7 +33,6 @@ from multidrop.drives.poller import Due, Poller
 from multidrop.drives.poller import Subscription as Subscription
 from multidrop.drives.recount import recount
 from multidrop.drives.roster import Roster
-from multidrop.transports import TransportLost
 
 MODEST = 0.02
 """Default period of a drive's motion, s: a screen shows no more, and others need the wire."""

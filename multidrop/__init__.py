@@ -49,8 +49,8 @@ if TYPE_CHECKING:
     from multidrop.base.errors import Refused as Refused
     from multidrop.base.errors import Stopped as Stopped
     from multidrop.base.errors import Timeout as Timeout
+    from multidrop.base.errors import TransportLost as TransportLost
     from multidrop.base.errors import Unreferenced as Unreferenced
-    from multidrop.transports import TransportLost as TransportLost
     from multidrop.transports import Unreachable as Unreachable
 
 __version__ = "0.1.0"
@@ -65,9 +65,10 @@ _PLACES = {
     "multidrop.api.simulated": "SimulatedCell simulate",
     "multidrop.api.telemetry": "AsyncTelemetry Sample Samples read_rrd",
     "multidrop.base.errors": (
-        "Diagnostic Differs DriveError Inexpressible MotionFailed NoAnswer Refused Stopped Timeout Unreferenced"
+        "Diagnostic Differs DriveError Inexpressible MotionFailed NoAnswer Refused Stopped Timeout TransportLost "
+        "Unreferenced"
     ),
-    "multidrop.transports": "TransportLost Unreachable",
+    "multidrop.transports": "Unreachable",
 }
 _PUBLIC = {name: module for module, names in _PLACES.items() for name in names.split()}
 __all__ = [*_PUBLIC]

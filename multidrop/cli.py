@@ -161,9 +161,8 @@ def run(chosen: argparse.Namespace) -> int:
     """Run a parsed command; return the exit code. A Diagnostic, or a loss, is one line on standard error."""
     file, _, function = chosen.run_by.partition(".")
     command: Callable[[argparse.Namespace], int] = imported(f"multidrop.commands.{file}:{function}")
-    from multidrop.base.errors import Diagnostic
+    from multidrop.base.errors import Diagnostic, TransportLost
     from multidrop.shell.streams.stdout import fail
-    from multidrop.transports import TransportLost
 
     context = copy_context()
     if hasattr(chosen, "no_config"):

@@ -9,9 +9,8 @@ from __future__ import annotations
 
 import asyncio
 
-from multidrop.base.errors import DriveError, Stopped
+from multidrop.base.errors import DriveError, Stopped, TransportLost
 from multidrop.drives.drive import REST, Drive
-from multidrop.transports import TransportLost
 
 ROUTINE = "its OE routine may have started"
 LIMIT = 1.0

@@ -16,10 +16,10 @@ from contextvars import ContextVar
 from dataclasses import dataclass, field
 
 from multidrop.base.errors import Diagnostic
+from multidrop.base.isolation import isolated
 from multidrop.dialects import Started
 from multidrop.drives.bus import Bus
 from multidrop.drives.drive import Drive
-from multidrop.drives.events import isolated
 from multidrop.drives.link import Link
 from multidrop.drives.port_journal import GLOBAL
 from multidrop.drives.stopping import Halt

@@ -17,7 +17,7 @@ from functools import partial
 from typing import Any
 
 from multidrop.base import new_file
-from multidrop.base.errors import Diagnostic, DriveError, NoAnswer, Refused, Stopped
+from multidrop.base.errors import Diagnostic, DriveError, NoAnswer, Refused, Stopped, TransportLost
 from multidrop.base.files import escaped_toml, text_of, toml_of
 from multidrop.base.on_demand import imported
 from multidrop.base.text import counted
@@ -29,7 +29,6 @@ from multidrop.shell.channel import running
 from multidrop.shell.events import By
 from multidrop.shell.session import TRAVEL, Session
 from multidrop.shell.waits import wait
-from multidrop.transports import TransportLost
 
 HEAD = (
     "What a drive answers to the questions of `multidrop certify`, one text for each line that was sent.",

@@ -10,10 +10,9 @@ from enum import Enum
 from math import ceil
 from typing import NamedTuple
 
-from multidrop.base.errors import Diagnostic, DriveError
+from multidrop.base.errors import Diagnostic, DriveError, TransportLost
 from multidrop.dialects.values import Readings
 from multidrop.drives.events import BusEvent
-from multidrop.transports import TransportLost
 
 FAILURES = (DriveError, Diagnostic, TransportLost)
 """The failures that `Session.run` raises, each with one line for a person; anything else is a bug."""

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from multidrop.base.errors import Diagnostic, DriveError, Stopped
-from multidrop.transports import TransportLost
+from multidrop.base.errors import Diagnostic, DriveError, Stopped, TransportLost
 
 CODES: tuple[tuple[type[BaseException], int], ...] = (
     (Stopped, 4),

@@ -12,7 +12,7 @@ from itertools import count
 from math import inf
 from typing import Any, TypeVar
 
-from multidrop.base.errors import Diagnostic, DriveError, NoAnswer
+from multidrop.base.errors import Diagnostic, DriveError, NoAnswer, TransportLost
 from multidrop.drives.bus import Bus
 from multidrop.drives.drive import Drive
 from multidrop.drives.echoes import LocalEcho
@@ -25,7 +25,6 @@ from multidrop.shell.raw import RawLine
 from multidrop.shell.secrets import url_without_secrets
 from multidrop.shell.state import crash_marks
 from multidrop.shell.workspace import BeingOpened, Workspace
-from multidrop.transports import TransportLost
 
 
 def model(drive: Drive) -> str:

@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping, Sequence
 from contextvars import ContextVar
 from weakref import WeakKeyDictionary
 
-from multidrop.base.errors import DriveError
+from multidrop.base.errors import DriveError, TransportLost
 from multidrop.dialects import Priority
 from multidrop.dialects.codec import at_priority
 from multidrop.dialects.program_files import Held
@@ -19,7 +19,6 @@ from multidrop.drives.events import Conditioned, Sample, Unsolicited
 from multidrop.macros import Recorder
 from multidrop.shell.events import OnBus, Printed, SessionEvent
 from multidrop.shell.line_syntax import join_target
-from multidrop.transports import TransportLost
 
 
 class KnownNames:

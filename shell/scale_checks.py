@@ -8,13 +8,12 @@ from contextlib import suppress
 from typing import TYPE_CHECKING
 from weakref import WeakKeyDictionary
 
-from multidrop.base.errors import DriveError
+from multidrop.base.errors import DriveError, TransportLost
 from multidrop.dialects import Priority
 from multidrop.drives.events import Sample
 from multidrop.drives.recount import recount
 from multidrop.shell.events import OnBus, SessionEvent, SettingsRead
 from multidrop.shell.line_syntax import EVERYONE
-from multidrop.transports import TransportLost
 
 if TYPE_CHECKING:
     from multidrop.drives.drive import Drive

@@ -10,14 +10,13 @@ import contextlib
 from collections.abc import AsyncIterator
 from dataclasses import dataclass
 
-from multidrop.base.errors import Differs, Inexpressible, Refused
+from multidrop.base.errors import Differs, Inexpressible, Refused, TransportLost
 from multidrop.dialects import Started
 from multidrop.drives.drive import Drive
 from multidrop.drives.port_journal import GLOBAL
 from multidrop.shell import at_rest
 from multidrop.shell.automation import Automation, Automations, Sent
 from multidrop.shell.events import FAILURES
-from multidrop.transports import TransportLost
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
-from multidrop.base.errors import Diagnostic, DriveError, NoAnswer, Timeout
+from multidrop.base.errors import Diagnostic, DriveError, NoAnswer, Timeout, TransportLost
 from multidrop.dialects import Motion
 from multidrop.drives.bus import Bus
 from multidrop.drives.drive import REST, Check, Drive, Running, confirmed_motion
@@ -22,7 +22,6 @@ from multidrop.shell.line_syntax import EVERYONE
 from multidrop.shell.motions import Watch, check_own
 from multidrop.shell.stop_report import UNCONFIRMED, last_seen
 from multidrop.shell.workspace import Workspace
-from multidrop.transports import TransportLost
 
 if TYPE_CHECKING:  # few sessions need it
     from multidrop.shell.units import Units

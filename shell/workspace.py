@@ -16,8 +16,9 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 from multidrop.base.errors import Diagnostic, NoAnswer
+from multidrop.base.isolation import isolated
 from multidrop.base.text import acts_first
-from multidrop.drives.events import BusEvent, Changed, Conditioned, Lost, Notice, Sample, Unsolicited, isolated
+from multidrop.drives.events import BusEvent, Changed, Conditioned, Lost, Notice, Sample, Unsolicited
 from multidrop.macros import MacroStore, Recorder
 from multidrop.shell import stop_report
 from multidrop.shell.channel import Channel, Questions, Tasks, UnderWay

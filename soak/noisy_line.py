@@ -16,7 +16,7 @@ from pathlib import Path
 from random import Random
 from typing import Any
 
-from multidrop.base.errors import DriveError
+from multidrop.base.errors import DriveError, TransportLost
 from multidrop.drives.events import Notice
 from multidrop.shell.configuration import Settings
 from multidrop.shell.connect.opening import open_port
@@ -29,7 +29,6 @@ from multidrop.simulator.cell.spec import Faults
 from multidrop.simulator.floor import Floor
 from multidrop.simulator.serving.endpoints import serve_bus
 from multidrop.simulator.serving.running import RunningFloor
-from multidrop.transports import TransportLost
 from soak.judge import Judge, Ledger, Witness
 from soak.languages import LANGUAGES, PROGRAM, TICKS
 

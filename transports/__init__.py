@@ -12,6 +12,8 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable
 from typing import Protocol
 
+from multidrop.base.errors import TransportLost
+
 
 class Endpoint(Protocol):
     """A descriptor that never blocks: `read` and `write` raise BlockingIOError instead."""
@@ -45,20 +47,6 @@ class Endpoint(Protocol):
 if sys.platform != "win32":
     import fcntl
     import termios
-
-
-class TransportLost(Exception):
-    """The pipe broke, or could not be opened. The text names the pipe and the reason."""
-
-    __module__ = "multidrop"
-    unproven = ""
-    """The command of which it is not known whether it was executed."""
-    executed = ""
-    """The last command that is known to be executed, where no other one is in doubt."""
-
-    def again(self) -> TransportLost:
-        """The same loss for another caller: places are noted on what each one is raised."""
-        return type(self)(*self.args)
 
 
 class Unreachable(TransportLost):

@@ -22,7 +22,8 @@ from collections import deque
 from collections.abc import Callable
 from typing import TypeVar
 
-from multidrop.transports import Endpoint, Lost, PortControl, Received, Transport, TransportLost
+from multidrop.base.errors import TransportLost
+from multidrop.transports import Endpoint, Lost, PortControl, Received, Transport
 
 LINGER = 1.0
 """Seconds that closing waits for bytes that were written and have not left: 960 bytes at 9600 baud."""

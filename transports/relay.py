@@ -23,7 +23,8 @@ from collections.abc import Callable, Iterator
 from enum import IntEnum
 from typing import TYPE_CHECKING
 
-from multidrop.transports import PortControl, TransportLost
+from multidrop.base.errors import TransportLost
+from multidrop.transports import PortControl
 
 if TYPE_CHECKING and sys.platform != "win32":
     from multidrop.transports.serial_port import SerialEndpoint

@@ -9,7 +9,8 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Callable, Iterable
 
-from multidrop.transports import Lost, PortControl, Received, Transport, TransportLost, Unreachable, telnet
+from multidrop.base.errors import TransportLost
+from multidrop.transports import Lost, PortControl, Received, Transport, Unreachable, telnet
 from multidrop.transports.sockets import open_tcp
 from multidrop.transports.telnet import Control, Setting
 

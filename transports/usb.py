@@ -21,7 +21,8 @@ from collections.abc import Callable, Collection, Iterable, Sequence
 from math import inf
 from typing import Protocol
 
-from multidrop.transports import TransportLost, Undelivered, Unreachable
+from multidrop.base.errors import TransportLost
+from multidrop.transports import Undelivered, Unreachable
 from multidrop.transports.performax import CANCELLED, GONE, STALLED, TIMEOUT, Control
 from multidrop.transports.pipe import Pipe
 from multidrop.transports.sockets import explain

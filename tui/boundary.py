@@ -33,7 +33,7 @@ from textual.widgets import Static
 from textual.worker import WorkerFailed
 
 from multidrop.base.atomic import make_folder
-from multidrop.drives.events import LOG
+from multidrop.base.isolation import LOG
 
 T = TypeVar("T")
 
@@ -216,7 +216,7 @@ class Boundary:
 
 
 class _Handler(logging.Handler):
-    """Takes the defects that `drives.events.isolated` logs, in whatever thread."""
+    """Takes the defects that `base.isolation.isolated` logs, in whatever thread."""
 
     def __init__(self, boundary: Boundary, loop: asyncio.AbstractEventLoop) -> None:
         super().__init__(logging.ERROR)

@@ -16,7 +16,7 @@ from pathlib import Path
 
 from textual.driver import Driver
 
-from multidrop.base.errors import Diagnostic
+from multidrop.base.errors import Diagnostic, TransportLost
 from multidrop.dialects import Hints
 from multidrop.dialects.families import FAMILIES
 from multidrop.drives.bus import Bus
@@ -32,7 +32,7 @@ from multidrop.shell.playing import Playing
 from multidrop.shell.session import Session
 from multidrop.shell.stop_report import Found, Tally
 from multidrop.shell.watching.wire import Dropped, Garbled, Heard, Item, Items, Now
-from multidrop.transports import Lost, Received, Transport, TransportLost
+from multidrop.transports import Lost, Received, Transport
 from multidrop.tui.app import MultidropApp
 from multidrop.tui.assist import Assist
 from multidrop.tui.figures import NATIVE, Figures

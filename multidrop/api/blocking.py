@@ -29,10 +29,9 @@ from multidrop.api.sessions import AsyncSession, Notice, log
 from multidrop.api.streams import AsyncStream
 from multidrop.api.telemetry import RATE, AsyncTelemetry, Sample, Samples
 from multidrop.api.threads import Ended, LoopThread, Notices
-from multidrop.base.errors import Diagnostic
+from multidrop.base.errors import Diagnostic, TransportLost
 from multidrop.drives.telemetry import PERIOD
 from multidrop.shell.events import FAILURES
-from multidrop.transports import TransportLost
 
 P = ParamSpec("P")
 T = TypeVar("T")

@@ -17,14 +17,14 @@ from weakref import WeakKeyDictionary, WeakSet
 from multidrop.api.returns import Returns
 from multidrop.api.streams import AsyncStream
 from multidrop.api.telemetry import AsyncTelemetry
-from multidrop.base.errors import Diagnostic, Stopped
+from multidrop.base.errors import Diagnostic, Stopped, TransportLost
 from multidrop.drives.conversations import refuse_stranger
 from multidrop.drives.drive import Drive
 from multidrop.shell import stop_report
 from multidrop.shell.automation import ENDING, outcome, settled
 from multidrop.shell.events import FAILURES, Output, Printed, SessionEvent
 from multidrop.shell.session import Session
-from multidrop.transports import TransportLost, Unreachable
+from multidrop.transports import Unreachable
 
 T = TypeVar("T")
 S = TypeVar("S", bound="AsyncStream[Any]")

@@ -14,15 +14,15 @@ import contextlib
 from collections.abc import Mapping
 from typing import NamedTuple
 
-from multidrop.base.errors import DriveError, NoAnswer, Refused
+from multidrop.base.errors import DriveError, NoAnswer, Refused, TransportLost
+from multidrop.base.isolation import isolated
 from multidrop.dialects import Priority
 from multidrop.dialects.values import Value, differing
 from multidrop.drives.bus import Bus
 from multidrop.drives.drive import Drive
-from multidrop.drives.events import Changed, Lost, isolated
+from multidrop.drives.events import Changed, Lost
 from multidrop.shell.events import OnBus, SessionEvent
 from multidrop.shell.session import Session
-from multidrop.transports import TransportLost
 
 NEVER = float("-inf")
 PAUSE = 0.25

@@ -20,8 +20,8 @@ from multidrop.api.pictures import drives_table, table
 from multidrop.api.returns import Returns
 from multidrop.api.telemetry import RATE, AsyncTelemetry
 from multidrop.api.values import seconds, text_of
-from multidrop.base.errors import Diagnostic, DriveError, Timeout
-from multidrop.drives.events import isolated
+from multidrop.base.errors import Diagnostic, DriveError, Timeout, TransportLost
+from multidrop.base.isolation import isolated
 from multidrop.drives.telemetry import PERIOD
 from multidrop.shell import stop_report, waits
 from multidrop.shell.automation import settled
@@ -29,7 +29,6 @@ from multidrop.shell.channel import Front
 from multidrop.shell.configuration import load
 from multidrop.shell.events import By, Notified, SessionEvent
 from multidrop.shell.session import Session as Shell
-from multidrop.transports import TransportLost
 
 if TYPE_CHECKING:
     from multidrop.drives.drive import Drive

@@ -8,7 +8,7 @@ import shlex
 from dataclasses import replace
 from functools import partial
 
-from multidrop.base.errors import Diagnostic
+from multidrop.base.errors import Diagnostic, TransportLost
 from multidrop.shell import configuration
 from multidrop.shell.batch import runner
 from multidrop.shell.connect.opening import open_buses
@@ -16,7 +16,6 @@ from multidrop.shell.connect.urls import parse
 from multidrop.shell.finding.rescuing import Rescue
 from multidrop.shell.finding.scanning import FoundDrive, Scanning, url_of
 from multidrop.shell.session import Session
-from multidrop.transports import TransportLost
 
 
 def run(chosen: argparse.Namespace) -> int:

@@ -17,7 +17,7 @@ from functools import partial
 from pathlib import Path
 
 from multidrop.base.atomic import write_atomically
-from multidrop.base.errors import Diagnostic
+from multidrop.base.errors import Diagnostic, TransportLost
 from multidrop.base.files import why
 from multidrop.base.text import counted
 from multidrop.shell import configuration
@@ -34,7 +34,6 @@ from multidrop.shell.sweeps.plan import Asked, Plan
 from multidrop.shell.sweeps.results import Table
 from multidrop.shell.sweeps.trial import Case, Result, bench
 from multidrop.shell.sweeps.variation import SEED, spelled
-from multidrop.transports import TransportLost
 
 
 def run(chosen: argparse.Namespace) -> int:

@@ -12,7 +12,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
-from multidrop.base.errors import Diagnostic
+from multidrop.base.errors import Diagnostic, TransportLost
 from multidrop.dialects import Family, Hints
 from multidrop.dialects.families import DEFAULT, FAMILIES
 from multidrop.drives.bus import Bus
@@ -21,7 +21,7 @@ from multidrop.shell import configuration
 from multidrop.shell.connect.reconnect import Absent, LoginAgain, Reopen, SerialAgain, host_again, simulated, usb_again
 from multidrop.shell.connect.urls import Connection
 from multidrop.shell.state.port_state import PortState
-from multidrop.transports import NotOpen, TransportLost, Unreachable
+from multidrop.transports import NotOpen, Unreachable
 from multidrop.transports.ssh import FarPort
 
 if TYPE_CHECKING:

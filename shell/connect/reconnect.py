@@ -17,13 +17,14 @@ import sys
 from collections.abc import Awaitable, Callable, Collection
 from typing import TYPE_CHECKING, NamedTuple
 
-from multidrop.base.errors import DriveError, Stopped
+from multidrop.base.errors import DriveError, Stopped, TransportLost
+from multidrop.base.isolation import isolated
 from multidrop.dialects import Hints
 from multidrop.drives.drive import confirmed_motion
-from multidrop.drives.events import Changed, isolated
+from multidrop.drives.events import Changed
 from multidrop.shell.connect import Pauses
 from multidrop.shell.stop_report import E_STOP, UNCONFIRMED, last_seen
-from multidrop.transports import Transport, TransportLost, Unreachable
+from multidrop.transports import Transport, Unreachable
 
 if TYPE_CHECKING:
     from multidrop.drives.bus import Bus

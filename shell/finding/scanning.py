@@ -13,7 +13,7 @@ from contextlib import AsyncExitStack, asynccontextmanager, suppress
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
-from multidrop.base.errors import Diagnostic
+from multidrop.base.errors import Diagnostic, TransportLost
 from multidrop.dialects import DriveState, Procedure
 from multidrop.dialects.families import DEFAULT, FAMILIES, spoken
 from multidrop.dialects.scanning import WINDOW, Reach, Scan
@@ -28,7 +28,6 @@ from multidrop.shell.connect.urls import DIRECT, Connection, with_echo
 from multidrop.shell.finding.limits import searched
 from multidrop.shell.state.port_state import memory_of
 from multidrop.shell.workspace import Workspace
-from multidrop.transports import TransportLost
 
 SLOWEST = 0.2
 """The longest time for which a network's reply is waited, s; `timeout=` in the URL replaces it."""

@@ -17,7 +17,7 @@ from pathlib import Path
 
 from multidrop.base import new_file
 from multidrop.base.atomic import make_folder
-from multidrop.base.errors import Diagnostic, DriveError, NoAnswer, Refused, Stopped
+from multidrop.base.errors import Diagnostic, DriveError, NoAnswer, Refused, Stopped, TransportLost
 from multidrop.base.files import why
 from multidrop.base.text import counted
 from multidrop.dialects.values import (
@@ -38,7 +38,6 @@ from multidrop.shell.line_syntax import split_target
 from multidrop.shell.params import file as files
 from multidrop.shell.session import Session
 from multidrop.shell.workspace import Workspace
-from multidrop.transports import TransportLost
 
 ALL = ("all", "*")
 OTHERS = "?drives=a,b in the URL names others of its line"

@@ -10,7 +10,7 @@ from datetime import UTC
 from itertools import count
 from typing import NamedTuple
 
-from multidrop.base.errors import Diagnostic, DriveError
+from multidrop.base.errors import Diagnostic, DriveError, TransportLost
 from multidrop.dialects import Priority
 from multidrop.drives.drive import Drive
 from multidrop.shell.batch import runner
@@ -20,7 +20,6 @@ from multidrop.shell.plots.request import PlotTarget, parse_rate, parse_series, 
 from multidrop.shell.session import Session
 from multidrop.shell.streams.stdout import write
 from multidrop.shell.workspace import address_of
-from multidrop.transports import TransportLost
 
 WIDTH = 11
 STAMP = 24

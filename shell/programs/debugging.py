@@ -11,7 +11,7 @@ import asyncio
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-from multidrop.base.errors import Diagnostic, DriveError, Inexpressible, Refused
+from multidrop.base.errors import Diagnostic, DriveError, Inexpressible, Refused, TransportLost
 from multidrop.dialects import Procedure
 from multidrop.dialects.debugging import Debugging, Look, Neighbours
 from multidrop.dialects.program_files import Stored
@@ -20,7 +20,6 @@ from multidrop.drives.events import Lost, Restarted
 from multidrop.shell.events import OnBus, Phase, SessionEvent
 from multidrop.shell.program_listing import Listing, Sight
 from multidrop.shell.session import Session
-from multidrop.transports import TransportLost
 
 PERIOD = 0.1
 """The time between two looks at a running program, s."""

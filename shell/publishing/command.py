@@ -6,7 +6,7 @@ import asyncio
 import sys
 from collections.abc import Callable, Mapping, Sequence
 
-from multidrop.base.errors import Diagnostic
+from multidrop.base.errors import Diagnostic, TransportLost
 from multidrop.base.text import counted
 from multidrop.drives.bus import Bus
 from multidrop.shell.batch import runner
@@ -23,7 +23,6 @@ from multidrop.shell.secrets import url_without_secrets
 from multidrop.shell.session import Session
 from multidrop.shell.streams.stdout import write
 from multidrop.shell.workspace import Workspace
-from multidrop.transports import TransportLost
 from multidrop.transports.sockets import exposed
 
 AGAIN = 30.0

@@ -12,11 +12,10 @@ import contextlib
 from collections import Counter, deque
 from collections.abc import Callable, Sequence
 
-from multidrop.base.errors import Diagnostic
+from multidrop.base.errors import Diagnostic, TransportLost
 from multidrop.base.text import counted
 from multidrop.shell.connect import Pauses
 from multidrop.shell.publishing.broker import Connection, Message
-from multidrop.transports import TransportLost
 
 MOST = 10_000
 """Messages that wait at most; some 5 MB."""

@@ -12,7 +12,7 @@ from collections.abc import AsyncIterator, Collection, Iterator, Mapping, Sequen
 from dataclasses import replace
 from itertools import islice
 
-from multidrop.base.errors import Diagnostic, NoAnswer, Stopped
+from multidrop.base.errors import Diagnostic, NoAnswer, Stopped, TransportLost
 from multidrop.base.text import counted
 from multidrop.drives.drive import Drive
 from multidrop.drives.events import Lost
@@ -30,7 +30,6 @@ from multidrop.shell.session import Session
 from multidrop.shell.state import crash_marks
 from multidrop.shell.waits import Standing, standings
 from multidrop.shell.workspace import LATCHED
-from multidrop.transports import TransportLost
 
 # A connection that is lost while no line uses it: that ends a script or macro too, and not only its next line.
 

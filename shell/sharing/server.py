@@ -14,7 +14,7 @@ from collections.abc import Callable, Coroutine, Sequence
 from functools import partial
 from typing import Any, cast
 
-from multidrop.base.errors import Diagnostic
+from multidrop.base.errors import Diagnostic, TransportLost
 from multidrop.base.text import counted
 from multidrop.dialects import StopPiece
 from multidrop.shell import configuration
@@ -40,7 +40,7 @@ from multidrop.shell.sharing.writer_turns import (
     Write,
 )
 from multidrop.shell.streams.stdout import fail, finish, nonblocking, write
-from multidrop.transports import PortControl, TransportLost
+from multidrop.transports import PortControl
 from multidrop.transports.sockets import explain, exposed, host_port, set_socket_options
 from multidrop.transports.telnet import Control, Setting
 

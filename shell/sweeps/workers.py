@@ -17,12 +17,12 @@ from contextlib import contextmanager, suppress
 from itertools import islice
 from typing import TYPE_CHECKING, Any
 
-from multidrop.base.errors import Diagnostic
+from multidrop.base.errors import Diagnostic, TransportLost
 from multidrop.shell.secrets import url_without_secrets
 from multidrop.shell.signals import Interruption
 from multidrop.shell.sweeps import trial
 from multidrop.shell.sweeps.trial import DIED, Case, Job, Result
-from multidrop.transports import TransportLost, Unreachable
+from multidrop.transports import Unreachable
 
 if TYPE_CHECKING:
     from distributed import Client, Future, as_completed

@@ -13,14 +13,14 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from types import MappingProxyType
 
-from multidrop.base.errors import Diagnostic
+from multidrop.base.errors import Diagnostic, TransportLost
 from multidrop.dialects.units import Scale
 from multidrop.simulator import cells
 from multidrop.simulator.cell.spec import BusSpec, Cell
 from multidrop.simulator.families import FAMILIES, family_of
 from multidrop.simulator.floor import Floor
 from multidrop.simulator.serving.running import Listener, RunningFloor
-from multidrop.transports import Lost, Received, Transport, TransportLost
+from multidrop.transports import Lost, Received, Transport
 
 DEFAULT = next(iter(FAMILIES))
 """The dialect for a bus without drives."""

@@ -11,11 +11,12 @@ from collections.abc import Callable
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any
 
+from multidrop.base.errors import TransportLost
 from multidrop.shell.connect.opening import open_port
 from multidrop.shell.connect.urls import parse
 from multidrop.shell.sharing.server import SharedPort
 from multidrop.shell.sharing.stop_bytes import stop_bytes
-from multidrop.transports import TransportLost, relay, serial_port
+from multidrop.transports import relay, serial_port
 
 if TYPE_CHECKING:
     from multidrop.shell.sharing.writer_turns import Say

@@ -16,9 +16,9 @@ from random import Random
 from types import SimpleNamespace
 from typing import Any
 
+from multidrop.base.isolation import LOG
 from multidrop.dialects.state import DriveState
 from multidrop.drives.conversations import Conversations
-from multidrop.drives.events import LOG
 from multidrop.simulator import wire
 from multidrop.transports import pipe, usb
 from soak.simulation.acts.seams import SEAMS

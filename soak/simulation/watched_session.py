@@ -9,12 +9,11 @@ from collections.abc import Iterator
 from contextvars import ContextVar
 from typing import TYPE_CHECKING, Any
 
-from multidrop.base.errors import Diagnostic, DriveError
+from multidrop.base.errors import Diagnostic, DriveError, TransportLost
 from multidrop.shell.configuration import Settings
 from multidrop.shell.line_syntax import TypedLine
 from multidrop.shell.session import Session
 from multidrop.shell.workspace import LATCHED
-from multidrop.transports import TransportLost
 from soak.judge import Word, word
 from soak.simulation.acts.watching import WatchedPath, examine_before_a_stop
 from soak.simulation.history import Command, Outcome

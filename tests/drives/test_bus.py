@@ -5,13 +5,12 @@ from typing import Any
 
 import pytest
 
-from multidrop.base.errors import Stopped
+from multidrop.base.errors import Stopped, TransportLost
 from multidrop.dialects import End
 from multidrop.dialects.mcode.host.framing import sealed
 from multidrop.dialects.mcode.manual import program_file
 from multidrop.drives.events import Changed, Ended, Lost, Notice, Sample
 from multidrop.simulator.serving.in_process import SimPipe
-from multidrop.transports import TransportLost
 from tests.support.cell_session import party
 from tests.support.simulated_bus import SimulatedBus
 from tests.support.until import until

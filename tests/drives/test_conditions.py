@@ -6,12 +6,11 @@ from typing import Any
 
 import pytest
 
-from multidrop.base.errors import Inexpressible, NoAnswer, Refused
+from multidrop.base.errors import Inexpressible, NoAnswer, Refused, TransportLost
 from multidrop.dialects.values import Part
 from multidrop.drives.events import Conditioned
 from multidrop.drives.readings import Running
 from multidrop.drives.telemetry import AGED, LEAST, Telemetry
-from multidrop.transports import TransportLost
 from tests.support.told_link import ToldLink
 
 pytestmark = pytest.mark.virtual

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from multidrop.base.errors import NoAnswer, Stopped
+from multidrop.base.errors import NoAnswer, Stopped, TransportLost
 from multidrop.dialects import Motion, Started
 from multidrop.drives import stopping
 from multidrop.drives.events import Sample
@@ -14,7 +14,6 @@ from multidrop.drives.halts import Halt
 from multidrop.drives.readings import Running, Seen
 from multidrop.drives.stop_readings import ENDLESS, NOTHING, Activity, read_activity
 from multidrop.drives.stopping import BETWEEN, RAMP, Stopping
-from multidrop.transports import TransportLost
 
 pytestmark = pytest.mark.virtual
 RESTS = Activity(0, False, "7")

@@ -4,7 +4,7 @@ import asyncio
 
 import pytest
 
-from multidrop.base.errors import Stopped
+from multidrop.base.errors import Stopped, TransportLost
 from multidrop.dialects import DriveState, Priority, Procedure, Reply, Request
 from multidrop.dialects.mcode.host.codec import MCode
 from multidrop.dialects.state import Owed
@@ -13,7 +13,7 @@ from multidrop.drives.events import Notice, Sent
 from multidrop.drives.line import Line
 from multidrop.drives.link import Link
 from multidrop.drives.port_journal import Keeper
-from multidrop.transports import Transport, TransportLost
+from multidrop.transports import Transport
 
 pytestmark = pytest.mark.virtual
 

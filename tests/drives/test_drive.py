@@ -7,13 +7,12 @@ from typing import Any
 
 import pytest
 
-from multidrop.base.errors import DriveError, Inexpressible, NoAnswer, Refused, Stopped, Unreferenced
+from multidrop.base.errors import DriveError, Inexpressible, NoAnswer, Refused, Stopped, TransportLost, Unreferenced
 from multidrop.dialects import Motion
 from multidrop.dialects.family import Referencing
 from multidrop.drives.drive import Drive, confirmed_motion, still
 from multidrop.drives.events import Changed
 from multidrop.drives.readings import REST, Running, Seen
-from multidrop.transports import TransportLost
 from tests.support.cell_session import party
 from tests.support.simulated_bus import SimulatedBus
 

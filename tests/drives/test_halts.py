@@ -5,10 +5,11 @@ from typing import Any
 
 import pytest
 
+from multidrop.base.errors import TransportLost
 from multidrop.dialects import Started
 from multidrop.drives.halts import Fate, Halt
 from multidrop.drives.readings import Running, Seen
-from multidrop.transports import TransportLost, Undelivered
+from multidrop.transports import Undelivered
 
 AT = 10.0
 LOST, UNDELIVERED = TransportLost("gone"), Undelivered("gone before it left")

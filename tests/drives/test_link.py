@@ -5,6 +5,7 @@ from typing import Any
 
 import pytest
 
+from multidrop.base.errors import TransportLost
 from multidrop.dialects import End, Kind, Priority, Reply, Request, StopPiece
 from multidrop.dialects.mcode.host.codec import MCode
 from multidrop.drives.events import Changed, Ended, Lost, Notice, Sent, Traffic, Transaction, Unsolicited
@@ -12,7 +13,7 @@ from multidrop.drives.inbox import LATE
 from multidrop.drives.line import Line
 from multidrop.drives.link import AS_GREETING, ECHO, GREETING, UNASKED, UNLIKE_A_DRIVE, Link, LostInFlight, Reserved
 from multidrop.drives.port_journal import Keeper
-from multidrop.transports import Transport, TransportLost
+from multidrop.transports import Transport
 
 pytestmark = pytest.mark.virtual
 CODEC = MCode(em=1)

@@ -11,7 +11,7 @@ from pymodbus import ModbusDeviceIdentification
 from pymodbus.server import ModbusTcpServer
 from pymodbus.simulator import DataType, SimData, SimDevice
 
-from multidrop.base.errors import NoAnswer, Refused
+from multidrop.base.errors import NoAnswer, Refused, TransportLost
 from multidrop.dialects import Hints, Priority
 from multidrop.dialects.families import family_of
 from multidrop.dialects.modbus.host import framing
@@ -21,7 +21,6 @@ from multidrop.drives.bus import Bus
 from multidrop.drives.drive import still
 from multidrop.drives.events import Notice, Traffic, Unsolicited
 from multidrop.drives.stopping import Fate
-from multidrop.transports import TransportLost
 from multidrop.transports.sockets import open_tcp
 from tests.support.until import PATIENCE
 

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from multidrop.base.errors import Inexpressible, NoAnswer, Refused
+from multidrop.base.errors import Inexpressible, NoAnswer, Refused, TransportLost
 from multidrop.dialects import Kind, Motion, Priority, Reply, Request
 from multidrop.dialects.codec import End
 from multidrop.dialects.mcode.host.codec import MCode
@@ -14,7 +14,6 @@ from multidrop.drives.events import Outcome, Sample, Silent, Transaction, Valued
 from multidrop.drives.poller import AFTER_DEFECT, Due, Poller, Subscription
 from multidrop.drives.readings import Seen
 from multidrop.drives.telemetry import Value, _MotionPoller, _ValuePoller
-from multidrop.transports import TransportLost
 from tests.support.told_link import ToldLink
 
 pytestmark = pytest.mark.virtual

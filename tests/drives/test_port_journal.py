@@ -4,11 +4,10 @@ import asyncio
 
 import pytest
 
-from multidrop.base.errors import Stopped
+from multidrop.base.errors import Stopped, TransportLost
 from multidrop.dialects import Hints, Owed
 from multidrop.dialects.mcode.manual import program_file
 from multidrop.drives.port_journal import Keeper
-from multidrop.transports import TransportLost
 from tests.drives.test_bus import LOOP
 from tests.drives.test_bus import opened as opened_with
 from tests.support.until import until

@@ -18,10 +18,11 @@ import pytest
 
 import multidrop
 from multidrop.__main__ import main
+from multidrop.base.errors import TransportLost
 from multidrop.shell.configuration import Settings
 from multidrop.shell.session import Session
 from multidrop.shell.signals import early_ends
-from multidrop.transports import Transport, TransportLost, Unreachable, ssh_session
+from multidrop.transports import Transport, Unreachable, ssh_session
 from multidrop.transports.port_users import User, lock_owner
 from multidrop.transports.ssh import FarPort
 from multidrop.transports.ssh_session import open_ssh, reason

@@ -20,12 +20,11 @@ from hypothesis.stateful import (
     run_state_machine_as_test,
 )
 
-from multidrop.base.errors import Diagnostic, DriveError
+from multidrop.base.errors import Diagnostic, DriveError, TransportLost
 from multidrop.macros import Macro
 from multidrop.macros.model import Step
 from multidrop.shell.scripts.executor import play
 from multidrop.simulator.cell.spec import Faults
-from multidrop.transports import TransportLost
 from soak.judge import Witness
 from soak.languages import MCodeLanguage
 from tests.support.cell_session import CellSession, bus, moves, party

@@ -4,13 +4,12 @@ import asyncio
 
 import pytest
 
-from multidrop.base.errors import DriveError, Refused, Stopped
+from multidrop.base.errors import DriveError, Refused, Stopped, TransportLost
 from multidrop.macros import Macro, Step
 from multidrop.shell.events import By
 from multidrop.shell.prompt.terminal_input import run_lines
 from multidrop.shell.scripts import model
 from multidrop.shell.scripts.executor import run_script
-from multidrop.transports import TransportLost
 from tests.support.cell_session import ETHERNET, CellSession, bus, party, pmx
 
 pytestmark = pytest.mark.virtual

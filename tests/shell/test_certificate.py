@@ -11,7 +11,7 @@ from unittest import mock
 
 import pytest
 
-from multidrop.base.errors import Diagnostic, NoAnswer, Refused, Stopped
+from multidrop.base.errors import Diagnostic, NoAnswer, Refused, Stopped, TransportLost
 from multidrop.dialects.certifying import BYTES, ERROR, FITS, MODE, MOVES, NOTHING, owed
 from multidrop.dialects.families import FAMILIES
 from multidrop.dialects.tmcl.manual import commands
@@ -28,7 +28,6 @@ from multidrop.simulator.lexium.ports.modbus import ModbusPort
 from multidrop.simulator.serving.endpoints import serve_bus
 from multidrop.simulator.serving.running import RunningFloor
 from multidrop.simulator.tmcl.module import Answer as TmclAnswer
-from multidrop.transports import TransportLost
 from tests.support.cell_session import CellSession, bus, drive, party, pmx
 
 ROUTINE = 'program_text = """\nPG 1\nLB Ga\nMR 5000\nRT\nPG\nOE Ga\n"""'

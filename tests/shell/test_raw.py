@@ -9,14 +9,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from multidrop.base.errors import Diagnostic, NoAnswer, Stopped
+from multidrop.base.errors import Diagnostic, NoAnswer, Stopped, TransportLost
 from multidrop.macros import Macro, Step
 from multidrop.shell.configuration import Settings
 from multidrop.shell.events import By, Bytes
 from multidrop.shell.raw import Form, hex_of, parse_bytes, text_of
 from multidrop.shell.scripts.executor import play
 from multidrop.shell.session import Session
-from multidrop.transports import TransportLost
 from tests.support.cell_session import CellSession, bus, moves, party, pmx
 
 pytestmark = pytest.mark.virtual

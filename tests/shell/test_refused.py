@@ -4,13 +4,12 @@ import asyncio
 
 import pytest
 
-from multidrop.base.errors import Diagnostic, DriveError, NoAnswer, Refused
+from multidrop.base.errors import Diagnostic, DriveError, NoAnswer, Refused, TransportLost
 from multidrop.drives import stopping
 from multidrop.drives.stop_readings import read_activity
 from multidrop.drives.stopping import Fate
 from multidrop.shell.events import By
 from multidrop.shell.prompt.terminal_input import run_lines
-from multidrop.transports import TransportLost
 from tests.support.cell_session import ETHERNET, CellSession, bus, drive, party, pmx
 
 pytestmark = pytest.mark.virtual

@@ -7,11 +7,10 @@ from pathlib import Path
 
 import pytest
 
-from multidrop.base.errors import Differs, Inexpressible, NoAnswer, Refused, Stopped
+from multidrop.base.errors import Differs, Inexpressible, NoAnswer, Refused, Stopped, TransportLost
 from multidrop.drives.drive import Drive
 from multidrop.shell.sending import sending
 from multidrop.shell.session import Session
-from multidrop.transports import TransportLost
 from tests.support.cell_session import bus, party, pmx, session_on
 
 pytestmark = pytest.mark.virtual

@@ -6,14 +6,13 @@ import re
 
 import pytest
 
-from multidrop.base.errors import Diagnostic, DriveError, Inexpressible, NoAnswer, Refused, Stopped
+from multidrop.base.errors import Diagnostic, DriveError, Inexpressible, NoAnswer, Refused, Stopped, TransportLost
 from multidrop.drives.events import Notice, Sent, Unsolicited
 from multidrop.macros import Macro, Step
 from multidrop.shell.channel import Front
 from multidrop.shell.events import By, Entered, Failed, Notified, OnBus, Output, Printed, StateChanged
 from multidrop.shell.scripts.executor import play
 from multidrop.shell.streams.stdout import report
-from multidrop.transports import TransportLost
 from tests.support.cell_session import ETHERNET, CellSession, bus, drive, party, pmx
 
 pytestmark = pytest.mark.virtual

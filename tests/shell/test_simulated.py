@@ -4,12 +4,11 @@ import asyncio
 
 import pytest
 
-from multidrop.base.errors import DriveError, Inexpressible, NoAnswer, Refused, Stopped
+from multidrop.base.errors import DriveError, Inexpressible, NoAnswer, Refused, Stopped, TransportLost
 from multidrop.drives.events import Traffic
 from multidrop.shell.configuration import SavedConnection, Settings
 from multidrop.shell.events import Failed, Notified, OnBus, Output, Printed
 from multidrop.shell.session import Session
-from multidrop.transports import TransportLost
 from tests.support.cell_session import ETHERNET, bus, drive, party
 from tests.support.until import PATIENCE
 

@@ -7,14 +7,13 @@ from pathlib import Path
 
 import pytest
 
-from multidrop.base.errors import Diagnostic, DriveError, Stopped
+from multidrop.base.errors import Diagnostic, DriveError, Stopped, TransportLost
 from multidrop.shell import snapshots
 from multidrop.shell.configuration import Settings
 from multidrop.shell.events import Notified
 from multidrop.shell.programs import transfers
 from multidrop.shell.session import Session
 from multidrop.simulator import cells
-from multidrop.transports import TransportLost
 from tests.support.cell_session import CellSession, bus, pmx
 
 pytestmark = [pytest.mark.virtual, pytest.mark.slow]

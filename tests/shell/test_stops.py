@@ -5,14 +5,13 @@ from dataclasses import replace
 
 import pytest
 
-from multidrop.base.errors import Diagnostic, DriveError, Stopped
+from multidrop.base.errors import Diagnostic, DriveError, Stopped, TransportLost
 from multidrop.dialects import Motion
 from multidrop.drives.drive import confirmed_motion
 from multidrop.drives.stopping import Fate
 from multidrop.shell import stop_report
 from multidrop.shell.automation import TRIAL, outcome, stop_key_trial
 from multidrop.shell.events import OnBus
-from multidrop.transports import TransportLost
 from tests.support.cell_session import ETHERNET, CellSession, bus, party, pmx
 
 pytestmark = pytest.mark.virtual

@@ -11,13 +11,13 @@ from typing import Any
 
 import pytest
 
-from multidrop.base.errors import NoAnswer, Refused
+from multidrop.base.errors import NoAnswer, Refused, TransportLost
 from multidrop.drives.events import Sample
 from multidrop.drives.stopping import Fate
 from multidrop.shell.connect.opening import port_name
 from multidrop.shell.connect.urls import parse
 from multidrop.shell.events import OnBus
-from multidrop.transports import TransportLost, libusb
+from multidrop.transports import libusb
 from tests.support.cell_session import CellSession, bus, pmx
 from tests.support.until import until
 from tests.support.usb_stand_in import UsbFaults

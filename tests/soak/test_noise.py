@@ -2,10 +2,9 @@
 
 import pytest
 
-from multidrop.base.errors import NoAnswer, Refused
+from multidrop.base.errors import NoAnswer, Refused, TransportLost
 from multidrop.simulator.cells import read
 from multidrop.simulator.floor import Floor
-from multidrop.transports import TransportLost
 from soak.judge import Judge, Ledger, Witness, Word, word
 from soak.noise import Job, jobs, judge
 from soak.noisy_line import Setup

@@ -17,7 +17,7 @@ from typing import Any
 
 from textual.pilot import Pilot
 
-from multidrop.base.errors import Diagnostic, DriveError, Stopped
+from multidrop.base.errors import Diagnostic, DriveError, Stopped, TransportLost
 from multidrop.dialects import DriveState
 from multidrop.dialects.families import FAMILIES
 from multidrop.dialects.family import Family
@@ -36,7 +36,7 @@ from multidrop.shell.roles import RunningPlot, Series
 from multidrop.shell.state.backups import Drafts
 from multidrop.shell.stop_report import Found, Tally
 from multidrop.shell.units import Axis, Units
-from multidrop.transports import TransportLost, Unreachable
+from multidrop.transports import Unreachable
 from multidrop.tui.app import MultidropApp
 from multidrop.tui.assist import Assist, StartEntry
 from multidrop.tui.screens.dialogs import Over

@@ -7,7 +7,7 @@ import socket
 import threading
 from collections.abc import Iterator
 
-from multidrop.transports import TransportLost
+from multidrop.base.errors import TransportLost
 from multidrop.transports.relay import GREETING, SILENCE, serve
 from multidrop.transports.relay_pipe import SocketStream
 from multidrop.transports.serial_port import SerialEndpoint

@@ -14,7 +14,8 @@ from dataclasses import dataclass, field
 import serial
 from serial import rfc2217
 
-from multidrop.transports import Transport, TransportLost
+from multidrop.base.errors import TransportLost
+from multidrop.transports import Transport
 from multidrop.transports.relay_pipe import RelayPipe
 from multidrop.transports.rfc2217 import open_rfc2217
 from multidrop.transports.serial_port import SerialDevice, open_serial

@@ -6,9 +6,8 @@ import os
 import re
 from pathlib import Path
 
-from multidrop.base.errors import Diagnostic, DriveError
+from multidrop.base.errors import Diagnostic, DriveError, TransportLost
 from multidrop.shell.events import By, Failed, Notified, Output, Printed
-from multidrop.transports import TransportLost
 from tests.support.cell_session import CellSession
 
 _CHANGING = (

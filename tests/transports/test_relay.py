@@ -14,7 +14,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from multidrop.transports import TransportLost, relay
+from multidrop.base.errors import TransportLost
+from multidrop.transports import relay
 from multidrop.transports.port_users import lock_owner
 from multidrop.transports.relay import (
     BEAT,

@@ -7,7 +7,8 @@ from collections.abc import Callable
 
 import pytest
 
-from multidrop.transports import Lost, Received, Transport, TransportLost, Unreachable, telnet
+from multidrop.base.errors import TransportLost
+from multidrop.transports import Lost, Received, Transport, Unreachable, telnet
 from multidrop.transports.rfc2217 import Rfc2217Pipe, negotiated
 from multidrop.transports.telnet import OPTION, REPLY, Control, Setting, message, parsed
 

@@ -10,7 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from multidrop.transports import TransportLost, Unreachable
+from multidrop.base.errors import TransportLost
+from multidrop.transports import Unreachable
 from multidrop.transports.rfc2217 import Rfc2217Pipe, open_rfc2217
 from tests.support.posix import termios, tty
 from tests.support.tools import tool

@@ -11,7 +11,8 @@ from collections.abc import Iterator
 
 import pytest
 
-from multidrop.transports import TransportLost, Unreachable, rfc2217, sockets
+from multidrop.base.errors import TransportLost
+from multidrop.transports import Unreachable, rfc2217, sockets
 from multidrop.transports.pipe import DescriptorPipe
 from multidrop.transports.rfc2217 import open_rfc2217
 from multidrop.transports.sockets import open_tcp, open_udp

@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import threading
 
-from multidrop.transports import TransportLost
+from multidrop.base.errors import TransportLost
 from multidrop.transports.pipe import running_loop
 from multidrop.transports.threaded import ThreadedPipe
 from tests.support.until import PATIENCE

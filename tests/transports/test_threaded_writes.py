@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from multidrop.transports import TransportLost
+from multidrop.base.errors import TransportLost
 from multidrop.transports.threaded import ThreadedPipe, closing
 from tests.support.until import PATIENCE, until
 

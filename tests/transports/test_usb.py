@@ -7,7 +7,8 @@ import threading
 
 import pytest
 
-from multidrop.transports import TransportLost, Undelivered, Unreachable
+from multidrop.base.errors import TransportLost
+from multidrop.transports import Undelivered, Unreachable
 from multidrop.transports.performax import CANCELLED, GONE, STALLED, Control
 from multidrop.transports.usb import LATE, REPLY, TAKEN, Broken, Done, TransferFailed, UsbPipe, open_usb
 

@@ -12,12 +12,13 @@ from typing import Any
 
 import pytest
 
+from multidrop.base.errors import TransportLost
 from multidrop.simulator.cells import read
 from multidrop.simulator.floor import Floor
 from multidrop.simulator.pmx.family import UsbController
 from multidrop.simulator.serving.running import RunningFloor
 from multidrop.simulator.serving.usbip import UsbipServer
-from multidrop.transports import TransportLost, Unreachable
+from multidrop.transports import Unreachable
 from multidrop.transports.usb import UsbPipe, open_usb
 from multidrop.transports.usbip import imported
 from tests.support.cell_session import bus, pmx

@@ -7,9 +7,9 @@ from textual import events
 from textual.pilot import Pilot
 from textual.worker import WorkerFailed
 
+from multidrop.base.errors import TransportLost
 from multidrop.drives.events import Sample, Unsolicited
 from multidrop.shell.events import By, Entered, OnBus, StateChanged
-from multidrop.transports import TransportLost
 from multidrop.tui.outbox import BURST
 from multidrop.tui.polling import LIVELY, OTHERS, PLOT, REST, STATUS
 from multidrop.tui.readout import State

@@ -10,11 +10,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from multidrop.base.errors import Diagnostic
+from multidrop.base.errors import Diagnostic, TransportLost
 from multidrop.drives.events import Lost, Sample, Valued
 from multidrop.shell.events import By, OnBus
 from multidrop.shell.roles import Series
-from multidrop.transports import TransportLost
 from multidrop.tui.curves.raster import ASCII
 from multidrop.tui.curves.samples import Quantity
 from multidrop.tui.curves.trigger import State

@@ -11,13 +11,13 @@ from pathlib import Path
 import pytest
 from textual.pilot import Pilot
 
+from multidrop.base.errors import TransportLost
 from multidrop.dialects.values import IO, VARIABLES, Conditions, Reading, Readings
 from multidrop.drives.events import Conditioned, Sample, Traffic, Valued
 from multidrop.drives.stopping import Fate
 from multidrop.shell.events import Bytes, OnBus, Phase, Printed, ProgramRead, ProgramSeen, SettingsRead
 from multidrop.shell.prompt.complete import Completion
 from multidrop.shell.roles import Filter, Series
-from multidrop.transports import TransportLost
 from multidrop.tui.app import MultidropApp
 from multidrop.tui.curves.samples import Quantity
 from multidrop.tui.curves.trigger import Setting

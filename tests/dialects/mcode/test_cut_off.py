@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import pytest
 
+from multidrop.base.errors import TransportLost
 from multidrop.dialects import End, Hints, Owed, Reply
 from multidrop.dialects.mcode.family import MCODE
 from multidrop.dialects.mcode.host import identify
@@ -12,7 +13,6 @@ from multidrop.dialects.mcode.host.operations import put_back_found
 from multidrop.dialects.mcode.host.state import MCodeState
 from multidrop.dialects.mcode.manual import program_file
 from multidrop.simulator.cell.spec import Faults
-from multidrop.transports import TransportLost
 from tests.support.cases import for_each
 from tests.support.faults import disturb
 from tests.support.mcode_drives import MODES, Witness

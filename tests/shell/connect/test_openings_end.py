@@ -7,11 +7,10 @@ from typing import Any
 
 import pytest
 
-from multidrop.base.errors import DriveError
+from multidrop.base.errors import DriveError, TransportLost
 from multidrop.shell.configuration import Settings
 from multidrop.shell.connect import opening
 from multidrop.shell.session import Session
-from multidrop.transports import TransportLost
 from tests.support.cases import for_each
 from tests.support.talker import Talker
 

@@ -9,12 +9,11 @@ from typing import Any
 
 import pytest
 
-from multidrop.base.errors import Diagnostic
+from multidrop.base.errors import Diagnostic, TransportLost
 from multidrop.drives.events import Sample
 from multidrop.macros import Macro, Step
 from multidrop.shell.events import OnBus
 from multidrop.shell.scripts.executor import play
-from multidrop.transports import TransportLost
 from tests.support.cell_session import ETHERNET, CellSession, bus, party, pmx
 from tests.support.mcode_drives import Witness
 from tests.support.until import until

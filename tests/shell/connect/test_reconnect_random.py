@@ -8,8 +8,7 @@ from random import Random
 
 import pytest
 
-from multidrop.base.errors import DriveError
-from multidrop.transports import TransportLost
+from multidrop.base.errors import DriveError, TransportLost
 from tests.support.cell_session import ETHERNET, CellSession, bus, party
 from tests.support.mcode_drives import Witness
 

@@ -4,7 +4,7 @@ import asyncio
 
 import pytest
 
-from multidrop.base.errors import Diagnostic, NoAnswer, Stopped
+from multidrop.base.errors import Diagnostic, NoAnswer, Stopped, TransportLost
 from multidrop.dialects.state import Remembered
 from multidrop.shell.configuration import Settings
 from multidrop.shell.connect import opening
@@ -13,7 +13,6 @@ from multidrop.shell.events import Notified
 from multidrop.shell.finding.scanning import NothingFound, Scanning, url_of
 from multidrop.shell.session import Session
 from multidrop.shell.state.port_state import PortState
-from multidrop.transports import TransportLost
 from tests.support.cell_session import CellSession, bus, drive, party, pmx
 from tests.support.talker import Talker
 from tests.support.tuned_ports import Port

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from multidrop.base.errors import Diagnostic, DriveError, Refused, Stopped
+from multidrop.base.errors import Diagnostic, DriveError, Refused, Stopped, TransportLost
 from multidrop.drives.events import Traffic
 from multidrop.shell.batch.report import Report
 from multidrop.shell.events import Notified, OnBus
@@ -17,7 +17,6 @@ from multidrop.shell.scripts.executor import play, run_script
 from multidrop.shell.scripts.model import Ending
 from multidrop.shell.scripts.reading import read_script
 from multidrop.shell.streams.stdout import report
-from multidrop.transports import TransportLost
 from tests.support.macro_shop import Shop
 
 pytestmark = pytest.mark.virtual

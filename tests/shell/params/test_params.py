@@ -7,14 +7,13 @@ from dataclasses import replace
 
 import pytest
 
-from multidrop.base.errors import Diagnostic, DriveError, NoAnswer, Refused, Stopped
+from multidrop.base.errors import Diagnostic, DriveError, NoAnswer, Refused, Stopped, TransportLost
 from multidrop.drives.events import Traffic
 from multidrop.shell.configuration import Settings
 from multidrop.shell.events import Notified, OnBus, Output
 from multidrop.shell.params import file as files
 from multidrop.shell.params.file import read
 from multidrop.shell.session import Session
-from multidrop.transports import TransportLost
 
 pytestmark = pytest.mark.virtual
 

@@ -8,13 +8,12 @@ from pathlib import Path
 
 import pytest
 
-from multidrop.base.errors import Diagnostic, DriveError, Refused, Stopped
+from multidrop.base.errors import Diagnostic, DriveError, Refused, Stopped, TransportLost
 from multidrop.drives.events import Traffic
 from multidrop.shell import snapshots
 from multidrop.shell.params import replacement
 from multidrop.shell.params.work import Options
 from multidrop.simulator import cells
-from multidrop.transports import TransportLost
 from tests.support.cell_session import CellSession, bus
 
 pytestmark = [pytest.mark.virtual, pytest.mark.slow]

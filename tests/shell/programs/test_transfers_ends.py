@@ -9,8 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from multidrop.base.errors import Diagnostic, Differs, Refused, Stopped
-from multidrop.transports import TransportLost
+from multidrop.base.errors import Diagnostic, Differs, Refused, Stopped, TransportLost
 from tests.support.cell_session import CellSession, bus, pmx
 from tests.support.transfers import FILE, LONG, RUNNING, SLOW, kept, load, shop_with
 from tests.support.until import until

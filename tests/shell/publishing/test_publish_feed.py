@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from multidrop import __version__
-from multidrop.base.errors import Diagnostic
+from multidrop.base.errors import Diagnostic, TransportLost
 from multidrop.drives.events import Unsolicited
 from multidrop.shell.configuration import Settings
 from multidrop.shell.events import Notified, OnBus
@@ -23,7 +23,6 @@ from multidrop.shell.publishing.feed import BURST, HEARTBEAT, LINES, Feed, Topic
 from multidrop.shell.publishing.publisher import Backlog, Publisher
 from multidrop.shell.publishing.registry import Registry
 from multidrop.shell.session import Session
-from multidrop.transports import TransportLost
 from tests.support.cell_session import ETHERNET, CellSession, bus, party, pmx
 from tests.support.kept_broker import KeptBroker
 

@@ -15,6 +15,7 @@ from unittest.mock import Mock
 import pytest
 import serial
 
+from multidrop.base.errors import TransportLost
 from multidrop.drives import pacing
 from multidrop.shell.connect.opening import open_port
 from multidrop.shell.connect.urls import parse
@@ -23,7 +24,7 @@ from multidrop.shell.sharing.client import Client, Input, Request
 from multidrop.shell.sharing.server import SharedPort
 from multidrop.shell.sharing.stop_bytes import stop_bytes
 from multidrop.shell.sharing.writer_turns import NOT_REACHED, TURN, Say, Write
-from multidrop.transports import TransportLost, Unreachable, telnet
+from multidrop.transports import Unreachable, telnet
 from multidrop.transports.rfc2217 import open_rfc2217
 from multidrop.transports.telnet import OPTION, Setting, message
 from tests.support.posix import termios, tty

@@ -7,13 +7,13 @@ import sys
 
 import pytest
 
-from multidrop.base.errors import Diagnostic, DriveError, Inexpressible, NoAnswer, Refused, Stopped
+from multidrop.base.errors import Diagnostic, DriveError, Inexpressible, NoAnswer, Refused, Stopped, TransportLost
 from multidrop.drives.events import Unsolicited
 from multidrop.shell.events import Failed, Notified, OnBus, Output, Printed
 from multidrop.shell.exit_codes import exit_code
 from multidrop.shell.streams.event_printer import Printer
 from multidrop.shell.streams.stdout import ReaderWatch, report, write
-from multidrop.transports import TransportLost, Unreachable
+from multidrop.transports import Unreachable
 from tests.support.posix import pty
 
 

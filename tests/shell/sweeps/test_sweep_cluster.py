@@ -9,11 +9,10 @@ from typing import Any
 
 import pytest
 
-from multidrop.base.errors import Diagnostic
+from multidrop.base.errors import Diagnostic, TransportLost
 from multidrop.shell.signals import Interruption
 from multidrop.shell.sweeps import trial, workers
 from multidrop.shell.sweeps.trial import Case, Job, Result
-from multidrop.transports import TransportLost
 
 comm = pytest.importorskip("distributed.comm", reason="the extra cluster is not installed")
 

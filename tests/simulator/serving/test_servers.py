@@ -17,14 +17,13 @@ from types import SimpleNamespace
 
 import pytest
 
-from multidrop.base.errors import Diagnostic
+from multidrop.base.errors import Diagnostic, TransportLost
 from multidrop.simulator.cells import read
 from multidrop.simulator.floor import Floor
 from multidrop.simulator.serving.command import reachable
 from multidrop.simulator.serving.endpoints import serve_bus
 from multidrop.simulator.serving.in_process import connect
 from multidrop.simulator.serving.running import RunningFloor
-from multidrop.transports import TransportLost
 from tests.support.paths import ROOT
 from tests.support.posix import fcntl, termios, tty
 from tests.support.until import PATIENCE
