@@ -32,9 +32,9 @@ from report import Row, compared, main
 from sim_process import ROOT, all_served, busy
 from terminal import Terminal, multidrop
 
+from multidrop.features.publishing.broker import WINDOW, Connection, Message, parse_target
+from multidrop.features.publishing.publisher import Backlog, Publisher
 from multidrop.shell.configuration import MqttSettings
-from multidrop.shell.publishing.broker import WINDOW, Connection, Message, parse_target
-from multidrop.shell.publishing.publisher import Backlog, Publisher
 
 MOSQUITTO = shutil.which("mosquitto", path=f"{os.environ.get('PATH', '')}:/usr/sbin") or ""
 NAMES = "abc"

@@ -25,7 +25,7 @@ sys.path.insert(0, str(Path(__file__).parent.parent))
 from report import Row, alone, compared, main
 
 from multidrop.__main__ import main as command
-from multidrop.shell.sweeps import plan, trial
+from multidrop.features.sweeps import plan, trial
 
 ROOT = Path(__file__).resolve().parent.parent
 AIM, MOST_MS = 1.8, 5.0

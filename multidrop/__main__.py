@@ -9,9 +9,6 @@ import signal
 import sys
 from collections.abc import Sequence
 
-PROTOCOLS = ("serving.relay", "serving.lsp")
-"""Commands whose standard output is a connection: they notice its end themselves."""
-
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run a command; return the exit code. An error that a person can cause is one line on standard error.
@@ -69,7 +66,7 @@ def _run(arguments: Sequence[str], own: bool) -> int:
         from multidrop.shell.streams import output_streams, stdout
 
         output_streams.as_json = getattr(chosen, "json", False) is True
-        if own and chosen.run_by not in PROTOCOLS:
+        if own and not chosen.run_by.connection:
             stdout.watch_reader(signal.SIGINT)
         code = run(chosen)
         stdout.flush_printed()

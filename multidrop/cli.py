@@ -10,7 +10,7 @@ from __future__ import annotations
 import argparse
 import os
 import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from contextvars import copy_context
 from importlib.machinery import PathFinder
 from typing import TYPE_CHECKING, Any, NoReturn
@@ -30,19 +30,8 @@ EPILOG = (
     "Without a command: the screen, with saved connections, serial ports and the demo cell. "
     "multidrop COMMAND --help shows its arguments."
 )
-EXTRAS = {
-    "cluster": "distributed",
-    "fit": "scipy",
-    "lsp": "pygls",
-    "mqtt": "paho",
-    "notebook": "ipykernel",
-    "opcua": "asyncua",
-    "prometheus": "prometheus_client",
-    "pytest": "pytest",
-    "rerun": "rerun",
-    "usb": "usb1",
-}
-"""The modules of the extras in pyproject.toml, by extra."""
+EXTRAS = {"notebook": "ipykernel", "pytest": "pytest", "rerun": "rerun", "usb": "usb1"}
+"""The modules of the extras in pyproject.toml that are no feature's, by extra."""
 
 
 class Formatter(argparse.HelpFormatter):
@@ -95,7 +84,7 @@ class Parser(argparse.ArgumentParser):
         if self.operation.run and not named:
             add_arguments(self, self.operation.arguments)
             _add_no_config(self)
-            self.set_defaults(run_by=self.operation.run, command=self.operation.command)
+            self.set_defaults(run_by=self.operation, command=self.operation.command)
         if own and (named or not self.operation.run):
             self.add_commands(own, given, "|".join(own), required=True)
 
@@ -105,7 +94,9 @@ class Parser(argparse.ArgumentParser):
         """Add the commands, or only the one that the first word names."""
         added = self.add_subparsers(prog=self.prog, metavar=metavar, required=required, parser_class=Parser)
         asked = given[0] if given else ""
-        for name, operation in ({asked: commands[asked]} if asked in commands else commands).items():
+        if asked not in commands:
+            _load_others(given)
+        for name, operation in (_the_one(asked, commands) if asked in commands else commands).items():
             part = added.add_parser(
                 name,
                 help=operation.meaning,
@@ -147,6 +138,26 @@ class _Version(argparse.Action):
         parser.exit()
 
 
+def _load_others(given: Sequence[str]) -> None:
+    """Load the features by others, whose commands a line may mean; say of each that cannot be loaded why."""
+    from multidrop.shell.operations.table import load_others
+    from multidrop.shell.streams.stdout import write
+
+    for warning in load_others(own="--no-config" not in given):
+        write(sys.stderr, f"warning: {warning}")
+
+
+def _the_one(name: str, commands: Mapping[str, Operation]) -> Mapping[str, Operation]:
+    """The command that a line asks for. Raises SystemExit where its feature is not there."""
+    from multidrop.base.errors import Diagnostic
+    from multidrop.shell.streams.stdout import fail
+
+    try:
+        return {name: commands[name]}
+    except Diagnostic as problem:
+        raise SystemExit(fail(problem)) from None
+
+
 def _add_no_config(parser: Parser) -> None:
     suppressed = argparse.SUPPRESS  # a default of the command would replace what stood before the command
     parser.add_argument("--no-config", action="store_true", default=suppressed, help="read no configuration file")
@@ -159,8 +170,7 @@ def parse(given: Sequence[str]) -> argparse.Namespace:
 
 def run(chosen: argparse.Namespace) -> int:
     """Run a parsed command; return the exit code. A Diagnostic, or a loss, is one line on standard error."""
-    file, _, function = chosen.run_by.partition(".")
-    command: Callable[[argparse.Namespace], int] = imported(f"multidrop.commands.{file}:{function}")
+    command = chosen.run_by.command_work
     from multidrop.base.errors import Diagnostic, TransportLost
     from multidrop.shell.streams.stdout import fail
 
@@ -168,16 +178,24 @@ def run(chosen: argparse.Namespace) -> int:
     if hasattr(chosen, "no_config"):
         context.run(imported("multidrop.commands.machine:ignore"))
     try:
-        return context.run(command, chosen)
+        code: int = context.run(command, chosen)
+        return code
     except (Diagnostic, TransportLost) as problem:
         return fail(problem)
+
+
+def extras() -> dict[str, str]:
+    """The extras of the distribution: the name of each, and a module that is there once it is installed."""
+    from multidrop.base import registry
+
+    return EXTRAS | {extra: module for each in registry.wheels() for extra, module in each.extras.items()}
 
 
 def version() -> str:
     """Describe the installation, as in `multidrop 0.1.0, Python 3.11.7, extras: rerun`; import no module for it."""
     import multidrop
 
-    found = [extra for extra, module in EXTRAS.items() if PathFinder.find_spec(module) is not None]
+    found = [extra for extra, module in sorted(extras().items()) if PathFinder.find_spec(module) is not None]
     python = ".".join(map(str, sys.version_info[:3]))
     return f"multidrop {multidrop.__version__}, Python {python}, extras: {', '.join(found) or 'none'}"
 
@@ -187,10 +205,11 @@ def build(given: Sequence[str] = ()) -> Parser:
     parser = Parser(prog="multidrop", description=DESCRIPTION, epilog=EPILOG, formatter_class=Formatter)
     parser.add_argument("--version", action=_Version, nargs=0, help="show the version and exit")
     _add_no_config(parser)
-    parser.set_defaults(run_by="lines.start")
     if given[:1] != ["--version"]:
+        from multidrop.shell.operations.operation import Operation
         from multidrop.shell.operations.table import COMMANDS
 
+        parser.set_defaults(run_by=Operation(run="lines.start"))
         parser.add_commands(COMMANDS.parts(""), given, "COMMAND", required=False)
     return parser
 

@@ -9,7 +9,7 @@ from typing import Any
 
 from hatchling.builders.hooks.plugin.interface import BuildHookInterface
 
-ROOMS = ("tui", "shell", "macros", "drives", "simulator", "dialects", "transports", "base")
+ROOMS = ("tui", "shell", "macros", "drives", "simulator", "dialects", "transports", "base", "features")
 
 
 class Rooms(BuildHookInterface[Any]):

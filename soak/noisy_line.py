@@ -18,12 +18,12 @@ from typing import Any
 
 from multidrop.base.errors import DriveError, TransportLost
 from multidrop.drives.events import Notice
+from multidrop.features.sharing.server import SharedPort
+from multidrop.features.sharing.stop_bytes import stop_bytes
 from multidrop.shell.configuration import Settings
 from multidrop.shell.connect.opening import open_port
 from multidrop.shell.connect.urls import parse
 from multidrop.shell.session import Session
-from multidrop.shell.sharing.server import SharedPort
-from multidrop.shell.sharing.stop_bytes import stop_bytes
 from multidrop.simulator import cells
 from multidrop.simulator.cell.spec import Faults
 from multidrop.simulator.floor import Floor

@@ -1,6 +1,6 @@
 """Telnet as bytes (RFC 854), with the messages of its com port option (RFC 2217). It has no clock and no socket.
 
-Both ends of RFC 2217 use it: `transports.rfc2217` and `shell.sharing`.
+Both ends of RFC 2217 use it: `transports.rfc2217` and `features.sharing`.
 """
 
 from __future__ import annotations

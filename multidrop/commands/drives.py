@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import argparse
 import json
-import sys
 from collections.abc import Awaitable, Callable
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from multidrop.base import new_file
@@ -30,31 +28,6 @@ if TYPE_CHECKING:
 
 DIFFERS = 1
 """The exit code of a comparison where something differs, as where a drive did not reply or refused."""
-
-
-def twin_fit(chosen: argparse.Namespace) -> int:
-    """Fit a cell to a log, in virtual time; report a wrong file before anything is opened.
-
-    The cell is written once all output is. Raises Diagnostic.
-    """
-    from multidrop.shell.batch.replay import VirtualLoop
-    from multidrop.shell.log import steps
-    from multidrop.shell.streams import stdout
-    from multidrop.shell.twin_fit.work import fit
-
-    log, cell = Path(chosen.log), Path(chosen.cell.removeprefix("sim:"))
-    steps.read(log)
-    found: list[Callable[[], None]] = []
-
-    async def body(session: Session) -> None:
-        found.append(await fit(session, log, cell, chosen.json))
-
-    code = runner.run([f"sim:{cell}"], body, unsolicited=False, replies=False, loop=VirtualLoop)
-    if not code and stdout.dropped:
-        stdout.write(sys.stderr, f"{cell} is unchanged: its values could not be shown")
-    elif not code:
-        found[0]()
-    return code
 
 
 def list_(chosen: argparse.Namespace) -> int:

@@ -1,6 +1,6 @@
 """Commands that serve until interrupted, and small ones: each imports what it needs when it runs.
 
-`multidrop sim`, `share`, `relay`, `plot`, `poll`, `publish`, `plant`, `lsp`, `ports`, `completion`.
+`multidrop sim`, `relay`, `plot`, `poll`, `ports`, `completion`.
 """
 
 from __future__ import annotations
@@ -42,12 +42,6 @@ def sim(chosen: argparse.Namespace) -> int:
     return asyncio.run(body())
 
 
-def share(chosen: argparse.Namespace) -> int:
-    from multidrop.shell.sharing import server
-
-    return server.run(chosen.url, chosen.rfc2217, as_json=chosen.json)
-
-
 def plot(chosen: argparse.Namespace) -> int:
     from multidrop.shell.plots import command
 
@@ -66,28 +60,6 @@ def poll(chosen: argparse.Namespace) -> int:
 
     asked = command.Polling(chosen.names, chosen.drive or "all", chosen.every, chosen.rows, chosen.json)
     return command.poll(chosen.url, asked, reconnect=not chosen.no_reconnect)
-
-
-def publish(chosen: argparse.Namespace) -> int:
-    from multidrop.shell.publishing import command
-
-    return command.run(
-        chosen.urls,
-        to=chosen.to,
-        rate=chosen.rate,
-        home_assistant=chosen.home_assistant,
-        reconnect=not chosen.no_reconnect,
-    )
-
-
-def plant(chosen: argparse.Namespace) -> int:
-    from multidrop.shell.publishing import watch
-
-    if chosen.json or not all(each.isatty() for each in (sys.stdin, sys.stdout, sys.stderr)):
-        return watch.run(chosen.url, as_json=chosen.json)
-    from multidrop.tui.plant import run
-
-    return run(chosen.url)
 
 
 def relay(chosen: argparse.Namespace) -> int:
@@ -129,19 +101,6 @@ def relay(chosen: argparse.Namespace) -> int:
             signal.signal(number, ended)
         serve(opened(SerialEndpoint, chosen.port, chosen.baud))
         return 0
-
-
-def lsp(chosen: argparse.Namespace) -> int:
-    try:
-        from multidrop.lsp.serving import serve
-    except ModuleNotFoundError as missing:
-        if (missing.name or "").partition(".")[0] not in ("pygls", "lsprotocol"):
-            raise
-        what = "the language server needs pygls, which is not installed"
-        raise Diagnostic(what, hint="pipx install 'multidrop[lsp]'") from None
-    if chosen.tcp is None and sys.stdin.isatty():
-        write(sys.stderr, "multidrop lsp speaks to an editor, which starts it; see docs/editors.md")
-    return serve(chosen.personality, chosen.tcp)
 
 
 def ports(chosen: argparse.Namespace) -> int:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import argparse
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Coroutine, Mapping, Sequence
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -37,15 +37,15 @@ class Operation(NamedTuple):
     """Name and arguments of the verb, in the notation of `multidrop.shell.operations.usage`; empty: no verb."""
     help: str = ""
     """The help on the verb; its first line is the meaning."""
-    work: str = ""
-    """`FILE:FUNCTION` in `multidrop.shell.verbs`; it takes the Call."""
+    work: str | Callable[[Any], Coroutine[Any, Any, None]] = ""
+    """What the verb does, from a `shell.verbs.call.Call`: a function, or `FILE:FUNCTION` in `multidrop.shell.verbs`."""
     words: Mapping[str, str] = NOTHING
     """The meanings of the literal words of the usage."""
-    recorded: str = ""
+    recorded: str | Callable[..., Any] = ""
     """`FILE:FUNCTION` of the line that a macro records; `typed`: the line as typed; empty: none."""
-    checked: str = ""
+    checked: str | Callable[..., Any] = ""
     """`FILE:FUNCTION`, which raises Diagnostic for arguments that are wrong whatever is open: scripts are checked."""
-    rows: str = ""
+    rows: str | Callable[[], Sequence[str]] = ""
     """`MODULE:FUNCTION` for more lines of its help, from the table that the verb uses."""
     fits: Callable[[Workspace], bool] | None = None
     """The condition under which the verb is offered."""
@@ -59,14 +59,21 @@ class Operation(NamedTuple):
     """The words of the command: `program check`; empty: no command."""
     meaning: str = ""
     """The meaning of the command."""
-    run: str = ""
-    """`FILE.FUNCTION` in `multidrop.commands`, from the parsed arguments to the exit code; empty: a group."""
+    run: str | Callable[[argparse.Namespace], int] = ""
+    """From the parsed arguments to the exit code: a function, or its `FILE.FUNCTION` in `multidrop.commands`; empty:
+    a group."""
     examples: Sequence[str] = ()
     arguments: Arguments = NOTHING
     urls: bool = False
     """The help on a group explains URLs, as that on a command with a URL does."""
     own_urls: str = ""
     """The explanation of its own URLs, where it takes other ones."""
+    connection: bool = False
+    """The standard output of the command is a connection, whose end it notices itself."""
+    group: str = ""
+    """The title of `/help` under which a feature's verb is listed."""
+    after: str = ""
+    """The verb or command that a feature's is listed after, in `/help` and `--help`; empty: it comes last."""
 
     @property
     def name(self) -> str:
@@ -83,15 +90,25 @@ class Operation(NamedTuple):
 
     def described(self) -> list[str]:
         """The usage, the help, and the rows of its table."""
-        return [self.usage, *self.lines, *(imported(self.rows)() if self.rows else ())]
+        rows = imported(self.rows) if isinstance(self.rows, str) and self.rows else self.rows
+        return [self.usage, *self.lines, *(rows() if rows else ())]
 
     def check(self, rest: str) -> None:
         """Raise Diagnostic for arguments that are wrong whatever is open."""
         if self.checked:
             self.imported(self.checked)(self, rest)
 
-    def imported(self, place: str) -> Any:
-        return imported(f"multidrop.shell.verbs.{place}")
+    def imported(self, place: str | Callable[..., Any]) -> Any:
+        return imported(f"multidrop.shell.verbs.{place}") if isinstance(place, str) else place
+
+    @property
+    def command_work(self) -> Callable[[argparse.Namespace], int]:
+        """What the command does."""
+        if not isinstance(self.run, str):
+            return self.run
+        file, _, function = self.run.partition(".")
+        work: Callable[[argparse.Namespace], int] = imported(f"multidrop.commands.{file}:{function}")
+        return work
 
     def wrong(self, message: str = "") -> Diagnostic:
         """A Diagnostic with the usage, and with the error if it is known."""

@@ -11,10 +11,13 @@ from __future__ import annotations
 import os
 import re
 from ast import literal_eval
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import cache
+from itertools import chain
 from typing import Any
 
+from multidrop.base import registry
+from multidrop.base.feature import Feature
 from multidrop.base.on_demand import imported
 from multidrop.shell.operations import arguments, conditions
 from multidrop.shell.operations.operation import Operation
@@ -31,8 +34,8 @@ VERB_GROUPS = {
     "Simulated drives": "/sim",
 }
 """The verbs in the order and the groups of `/help`."""
-COMMAND_ORDER = """demo tui shell send run sim program params macro plot poll publish plant share snapshot twin certify
-    ports relay scan rescue log config help lsp report completion"""
+COMMAND_ORDER = """demo tui shell send run sim program params macro plot poll snapshot certify ports relay scan rescue
+    log config help report completion"""
 SCRIPT_VERBS: Mapping[str, tuple[str, str]] = {
     "/set": ("/set NAME EXPR", "gives a name a value, which is worked out once: a number, a text, a drive's word"),
     "/if": ("/if EXPR", "executes the lines up to /else or /end if the expression holds"),
@@ -72,29 +75,75 @@ _ENTRY = re.compile(
     re.M | re.S,
 )
 """A head, with the name of its table; or a key and its text of several lines, or another value."""
+_WORD = re.compile(r"/?[a-z][a-z0-9-]*( [a-z][a-z0-9-]*)?")
+BY_OTHERS = "Added by others"
+"""The title of `/help` for verbs that name no other one."""
 _KEY = re.compile(r'"([^"]*)"|([\w-]+)')
 _ELSEWHERE = re.compile(r"@([\w.]+:\w+)")
 
 
 class Declared(Mapping[str, Operation]):
-    """Operations by name. A section is parsed when it is asked for, as a start needs one or two of them."""
+    """Operations by name: those of the sections, then those of features, each after the one that it names.
 
-    def __init__(self, sections: Mapping[str, str], order: Sequence[str] = ()) -> None:
+    A section is parsed, and a feature imported, when its operation is asked for: a start needs one or two of them.
+    """
+
+    def __init__(self, sections: Mapping[str, str], order: Sequence[str], name_of: Callable[[Operation], str]) -> None:
         self._sections = {name: sections[name] for name in (*order, *(each for each in sections if each not in order))}
+        self._name_of = name_of
 
     def __getitem__(self, name: str) -> Operation:
-        return _operation(self._sections[name])
+        if name in self._sections:
+            return _operation(self._sections[name])
+        feature = registry.with_word(name)
+        for each in (feature,) if feature is not None else registry.by_others():
+            if (found := self._added(each).get(name)) is not None:
+                return found
+        raise KeyError(name)
 
     def __iter__(self) -> Iterator[str]:
-        return iter(self._sections)
+        names = [*self._sections]
+        for feature in registry.features():
+            for name, operation in self._added(feature).items():
+                names.insert(names.index(operation.after) + 1 if operation.after in names else len(names), name)
+        return iter(names)
 
     def __len__(self) -> int:
-        return len(self._sections)
+        return sum(1 for _ in self)
 
-    def parts(self, group: str) -> Declared:
+    def __contains__(self, name: object) -> bool:
+        """Whether there is such an operation; a feature of the wheel is not imported for that."""
+        if name in self._sections or any(name in self._added(each) for each in registry.by_others()):
+            return True
+        return name in registry.words()
+
+    def _added(self, feature: Feature) -> dict[str, Operation]:
+        operations = (each for each in feature.adds if isinstance(each, Operation))
+        return {name: each for each in operations if (name := self._name_of(each))}
+
+    def parts(self, group: str) -> Parts:
         """The commands of a group by their last word; of "" all first words."""
-        sections = self._sections.items()
-        return Declared({name.rpartition(" ")[2]: text for name, text in sections if name.rpartition(" ")[0] == group})
+        return Parts(self, group)
+
+
+class Parts(Mapping[str, Operation]):
+    """The commands of a group, by their last words."""
+
+    def __init__(self, every: Declared, group: str) -> None:
+        self._every, self._group = every, group
+
+    def __getitem__(self, word: str) -> Operation:
+        return self._every[f"{self._group} {word}".strip()]
+
+    def __iter__(self) -> Iterator[str]:
+        heads = (name.rpartition(" ") for name in self._every)
+        return (word for group, _, word in heads if group == self._group)
+
+    def __len__(self) -> int:
+        return sum(1 for _ in self)
+
+    def __contains__(self, word: object) -> bool:
+        return isinstance(word, str) and word.split() == [word] and f"{self._group} {word}".strip() in self._every
 
 
 @cache
@@ -150,10 +199,43 @@ def _declared() -> Iterator[tuple[str, str, str]]:
 
 
 _FOUND = [*_declared()]
-VERBS = Declared({verb: text for verb, _, text in _FOUND if verb}, " ".join(VERB_GROUPS.values()).split())
+VERBS = Declared(
+    {verb: text for verb, _, text in _FOUND if verb}, " ".join(VERB_GROUPS.values()).split(), lambda each: each.name
+)
 """By name, in the order of `/help`."""
-COMMANDS = Declared({command: text for _, command, text in _FOUND if command}, COMMAND_ORDER.split())
+COMMANDS = Declared(
+    {command: text for _, command, text in _FOUND if command}, COMMAND_ORDER.split(), lambda each: each.command
+)
 """By their words, in the order of `--help`; the parts of a group after it."""
+
+
+def groups() -> dict[str, list[str]]:
+    """The verbs by the titles of `/help`, those of features among them."""
+    found = {title: names.split() for title, names in VERB_GROUPS.items()}
+    for name in VERBS:
+        if name not in chain.from_iterable(found.values()):
+            operation = VERBS[name]
+            names = found.setdefault(operation.group or BY_OTHERS, [])
+            names.insert(names.index(operation.after) + 1 if operation.after in names else len(names), name)
+    return found
+
+
+def load_others(own: bool = True) -> list[str]:
+    """Load the features by others; return a warning for each that cannot be, or whose verb or command is taken."""
+    known = {feature.name for feature in registry.by_others()}
+    warnings = registry.load_others(own)
+    taken = {*VERBS._sections, *COMMANDS._sections, *registry.words()}
+    for feature in registry.by_others():
+        adds = [each for each in feature.adds if isinstance(each, Operation)]
+        words = [word for each in adds for word in (each.name, each.command) if word]
+        if feature.name in known:
+            taken.update(words)
+        elif wrong := next((word for word in words if word in taken or not _WORD.fullmatch(word)), ""):
+            why = f"{wrong} is taken" if wrong in taken else f"{wrong} is no name of a verb or a command"
+            warnings.append(registry.refuse(feature.name, why))
+        else:
+            taken.update(words)
+    return warnings
 
 
 def find(name: str) -> Operation:

@@ -19,7 +19,7 @@ from multidrop.shell.log.writer import SessionLog
 from multidrop.shell.motions import OUTCOME
 from multidrop.shell.operations.conditions import ON_SCREEN
 from multidrop.shell.operations.operation import Operation
-from multidrop.shell.operations.table import SCRIPT_VERBS, VERB_GROUPS, VERBS
+from multidrop.shell.operations.table import SCRIPT_VERBS, VERBS, groups
 from multidrop.shell.operations.usage import split
 from multidrop.shell.quitting import GOES_ON
 from multidrop.shell.roles import EVERYTHING, TIMES, Filter, Transcripts
@@ -267,9 +267,9 @@ def explained(word: str, language: Language | None, product: str = "") -> list[s
 def overview() -> list[str]:
     """All verbs in their groups, a line each; a long usage has a line of its own."""
     lines: list[str] = []
-    for title, names in VERB_GROUPS.items():
+    for title, names in groups().items():
         lines += ["", f"{title}:"] if lines else [f"{title}:"]
-        for each in map(VERBS.__getitem__, names.split()):
+        for each in map(VERBS.__getitem__, names):
             if len(each.usage) > WIDTH:
                 lines.append(each.usage)
             mark = "[screen] " * (each.fits in ON_SCREEN)

@@ -19,7 +19,8 @@ ROOMS = {
     "shell": ("shell/**/*.py",),
     "macros": ("macros/**/*.py",),
     "base": ("base/**/*.py",),
-    "multidrop": ("multidrop/*.py", "multidrop/commands/**/*.py", "multidrop/api/**/*.py", "multidrop/lsp/**/*.py"),
+    "features": ("features/**/*.py",),
+    "multidrop": ("multidrop/*.py", "multidrop/commands/**/*.py", "multidrop/api/**/*.py"),
 }
 """The files of each room. `families`: the host's side of each language; a manual is facts, which tests compare."""
 

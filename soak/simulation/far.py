@@ -12,14 +12,14 @@ from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any
 
 from multidrop.base.errors import TransportLost
+from multidrop.features.sharing.server import SharedPort
+from multidrop.features.sharing.stop_bytes import stop_bytes
 from multidrop.shell.connect.opening import open_port
 from multidrop.shell.connect.urls import parse
-from multidrop.shell.sharing.server import SharedPort
-from multidrop.shell.sharing.stop_bytes import stop_bytes
 from multidrop.transports import relay, serial_port
 
 if TYPE_CHECKING:
-    from multidrop.shell.sharing.writer_turns import Say
+    from multidrop.features.sharing.writer_turns import Say
     from multidrop.transports.ssh import FarPort
     from soak.simulation.kernel import Kernel
     from soak.simulation.process import Process

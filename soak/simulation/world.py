@@ -18,12 +18,12 @@ from pathlib import Path
 from random import Random
 from typing import TYPE_CHECKING, Any
 
+from multidrop.features.sharing.server import SharedPort
+from multidrop.features.sharing.writer_turns import Say
 from multidrop.shell.automation import settled
 from multidrop.shell.configuration import Settings, parse
 from multidrop.shell.log import files, writer
 from multidrop.shell.session import Session
-from multidrop.shell.sharing.server import SharedPort
-from multidrop.shell.sharing.writer_turns import Say
 from multidrop.simulator import cells, wire
 from multidrop.simulator.cell.spec import Faults
 from multidrop.simulator.floor import Floor

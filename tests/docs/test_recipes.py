@@ -12,10 +12,10 @@ from typing import Any
 import pytest
 
 from multidrop.dialects.values import Conditions
+from multidrop.features.publishing import feed, registry
+from multidrop.features.publishing.feed import Topics
+from multidrop.features.publishing.registry import error_of
 from multidrop.shell.log.files import Entry
-from multidrop.shell.publishing import feed, registry
-from multidrop.shell.publishing.feed import Topics
-from multidrop.shell.publishing.registry import error_of
 from tests.support.paths import ROOT
 
 FOLDER = ROOT / "docs" / "recipes"

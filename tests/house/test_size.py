@@ -8,7 +8,7 @@ from tests.support.paths import ROOT
 
 pytestmark = pytest.mark.slow
 
-ROOMS = ("multidrop", "tui", "shell", "macros", "drives", "simulator", "dialects", "transports", "base")
+ROOMS = ("multidrop", "tui", "shell", "macros", "drives", "simulator", "dialects", "transports", "base", "features")
 MOST = 40
 
 

@@ -1,6 +1,5 @@
 """The command line from outside, and the package: usage, help, exit codes that need no drive, public names."""
 
-import importlib
 import subprocess
 import sys
 import tomllib
@@ -15,7 +14,7 @@ from tests.support.paths import ROOT
 from tests.support.until import PATIENCE
 
 COMMANDS = ["demo", "tui", "shell", "send", "run", "sim", "program", "macro", "plot", "ports", "report", "completion"]
-RUN = [each.run for each in table.COMMANDS.values() if each.run]
+RUN = [each for each in table.COMMANDS.values() if each.run]
 
 
 @pytest.mark.process
@@ -77,8 +76,7 @@ def test_help_is_there_for_every_command_with_examples(multidrop, command):
 
 @pytest.mark.parametrize("run", [*RUN, cli.build().get_default("run_by")])
 def test_the_table_of_commands_names_functions(run):
-    file, _, function = run.partition(".")
-    assert callable(getattr(importlib.import_module(f"multidrop.commands.{file}"), function))
+    assert callable(run.command_work)
 
 
 def test_the_help_names_each_personality_that_runs_programs(multidrop):
@@ -135,11 +133,11 @@ def test_what_is_not_public_is_an_attribute_error():
 def test_the_version_says_which_extras_are_installed(monkeypatch):
     with open(ROOT / "pyproject.toml", "rb") as file:
         project = tomllib.load(file)["project"]
-    assert set(cli.EXTRAS) == set(project["optional-dependencies"])
-    monkeypatch.setattr(cli, "EXTRAS", {"here": "json", "absent": "no_such_module"})
+    assert set(cli.extras()) == set(project["optional-dependencies"])
+    monkeypatch.setattr(cli, "extras", lambda: {"here": "json", "absent": "no_such_module"})
     python = ".".join(map(str, sys.version_info[:3]))
     assert cli.version() == f"multidrop {multidrop.__version__}, Python {python}, extras: here"
-    monkeypatch.setattr(cli, "EXTRAS", {})
+    monkeypatch.setattr(cli, "extras", dict)
     assert cli.version().endswith("extras: none")
 
 

@@ -9,6 +9,7 @@ import pytest
 
 from multidrop import cli
 from multidrop.commands import machine
+from multidrop.shell.operations.table import COMMANDS
 
 
 class Terminal(io.StringIO):
@@ -29,7 +30,7 @@ def run(monkeypatch, output="", yes=False, typed=None):
     printed = Terminal() if typed is not None else io.StringIO()
     monkeypatch.setattr(sys, "stdin", Terminal(typed) if typed is not None else io.StringIO())
     monkeypatch.setattr(sys, "stdout", printed)
-    code = cli.run(argparse.Namespace(run_by="machine.report", output=output, yes=yes))
+    code = cli.run(argparse.Namespace(run_by=COMMANDS["report"], output=output, yes=yes))
     return code, printed.getvalue()
 
 

@@ -8,9 +8,9 @@ from hypothesis import strategies as st
 
 from multidrop.__main__ import main
 from multidrop.base.errors import Diagnostic
+from multidrop.features.publishing.broker import parse_target as broker
 from multidrop.shell.connect.urls import parse
 from multidrop.shell.plots.request import parse_target as plot_target
-from multidrop.shell.publishing.broker import parse_target as broker
 from multidrop.shell.secrets import HIDDEN, toml_without_secrets, without_secrets
 
 

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from tests.shell.publishing.test_publish_feed import published
 
 from multidrop.api.telemetry import AsyncTelemetry
 from multidrop.base.errors import DriveError
@@ -20,7 +21,6 @@ from multidrop.shell.roles import Series
 from multidrop.shell.waits import standings
 from multidrop.simulator import cells
 from multidrop.tui.figures import NATIVE, figures_of
-from tests.shell.publishing.test_publish_feed import published
 from tests.support.cases import for_each
 from tests.support.cell_session import ETHERNET, CellSession, bus, drive, party, pmx
 

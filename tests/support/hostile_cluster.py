@@ -9,7 +9,7 @@ from typing import Any
 from distributed import LocalCluster
 from distributed.protocol import ToPickle
 
-from multidrop.shell.sweeps import trial
+from multidrop.features.sweeps import trial
 
 
 class Hostile:

@@ -7,7 +7,7 @@ import json
 from collections.abc import Callable
 from typing import Any
 
-from multidrop.shell.publishing.broker import Message
+from multidrop.features.publishing.broker import Message
 from multidrop.transports import Unreachable
 
 

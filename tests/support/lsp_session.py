@@ -14,7 +14,7 @@ from pygls.io_ import run_async
 from pytest_lsp import client_capabilities
 from pytest_lsp.client import LanguageClient, make_test_lsp_client
 
-from multidrop.lsp.server import Server
+from multidrop.features.lsp.server import Server
 
 _VERSIONS = itertools.count()
 

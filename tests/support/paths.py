@@ -7,7 +7,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
 SUPPORT = ROOT / "tests" / "support"
-ROOMS = ("multidrop", "tui", "shell", "macros", "drives", "simulator", "dialects", "transports", "base")
+ROOMS = ("multidrop", "tui", "shell", "macros", "drives", "simulator", "dialects", "transports", "base", "features")
 FACTS = ROOT.parent / "shared" / "facts"
 
 

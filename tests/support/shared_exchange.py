@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from multidrop.shell.sharing.stop_bytes import stop_bytes
-from multidrop.shell.sharing.writer_turns import Action, Close, Exchange, Purge, Say, Send, Set, Stop, Write
+from multidrop.features.sharing.stop_bytes import stop_bytes
+from multidrop.features.sharing.writer_turns import Action, Close, Exchange, Purge, Say, Send, Set, Stop, Write
 from multidrop.transports import telnet
 from multidrop.transports.telnet import OPTION
 

@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING
 
 from multidrop.dialects.tmcl.host import codec
 from multidrop.dialects.tmcl.manual import commands
-from multidrop.shell.sharing.writer_turns import SILENT
+from multidrop.features.sharing.writer_turns import SILENT
 from multidrop.simulator.lexium.ports.replies import checksum
 
 if TYPE_CHECKING:
-    from multidrop.shell.sharing.server import SharedPort
+    from multidrop.features.sharing.server import SharedPort
     from soak.simulation.places import Place
     from soak.simulation.world import World
 

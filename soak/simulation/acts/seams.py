@@ -8,9 +8,9 @@ from __future__ import annotations
 
 from typing import Any
 
+import multidrop.features.publishing.feed
 import multidrop.shell.plots.plot
 import multidrop.shell.prompt.terminal_input
-import multidrop.shell.publishing.feed
 import multidrop.shell.scripts.executor
 import multidrop.shell.snapshots
 import multidrop.shell.twins.pair

@@ -1,0 +1,259 @@
+"""Every feature: the wheel's, those that other packages bring, and a person's own files. It imports none of them.
+
+The wheel's are in the table below: the words that each answers to (verbs, commands, schemes), so that one word imports
+one feature, and the word of a feature that was deleted is explained. Packages name theirs in the entry points
+`multidrop.features`; their names are kept until the environment changes, because reading them takes 40 ms. A person's
+own features are the files in the folder `features` of the configuration.
+
+A feature by others is imported when a session opens, or for a word that nothing else explains. One that cannot be
+loaded is a warning, and the rest works.
+"""
+
+from __future__ import annotations
+
+import importlib
+import importlib.util
+import os
+import sys
+from collections.abc import Iterator
+from contextlib import suppress
+from functools import cache
+from pathlib import Path
+from types import TracebackType
+from typing import Any, NamedTuple, TypeVar
+
+from multidrop.base.errors import Diagnostic
+from multidrop.base.feature import Feature
+from multidrop.base.isolation import isolated
+from multidrop.base.on_demand import importing
+from multidrop.base.places import config_folder, state_folder
+
+T = TypeVar("T")
+GROUP = "multidrop.features"
+"""The entry points of features, and the package of the wheel's."""
+RECORD = "FEATURE"
+"""The name of the record in a module."""
+WHEEL = "multidrop"
+KEPT = "features.json"
+
+
+class Entry(NamedTuple):
+    """A feature that may be loaded. `place`: `MODULE:ATTRIBUTE`, or the path of a person's own file."""
+
+    name: str
+    source: str
+    """`multidrop`, another distribution, or the path of a file."""
+    version: str
+    place: str
+
+
+class Failed(NamedTuple):
+    """A feature that cannot be loaded, and why."""
+
+    entry: Entry
+    why: str
+
+    def __str__(self) -> str:
+        return f"the feature {self.entry.name} ({self.entry.source}) cannot be loaded: {self.why}"
+
+
+IN_WHEEL: dict[str, tuple[str, ...]] = {
+    "lsp": ("lsp",),
+    "publishing": ("publish", "plant"),
+    "sharing": ("share",),
+    "sweeps": ("program sweep",),
+    "twin_fit": ("twin", "twin fit"),
+}
+"""The features of the wheel, and the words that each answers to: `/twin`, `program sweep`, `usb:`."""
+_failed: dict[str, Failed] = {}
+_others: dict[str, tuple[Entry, Feature]] = {}
+"""The features by others that are loaded, by their places."""
+
+
+class _Loading(isolated):
+    """The import of what others wrote, which may raise anything: an exit, too, ends only the import."""
+
+    def __exit__(
+        self, kind: type[BaseException] | None, failure: BaseException | None, _: TracebackType | None
+    ) -> bool:
+        if not isinstance(failure, Exception | SystemExit):
+            return False
+        self.tell(str(failure) if isinstance(failure, Diagnostic) else f"{type(failure).__name__}: {failure}")
+        return True
+
+
+# The wheel's
+
+
+def _wheel(name: str) -> Feature | None:
+    """A feature of the wheel; None where its folder was deleted. Raises what its module raises otherwise."""
+    module = f"{GROUP}.{name}"
+    try:
+        with importing():
+            found: Feature = getattr(importlib.import_module(module), RECORD)
+    except ModuleNotFoundError as missing:
+        if missing.name not in (module, GROUP):
+            raise
+        return None
+    return found
+
+
+wheel = cache(_wheel)
+
+
+def with_word(word: str) -> Feature | None:
+    """The feature that answers to a word; None: no feature of the wheel does. Raises Diagnostic where it is gone."""
+    for name, words in IN_WHEEL.items():
+        if word in words:
+            found = wheel(name)
+            if found is None:
+                raise Diagnostic(f"the feature {name} is not there", word, "install multidrop again, whole")
+            return found
+    return None
+
+
+def words() -> tuple[str, ...]:
+    """The words of the wheel's features, whether these are there or not."""
+    return tuple(word for each in IN_WHEEL.values() for word in each)
+
+
+# By others
+
+
+def entries(own: bool = True) -> list[Entry]:
+    """The features by others: those of packages by their names, then, with `own`, a person's files."""
+    return [*_of_packages(), *(_own() if own else ())]
+
+
+def _of_packages() -> Iterator[Entry]:
+    from multidrop.base.store import Store, digest
+
+    store, environment = Store(state_folder()), digest(_environment(), 32)
+    kept = store.find(KEPT, _parse_kept)
+    if kept is None or kept[0] != environment:
+        kept = environment, sorted(_read_entry_points())
+        with suppress(OSError):
+            store.write(KEPT, {"environment": environment, "entries": kept[1]}, synced=False)
+    yield from kept[1]
+
+
+def _parse_kept(found: Any) -> tuple[str, list[Entry]]:
+    return str(found["environment"]), [Entry(*map(str, row)) for row in found["entries"]]
+
+
+def _read_entry_points() -> Iterator[Entry]:
+    from importlib.metadata import entry_points
+
+    for each in entry_points(group=GROUP):
+        source, version = (each.dist.name, each.dist.version) if each.dist is not None else ("?", "")
+        yield Entry(each.name, source, version, each.value)
+
+
+def _environment() -> str:
+    """What changes as a distribution comes or goes: the folders of modules, and when each was changed."""
+    found = [sys.version]
+    for folder in sys.path[1:]:  # the first is that of the script
+        with suppress(OSError):
+            found.append(f"{folder} {os.stat(folder).st_mtime_ns}")
+    return " ".join(found)
+
+
+def _own() -> Iterator[Entry]:
+    with suppress(OSError):
+        for path in sorted((config_folder() / "features").glob("*.py")):
+            yield Entry(path.stem, str(path), "", str(path))
+
+
+def load_others(own: bool = True) -> list[str]:
+    """Load the features by others that are not loaded yet; return a warning for each that cannot be."""
+    warnings: list[str] = []
+    for entry in entries(own):
+        if entry.place not in _others and entry.place not in _failed:
+            why: list[str] = []
+            with _Loading(entry.name, why):
+                _others[entry.place] = entry, _loaded(entry)
+            if why:
+                _failed[entry.place] = failed = Failed(entry, why[0])
+                warnings.append(str(failed))
+    return warnings
+
+
+def refuse(name: str, why: str) -> str:
+    """Take a feature by others out again, for what a room finds wrong in what it adds; return the warning."""
+    entry = next(entry for entry, feature in _others.values() if feature.name == name)
+    del _others[entry.place]
+    _failed[entry.place] = failed = Failed(entry, why)
+    return str(failed)
+
+
+def _loaded(entry: Entry) -> Feature:
+    """Import a feature by others. Raises anything."""
+    if entry.name in IN_WHEEL or entry.name in (known.name for known, _ in _others.values()):
+        raise Diagnostic("another feature has this name")
+    found = _of_file(Path(entry.place)) if entry.place == entry.source else _of_place(entry.place)
+    if not isinstance(found, Feature):
+        raise TypeError(f"{RECORD} is no multidrop.base.feature.Feature")
+    if found.name != entry.name:
+        raise Diagnostic(f"its record has the name {found.name}")
+    return found
+
+
+def _of_place(place: str) -> Any:
+    module, _, attribute = place.partition(":")
+    return getattr(importlib.import_module(module), attribute or RECORD)
+
+
+def _of_file(path: Path) -> Any:
+    from multidrop.base.file_owners import other_writer
+
+    if writer := other_writer(path):
+        raise Diagnostic(f"can be changed by {writer}, so it is not used")
+    spec = importlib.util.spec_from_file_location(f"multidrop_own_{path.stem}", path)
+    if spec is None or spec.loader is None:
+        raise ImportError("it is no module")
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[spec.name] = module
+    spec.loader.exec_module(module)
+    return getattr(module, RECORD)
+
+
+# What they add
+
+
+def by_others() -> list[Feature]:
+    """The features by others that are loaded."""
+    return [feature for _, feature in _others.values()]
+
+
+def wheels() -> Iterator[Feature]:
+    """The features of the wheel that are there."""
+    return filter(None, map(wheel, IN_WHEEL))
+
+
+def features() -> Iterator[Feature]:
+    """The features that are there: all of the wheel, and those by others that are loaded."""
+    yield from wheels()
+    yield from by_others()
+
+
+def added(kind: type[T]) -> Iterator[T]:
+    """What the features add of one class."""
+    for feature in features():
+        yield from (each for each in feature.adds if isinstance(each, kind))
+
+
+def states(version: str, own: bool = True) -> Iterator[tuple[Entry, str, str]]:
+    """Every feature with its meaning and its state, both in words. Loads those by others. `version`: the wheel's."""
+    load_others(own)
+    for name in IN_WHEEL:
+        yield Entry(name, WHEEL, version, ""), *_described(wheel(name), "not there")
+    for entry in entries(own):
+        _, found = _others.get(entry.place, (entry, None))
+        yield entry, *_described(found, f"cannot be loaded: {_failed[entry.place].why}" if found is None else "")
+
+
+def _described(feature: Feature | None, otherwise: str) -> tuple[str, str]:
+    if feature is None:
+        return "", otherwise
+    missing = feature.missing()
+    return feature.meaning, f"needs the extra {', '.join(missing)}" if missing else "ready"

@@ -1,0 +1,95 @@
+"""Samples, states, errors and transcripts of drives, for an existing MQTT broker, which commands no drive."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+
+from multidrop.base.feature import Feature
+from multidrop.shell.operations.operation import Operation
+
+
+def _publish(chosen: argparse.Namespace) -> int:
+    from multidrop.features.publishing import command
+
+    return command.run(
+        chosen.urls,
+        to=chosen.to,
+        rate=chosen.rate,
+        home_assistant=chosen.home_assistant,
+        reconnect=not chosen.no_reconnect,
+    )
+
+
+def _plant(chosen: argparse.Namespace) -> int:
+    from multidrop.features.publishing import watch
+
+    if chosen.json or not all(each.isatty() for each in (sys.stdin, sys.stdout, sys.stderr)):
+        return watch.run(chosen.url, as_json=chosen.json)
+    from multidrop.features.publishing.screen import run
+
+    return run(chosen.url)
+
+
+FEATURE = Feature(
+    "publishing",
+    "values of all drives for MQTT, Prometheus and OPC UA, and a page of what others publish",
+    adds=(
+        Operation(
+            command="publish",
+            meaning=(
+                "publish samples, states and errors of all drives until interrupted: to an MQTT broker, for "
+                "Prometheus or OPC UA"
+            ),
+            run=_publish,
+            examples=(
+                "publish press --to mqtt://broker/plant/hall-2",
+                "publish press eth --to mqtts://shop-7@broker/plant/hall-2 --rate 5",
+                "publish press --to mqtt://broker/plant/hall-2 --to prometheus://:9464",
+            ),
+            arguments={
+                "URL ...": "what to open",
+                "--to TARGET ...": {
+                    "help": (
+                        "mqtt://[USER@]BROKER[:PORT]/PREFIX: a broker, and the topic above all others (mqtts:// is "
+                        "encrypted); prometheus://[HOST]:PORT or opcua://[HOST]:PORT: serve this machine, or at "
+                        "HOST; may be repeated"
+                    ),
+                    "required": True,
+                },
+                "--home-assistant": "describe the values for the discovery of Home Assistant, at the broker",
+                "--rate N": {
+                    "help": "samples a second of each drive, at most (default: 2)",
+                    "default": "2",
+                },
+                "--no-reconnect": "give up a lost connection, and do not try again",
+            },
+            after="poll",
+        ),
+        Operation(
+            command="plant",
+            meaning=(
+                "show every drive that is published under a topic of an MQTT broker, the worst first; commands nothing"
+            ),
+            run=_plant,
+            examples=(
+                "plant mqtt://broker/plant",
+                "plant mqtt://broker/plant --json",
+            ),
+            own_urls=(
+                "A BROKER-URL is mqtt://BROKER/PREFIX or mqtts://BROKER/PREFIX (encrypted), with USER@ before the "
+                "broker and :PORT after it where they are needed. The password and the certificates are in the "
+                "configuration ([mqtt])."
+            ),
+            arguments={
+                "url=BROKER-URL": (
+                    "mqtt://[USER@]BROKER[:PORT]/PREFIX: a broker, and the topic above all publishers; mqtts:// is "
+                    "encrypted"
+                ),
+                "--json": "print one JSON object a line",
+            },
+            after="publish",
+        ),
+    ),
+    extras={"mqtt": "paho", "opcua": "asyncua", "prometheus": "prometheus_client"},
+)

@@ -1,1 +1,0 @@
-"""The language server of `multidrop lsp`: program files in editors that speak the Language Server Protocol."""

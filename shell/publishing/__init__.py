@@ -1,1 +1,0 @@
-"""Samples, states, errors and transcripts of drives, for an existing MQTT broker, which commands no drive."""

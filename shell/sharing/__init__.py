@@ -1,1 +1,0 @@
-"""`multidrop share`: a port for several clients, of which one writes."""

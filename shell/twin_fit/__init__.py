@@ -1,1 +1,0 @@
-"""Load, friction, inertia and current margin of axes, found in a session log."""
