@@ -63,6 +63,7 @@ IN_WHEEL: dict[str, tuple[str, ...]] = {
     "sharing": ("share",),
     "sweeps": ("program sweep",),
     "twin_fit": ("twin", "twin fit"),
+    "twins": ("/twin",),
 }
 """The features of the wheel, and the words that each answers to: `/twin`, `program sweep`, `usb:`."""
 _failed: dict[str, Failed] = {}

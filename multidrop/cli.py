@@ -75,6 +75,7 @@ class Parser(argparse.ArgumentParser):
         """Add the arguments of the command, or its parts. One with both is a part if the first word names one."""
         if self.operation is None or self.complete:
             return
+        from multidrop.shell.hooks import with_options
         from multidrop.shell.operations.operation import add_arguments
         from multidrop.shell.operations.table import COMMANDS
 
@@ -82,7 +83,7 @@ class Parser(argparse.ArgumentParser):
         own = COMMANDS.parts(self.operation.command)
         named = given[:1] and given[0] in own
         if self.operation.run and not named:
-            add_arguments(self, self.operation.arguments)
+            add_arguments(self, with_options(self.operation.command, self.operation.arguments))
             _add_no_config(self)
             self.set_defaults(run_by=self.operation, command=self.operation.command)
         if own and (named or not self.operation.run):

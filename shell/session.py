@@ -21,7 +21,7 @@ from multidrop.base.on_demand import imported
 from multidrop.drives.bus import Bus
 from multidrop.drives.drive import Drive
 from multidrop.drives.events import Restarted
-from multidrop.shell import motions
+from multidrop.shell import hooks, motions
 from multidrop.shell.automation import AGREED, ENDING, Automations, only_ends
 from multidrop.shell.configuration import Settings
 from multidrop.shell.connect.opening import Opener, open_buses
@@ -44,7 +44,6 @@ from multidrop.shell.quitting import ENDING as QUITTING
 from multidrop.shell.quitting import EVEN_NOW, Unanswered
 from multidrop.shell.raw import RawLine, text_of
 from multidrop.shell.sending import sending
-from multidrop.shell.twins.twins import Twins
 from multidrop.shell.waits import in_motion
 from multidrop.shell.workspace import LATCHED, Workspace
 
@@ -82,11 +81,6 @@ def _forget_restarted(session: Session, event: SessionEvent) -> None:
             imported("multidrop.shell.program_listing:forget")(session, drive)
 
 
-def _apart(session: Session, drive: Drive, axis: str, steps: int) -> str:
-    """A distance of an axis in its unit, ` (0.5 mm)`; empty where it has no scale."""
-    return imported("multidrop.shell.setting_units:apart")(session.units, drive, axis, steps) if session.scaled else ""
-
-
 class Session(Workspace):
     """Everything that is open, and the path of a command. Needs a running event loop, and belongs to its thread."""
 
@@ -110,21 +104,16 @@ class Session(Workspace):
         (ADDR or BUS:ADDR) that the command line mentions, which are looked for where a URL states no drives.
         """
         super().__init__(settings or Settings(), reconnect)
-        self.automations, self.twins = Automations(self), Twins(self, partial(_apart, self))
+        self.automations = Automations(self)
         self.unanswered = Unanswered()
         self.path = LinePath(self)
         self.openings = Openings(self, opener or partial(open_buses, state=self.settings.state), lazy, raw, tried)
         self._background: dict[asyncio.Task[Any], None] = {}
         self.on_opened.append(lambda bus: self.units.opened(bus))
-        self.on_changed.append(self.twins.changed)
         self.subscribe(partial(_forget_restarted, self), Restarted)
+        hooks.begin(self)
 
     # Buses
-
-    def identified(self, bus: Bus) -> None:
-        """Note that the drives of a bus are found: its first one is selected there, and twins begin if wanted."""
-        super().identified(bus)
-        self.twins.identified(bus)
 
     async def open(self, url: str, name: str | None = None, *, raw: bool = False) -> list[Bus]:
         """Open a URL or saved connection and find its drives; `sim:` may open several buses. Moves nothing.
@@ -161,11 +150,6 @@ class Session(Workspace):
             self.log = None
         for bus in list(self.buses.values()):
             await self.forget(bus)
-
-    async def forget(self, bus: Bus) -> None:
-        """Close a bus and drop everything known of it, its twins too."""
-        self.twins.stop(bus)
-        await super().forget(bus)
 
     # The path of a command
 

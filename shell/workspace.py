@@ -13,7 +13,7 @@ import re
 from collections.abc import Awaitable, Callable
 from dataclasses import dataclass, field
 from functools import partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 from multidrop.base.errors import Diagnostic, NoAnswer
 from multidrop.base.isolation import isolated
@@ -42,6 +42,9 @@ if TYPE_CHECKING:
 
 LATCHED = "stopped; /resume lets macros and scripts run again"
 """The refusal of automation after a stop."""
+
+
+P = TypeVar("P")
 
 
 @dataclass(frozen=True, eq=False)
@@ -140,6 +143,14 @@ class Workspace(Channel):
         """Awaited with each bus whose drives were found, where an axis may have a scale."""
         self.on_changed: list[Callable[[Bus], None]] = []
         """Called with each bus that has changed, once that is published."""
+        self.on_identified: list[Callable[[Bus], None]] = []
+        """Called with each bus whose drives were found."""
+        self.on_forgotten: list[Callable[[Bus], None]] = []
+        """Called with each bus that is about to be closed."""
+        self.predicted: set[Bus] = set()
+        """The buses of which a feature predicts drives: `shell.events.Predicted` comes beside their samples."""
+        self._parts: dict[type, object] = {}
+        """What features keep for as long as the session lives, by class."""
         self.plots: list[RunningPlot] = []
         self.plotted: tuple[Series, ...] = ()
         """The series that the screen plots; empty: the selected drive."""
@@ -157,6 +168,16 @@ class Workspace(Channel):
         """The buses that are tried again when they are lost."""
         self._closing: set[asyncio.Future[None]] = set()
 
+    def keep(self, part: object) -> None:
+        """Keep an object of a feature for as long as the session lives; `part` finds it by its class."""
+        self._parts[type(part)] = part
+
+    def part(self, kind: type[P]) -> P:
+        """What a feature keeps. Raises LookupError where it keeps none."""
+        found = self._parts[kind]
+        assert isinstance(found, kind)
+        return found
+
     # Buses
 
     def adopt(self, opened: Opened, place: int, connection: Connection | None = None, in_cell: str = "") -> OpenBus:
@@ -173,6 +194,8 @@ class Workspace(Channel):
 
     async def forget(self, bus: Bus) -> None:
         """Close a bus and drop everything known of it. A stop that ends the caller does not leave the port open."""
+        for forgotten in self.on_forgotten:
+            forgotten(bus)
         record = self._open.get(bus)
         for observer in record.debuggers.values() if record is not None else ():
             observer.close()
@@ -300,6 +323,8 @@ class Workspace(Channel):
         if record := self._open.get(bus):
             record.selected = next(iter(bus.drives.values()), None)
         self.changed()
+        for found in self.on_identified:
+            found(bus)
 
     def drive(self, bus: str = "", address: str | None = None) -> Drive:
         """Find the drive at an address (or label) of a bus, known or not; by default the selected one."""

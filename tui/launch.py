@@ -17,6 +17,7 @@ from multidrop.base.on_demand import importing
 from multidrop.shell.automation import stop_key_trial
 from multidrop.shell.configuration import Settings
 from multidrop.shell.console import swallows
+from multidrop.shell.hooks import Prepare, nothing
 from multidrop.shell.session import Session
 from multidrop.shell.signals import SIGNALS, early_ends, in_loop
 from multidrop.tui.app import MultidropApp
@@ -26,11 +27,17 @@ SCREENS = "screens"
 """The folder of the sockets of shared screens, in the state folder."""
 
 
-def run(urls: Sequence[str], reconnect: bool = True, raw: bool = False, twin: bool = False, share: bool = False) -> int:
+def run(
+    urls: Sequence[str],
+    reconnect: bool = True,
+    raw: bool = False,
+    prepare: Prepare = nothing,
+    share: bool = False,
+) -> int:
     """Show the URLs, a tab for each bus; without URLs, show the start page. Return the exit code.
 
-    `reconnect`: lost buses are tried again. `raw`: the URLs are opened in raw mode. `twin`: each drive gets a twin.
-    `share`: others of this account may watch.
+    `reconnect`: lost buses are tried again. `raw`: the URLs are opened in raw mode. `prepare`: takes the
+    session before a URL is opened. `share`: others of this account may watch.
 
     Raises Diagnostic if there is no terminal, or if the configuration is wrong.
     """
@@ -41,7 +48,7 @@ def run(urls: Sequence[str], reconnect: bool = True, raw: bool = False, twin: bo
         raise Diagnostic("the screen needs a terminal", "tui", "multidrop shell reads lines from standard input")
     sys.setswitchinterval(SWITCH)
     with early_ends():
-        return asyncio.run(_run(urls, load(lenient=True), reconnect, raw, twin, share))
+        return asyncio.run(_run(urls, load(lenient=True), reconnect, raw, prepare, share))
 
 
 def join(where: str) -> int:
@@ -77,14 +84,16 @@ def join(where: str) -> int:
             connection.close(False)
 
 
-async def _run(urls: Sequence[str], settings: Settings, reconnect: bool, raw: bool, twin: bool, share: bool) -> int:
+async def _run(
+    urls: Sequence[str], settings: Settings, reconnect: bool, raw: bool, prepare: Prepare, share: bool
+) -> int:
     with importing():
         from multidrop.shell.log.writer import begin
         from multidrop.shell.prompt.collector import at_rest, collected_at_rest
         from multidrop.shell.session import Session
 
     session = Session(settings, reconnect=reconnect, raw=raw)
-    session.twins.wanted = twin
+    prepare(session)
     app: MultidropApp | None = None
     try:
         with collected_at_rest(partial(at_rest, session)):

@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING
 
 from multidrop.base.errors import Diagnostic
 from multidrop.base.on_demand import importing
+from multidrop.shell import hooks
+from multidrop.shell.hooks import Prepare
 
 if TYPE_CHECKING:
     from multidrop.dialects.family import Language
@@ -27,15 +29,13 @@ def shell(chosen: argparse.Namespace) -> int:
             agreed=chosen.yes,
             beyond=chosen.beyond,
             raw=chosen.raw,
-            twin=chosen.twin,
+            prepare=partial(hooks.prepare, chosen=chosen),
         )
     from multidrop.shell.batch import runner
     from multidrop.shell.prompt.terminal_input import run_stream
 
     async def lines(session: Session) -> None:
-        if chosen.twin:
-            for bus in list(session.buses.values()):
-                await session.twins.start(bus)
+        await hooks.opened(session, chosen)
         await run_stream(session, descriptor=sys.stdin.fileno())
 
     return runner.run(
@@ -115,21 +115,28 @@ def demo(chosen: argparse.Namespace) -> int:
 
 def tui(chosen: argparse.Namespace) -> int:
     if chosen.join is None:
-        return _screen(chosen.urls, not chosen.no_reconnect, chosen.raw, chosen.twin, chosen.share)
-    if chosen.urls or chosen.share or chosen.raw or chosen.twin:
+        prepare = partial(hooks.prepare, chosen=chosen)
+        return _screen(chosen.urls, not chosen.no_reconnect, chosen.raw, prepare, chosen.share)
+    if chosen.urls or chosen.share or chosen.raw:
         raise Diagnostic("a watcher opens nothing itself", "tui --join", "give --join alone, or with ssh://HOST")
     from multidrop.tui.launch import join
 
     return join(chosen.join)
 
 
-def _screen(urls: list[str], reconnect: bool = True, raw: bool = False, twin: bool = False, share: bool = False) -> int:
+def _screen(
+    urls: list[str],
+    reconnect: bool = True,
+    raw: bool = False,
+    prepare: Prepare = hooks.nothing,
+    share: bool = False,
+) -> int:
     if not (sys.stdin.isatty() and sys.stdout.isatty()):
         raise Diagnostic("the screen needs a terminal", hint="multidrop shell reads lines from anywhere")
     with importing():
         from multidrop.tui.launch import run
 
-    return run(urls, reconnect, raw, twin, share)
+    return run(urls, reconnect, raw, prepare, share)
 
 
 def help_(chosen: argparse.Namespace) -> int:

@@ -10,12 +10,12 @@ from datetime import datetime, timedelta
 from multidrop.dialects.family import Motion
 from multidrop.drives.drive import Drive
 from multidrop.drives.events import Sample
+from multidrop.shell.comparing.compared import Compared
+from multidrop.shell.comparing.differences import LIMIT, Verdict
 from multidrop.shell.events import Diverged
 from multidrop.shell.line_syntax import EVERYONE, join_target
 from multidrop.shell.log.decoding import Decoding, Measured, printed
 from multidrop.shell.log.steps import Exchange, Step
-from multidrop.shell.twins.comparing import LIMIT, Verdict
-from multidrop.shell.twins.pair import Compared
 from multidrop.simulator.family import Shadow
 
 LATE = 0.05

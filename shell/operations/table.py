@@ -25,7 +25,7 @@ from multidrop.shell.operations.operation import Operation
 VERB_GROUPS = {
     "Stop and end": "/stop /resume /quit /exit",
     "Lines and drives": "/open /close /use /drives /scan /status /units /referenced /rename /tab /keep",
-    "Settings and values": "/params /snapshot /plot /twin /register /coil /device",
+    "Settings and values": "/params /snapshot /plot /register /coil /device",
     "Programs of drives": "/check /download /upload /list /trace /step /continue /break /watch",
     "Macros": "/macros /macro /record /play /key",
     "Waits": "/wait /sleep",

@@ -173,7 +173,7 @@ def _value(workspace: Session, bus: str, address: str, word: str, text: str) -> 
     if not word:
         raise Diagnostic(f"no value in {text!r}", hint=FORMS)
     if word.lower() == DIFFERENCE:
-        if not workspace.twins.running(workspace.buses[bus]):
+        if workspace.buses[bus] not in workspace.predicted:
             raise Diagnostic(f"{drive.shown}: no twin runs that it could differ from", hint="/twin on begins one")
         return Series(bus, address, DIFFERENCE)
     return Series(bus, address, drive.family.values.check(drive.state, word))

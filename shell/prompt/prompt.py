@@ -41,6 +41,7 @@ from multidrop.shell.channel import Front
 from multidrop.shell.console import swallows
 from multidrop.shell.events import FAILURES, Progressed, SessionEvent, StateChanged
 from multidrop.shell.exit_codes import INTERRUPTED
+from multidrop.shell.hooks import Prepare, nothing
 from multidrop.shell.log.writer import begin as begin_log
 from multidrop.shell.prompt.collector import at_rest, collected_at_rest
 from multidrop.shell.prompt.keyboard import Keyboard, on_signals, terminal
@@ -72,12 +73,12 @@ def run(
     agreed: bool = False,
     beyond: bool = False,
     raw: bool = False,
-    twin: bool = False,
+    prepare: Prepare = nothing,
 ) -> int:
     """Open the URLs and prompt until the end; return the exit code.
 
     `reconnect`: lost buses are tried again. `agreed`: every question is answered with yes; `beyond`: those on travel,
-    too. `raw`: the URLs are opened in raw mode. `twin`: each drive gets a twin.
+    too. `raw`: the URLs are opened in raw mode. `prepare`: takes the session before a URL is opened.
     """
     try:
         found = configuration.load(lenient=True)
@@ -86,15 +87,22 @@ def run(
     write(sys.stderr, *map(str, found.problems))
     try:
         with early_ends():  # before the log has its thread
-            return asyncio.run(_run(partial(Session, found, reconnect=reconnect, raw=raw), urls, agreed, beyond, twin))
+            make = partial(_session, partial(Session, found, reconnect=reconnect, raw=raw), prepare)
+            return asyncio.run(_run(make, urls, agreed, beyond))
     except KeyboardInterrupt:
         return INTERRUPTED
 
 
-async def _run(make: Callable[[], Session], urls: Sequence[str], agreed: bool, beyond: bool, twin: bool) -> int:
+def _session(make: Callable[[], Session], prepare: Prepare) -> Session:
+    session = make()
+    prepare(session)
+    return session
+
+
+async def _run(make: Callable[[], Session], urls: Sequence[str], agreed: bool, beyond: bool) -> int:
     with nonblocking() as streams, ExitStack() as stack:
         session = make()
-        session.questions.agreed, session.questions.beyond, session.twins.wanted = agreed, beyond, twin
+        session.questions.agreed, session.questions.beyond = agreed, beyond
         session.subscribe(Printer(talkative=True).show)
         begin_log(session)
         stack.enter_context(collected_at_rest(partial(at_rest, session)))

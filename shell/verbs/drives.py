@@ -9,7 +9,6 @@ from typing import Any
 
 from multidrop.base.errors import Diagnostic, Inexpressible
 from multidrop.base.on_demand import imported
-from multidrop.base.text import whole
 from multidrop.dialects import Procedure
 from multidrop.dialects.families import FAMILIES, TABLE
 from multidrop.dialects.family import Registers
@@ -26,8 +25,6 @@ from multidrop.shell.verbs.call import Call
 
 FLAGS = ("--dry-run", "--save", "--communication", "--other-product", "--defaults")
 VALUES = {"--with": "a value", "--against": "a value"}
-MOST = 1_000_000_000
-"""The largest limit of twins, steps."""
 
 
 def _parsed(call: Call) -> tuple[str, list[str], dict[str, str], list[str]]:
@@ -238,41 +235,6 @@ async def snapshot(call: Call) -> None:
 
     (file,) = call.words()
     await snapshots.save(call.session, call.output_file(file), call.session.units.scales)
-
-
-async def twin(call: Call) -> None:
-    twins, workspace = call.session.twins, call.session
-    match call.split():
-        case []:
-            rows = list(twins.rows())
-            for row in rows:
-                workspace.output(row, columns=True)
-            workspace.output(f"limit at rest: {twins.limit} steps" if rows else "no twin runs; /twin on begins one")
-        case ["on"]:
-            bus = workspace.bus()
-            if not bus.drives:
-                raise Diagnostic(f"no drive has replied on {bus.name}", call.verb.name)
-            await twins.start(bus)
-        case ["on", *targets]:
-            drives = list(dict.fromkeys(call.drive(each) for each in targets))
-            for drive in drives:
-                bus = workspace.buses[drive.link.name]
-                if bus.drives.get(drive.address) is not drive:
-                    what = f"no drive {drive.address} on {bus.name}"
-                    raise Diagnostic(what, call.verb.name, f"valid: {', '.join(bus.drives)}")
-            for drive in drives:
-                await twins.start(workspace.buses[drive.link.name], [drive.address])
-        case ["off"]:
-            if not twins.off():
-                raise Diagnostic("no twin runs", call.verb.name)
-            workspace.notify("all twins have ended")
-        case ["limit", text]:
-            if (steps := whole(text, 1, MOST)) is None:
-                raise call.wrong(f"no limit {text!r}: steps from 1 to {MOST}")
-            twins.limit = steps
-            workspace.notify(f"twins: the limit at rest is {twins.limit} steps")
-        case _:
-            raise call.wrong()
 
 
 async def sim(call: Call) -> None:

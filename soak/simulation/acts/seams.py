@@ -9,11 +9,11 @@ from __future__ import annotations
 from typing import Any
 
 import multidrop.features.publishing.feed
+import multidrop.features.twins.pair
 import multidrop.shell.plots.plot
 import multidrop.shell.prompt.terminal_input
 import multidrop.shell.scripts.executor
 import multidrop.shell.snapshots
-import multidrop.shell.twins.pair
 import multidrop.shell.verbs.buses
 import multidrop.shell.verbs.call
 import multidrop.shell.verbs.drives

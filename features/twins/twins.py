@@ -7,16 +7,35 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 from multidrop.base.errors import Diagnostic, DriveError, Stopped
+from multidrop.shell.comparing.differences import LIMIT
 from multidrop.shell.events import FAILURES, Agreed, Diverged, OnBus, TwinEvent
-from multidrop.shell.twins.comparing import LIMIT
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
     from multidrop.drives.bus import Bus
     from multidrop.drives.drive import Drive
-    from multidrop.shell.twins.pair import BusTwins
+    from multidrop.features.twins.pair import BusTwins
+    from multidrop.shell.session import Session
     from multidrop.shell.workspace import Workspace
+
+
+def begin(session: Session) -> None:
+    """Let a session have twins: they begin where they are wanted, and end with their bus."""
+    twins = Twins(session, partial(_apart, session))
+    session.keep(twins)
+    session.on_changed.append(twins.changed)
+    session.on_identified.append(twins.identified)
+    session.on_forgotten.append(twins.stop)
+
+
+def _apart(session: Session, drive: Drive, axis: str, steps: int) -> str:
+    """A distance of an axis in its unit, ` (0.5 mm)`; empty where it has no scale."""
+    if not session.scaled:
+        return ""
+    from multidrop.shell.setting_units import apart
+
+    return apart(session.units, drive, axis, steps)
 
 
 class Twins:
@@ -46,9 +65,6 @@ class Twins:
         for each in self._buses.values():
             each.set_limit(steps)
 
-    def running(self, bus: Bus) -> bool:
-        return bus in self._buses and bool(self._buses[bus].besides)
-
     async def start(self, bus: Bus, addresses: Sequence[str] | None = None) -> None:
         """Read drives of a bus (None: all), and begin a twin beside each, in place of one that runs.
 
@@ -56,7 +72,7 @@ class Twins:
         are warnings. A stop, or the end of the twins, ends the reading.
         """
         drives = [bus.drives[each] for each in (list(bus.drives) if addresses is None else addresses)]
-        from multidrop.shell.twins.pair import BusTwins
+        from multidrop.features.twins.pair import BusTwins
 
         if bus not in self._buses:
             publish, lost = partial(self._publish, bus), partial(self._lost, bus)
@@ -102,13 +118,14 @@ class Twins:
 
     def _end(self, bus: Bus) -> None:
         if (twins := self._buses.pop(bus, None)) is not None:
+            self._workspace.predicted.discard(bus)
             twins.close()
 
     async def _start(self, twins: BusTwins, drive: Drive) -> tuple[str, ...]:
         """Read a drive, and run a twin beside it; return the gaps of the twin."""
+        from multidrop.features.twins.pair import Beside
+        from multidrop.features.twins.twin import make
         from multidrop.shell import snapshots
-        from multidrop.shell.twins.pair import Beside
-        from multidrop.shell.twins.twin import make
 
         name, bus = self._workspace.display_name(drive), twins.bus
         twins.expect(drive)
@@ -123,6 +140,7 @@ class Twins:
             begun = bus.now()
             twin, gaps = make(snapshot, begun, drive.family.registers is not None, len(bus.drives) == 1)
             twins.begin(Beside(drive, twin, begun))
+            self._workspace.predicted.add(bus)
         finally:
             twins.forgo(drive)
         self._workspace.notify(f"{name}: a twin runs beside it", bus=bus.name, outcome=True)

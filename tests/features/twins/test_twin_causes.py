@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from multidrop.shell.twins.comparing import LASTING, LIMIT, Comparison, Pair, Verdict, causes
+from multidrop.shell.comparing.differences import LASTING, LIMIT, Comparison, Pair, Verdict, causes
 
 STEP = 0.1
 Motion = Callable[[float], tuple[float, float]]

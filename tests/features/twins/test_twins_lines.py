@@ -10,6 +10,7 @@ import pytest
 
 from multidrop.base.errors import Diagnostic, DriveError, NoAnswer, Refused
 from multidrop.drives.events import Sent
+from multidrop.features.twins.twins import Twins
 from multidrop.shell.events import Diverged, Notified, OnBus, Predicted, TwinEnded
 from tests.support.cell_session import ETHERNET, CellSession, bus, party, pmx
 from tests.support.twin_cell import of, run
@@ -123,7 +124,7 @@ async def test_a_line_that_comes_back_is_read_again(tmp_path: Path) -> None:
         assert len(of(cell, TwinEnded)) == 1
         (said,) = [each for each in cell.events if isinstance(each, Notified) and "its twins end" in each.text]
         assert said.outcome and said.text.endswith("they begin again once it is back"), "the piped shell shows outcomes"
-        assert not cell.session.twins.running(cell.session.buses["press"])
+        assert not cell.session.part(Twins).running(cell.session.buses["press"])
         cell.device("press:a").execute("MR 400", cell.floor.now())
         cell.world("plug press")
         cell.events.clear()
@@ -145,7 +146,7 @@ async def test_a_drive_that_moves_gets_no_twin(tmp_path: Path) -> None:
         await run(cell, "SL 500")
         with pytest.raises(DriveError, match="a twin begins at rest"):
             await cell.session.run("/twin on")
-        assert list(cell.session.twins.rows()) == []
+        assert list(cell.session.part(Twins).rows()) == []
         cell.events.clear()
         await asyncio.sleep(1)
         assert cell.written("press") == b""
@@ -231,4 +232,4 @@ async def test_a_stop_while_a_drive_is_read_leaves_nothing_behind(tmp_path: Path
 async def test_a_closed_bus_has_no_twins(tmp_path: Path) -> None:
     async with CellSession(tmp_path, bus("press", party("a"))) as cell:
         await run(cell, "/twin on", "/close press")
-        assert len(of(cell, TwinEnded)) == 1 and list(cell.session.twins.rows()) == []
+        assert len(of(cell, TwinEnded)) == 1 and list(cell.session.part(Twins).rows()) == []

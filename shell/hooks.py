@@ -1,0 +1,91 @@
+"""What a feature adds to sessions and to the commands that open them. It is called by `Session` and by these commands.
+
+A feature's verbs and commands are `shell.operations.operation.Operation`s.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Awaitable, Callable, Iterator, Mapping
+from typing import Any, NamedTuple
+
+from multidrop.base import registry
+from multidrop.base.isolation import isolated
+
+Session = Any
+"""`shell.session.Session`, which knows this module."""
+Prepare = Callable[[Session], None]
+"""Takes a session before a URL is opened."""
+
+
+def nothing(session: Session) -> None:
+    """Prepare nothing."""
+
+
+class AtSession(NamedTuple):
+    """What is done as a session begins, before anything is open: subscribe to its events (`Session.subscribe`).
+
+    `Session.keep` keeps an object for as long as the session lives, and `Session.part` finds it.
+    """
+
+    begin: Callable[[Session], None]
+
+
+class Options(NamedTuple):
+    """Options of a command that is there already.
+
+    Both functions take the session and the parsed arguments: `prepare` before a URL is opened, `opened` once all are,
+    in a command that is not for a person.
+    """
+
+    command: str
+    arguments: Mapping[str, Any]
+    """As those of an Operation."""
+    excludes: str = ""
+    """The option of the command that these exclude."""
+    prepare: Callable[[Session, argparse.Namespace], None] = lambda session, chosen: None
+    opened: Callable[[Session, argparse.Namespace], Awaitable[None]] | None = None
+
+
+def begin(session: Session) -> None:
+    """Let every feature begin in a session; a defect of one ends neither the session nor the others."""
+    for feature in registry.features():
+        for each in feature.adds:
+            if isinstance(each, AtSession):
+                with isolated(f"the feature {feature.name}"):
+                    each.begin(session)
+
+
+def options(command: str) -> Iterator[Options]:
+    """The options that features add to a command."""
+    return (each for each in registry.added(Options) if each.command == command)
+
+
+def with_options(command: str, arguments: Mapping[str, Any]) -> dict[str, Any]:
+    """The arguments of a command, and those that features add."""
+    found = dict(arguments)
+    for each in options(command):
+        if each.excludes not in found:
+            found |= each.arguments
+            continue
+        group = {each.excludes: found[each.excludes], **each.arguments}
+        named = {f"[{' | '.join(group)}]": group}
+        found = {
+            name: about
+            for key, given in found.items()
+            for name, about in (named if key == each.excludes else {key: given}).items()
+        }
+    return found
+
+
+def prepare(session: Session, chosen: argparse.Namespace) -> None:
+    """Do what the options of features ask for before a URL is opened."""
+    for each in options(chosen.command):
+        each.prepare(session, chosen)
+
+
+async def opened(session: Session, chosen: argparse.Namespace) -> None:
+    """Do what the options of features ask for once all URLs are open. Raises what they raise."""
+    for each in options(chosen.command):
+        if each.opened is not None:
+            await each.opened(session, chosen)

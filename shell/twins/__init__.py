@@ -1,1 +1,0 @@
-"""Twins: simulated drives that run beside real ones, and every difference between the two."""
