@@ -58,6 +58,7 @@ class Failed(NamedTuple):
 
 
 IN_WHEEL: dict[str, tuple[str, ...]] = {
+    "log_analysis": ("log at", "log bisect", "log judge", "log replay"),
     "lsp": ("lsp",),
     "publishing": ("publish", "plant"),
     "sharing": ("share",),

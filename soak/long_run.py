@@ -21,7 +21,7 @@ from typing import Any
 from multidrop.drives.events import Sample
 from multidrop.macros import Macro
 from multidrop.macros.model import Step
-from multidrop.shell.batch.replay import VirtualLoop
+from multidrop.shell.batch.virtual_loop import VirtualLoop
 from multidrop.shell.configuration import Settings
 from multidrop.shell.events import Failed, OnBus
 from multidrop.shell.scripts.executor import play

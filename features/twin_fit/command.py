@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from multidrop.features.twin_fit.work import fit
 from multidrop.shell.batch import runner
-from multidrop.shell.batch.replay import VirtualLoop
+from multidrop.shell.batch.virtual_loop import VirtualLoop
 from multidrop.shell.log import steps
 from multidrop.shell.streams import stdout
 

@@ -26,13 +26,12 @@ from multidrop.base.files import utf8_of, why
 from multidrop.base.text import counted, whole
 from multidrop.drives.drive import Drive
 from multidrop.features.twin_fit.estimate import FEWEST, MARGIN, UNITS, Estimate, Evidence, Point, estimates
-from multidrop.shell.batch.replay import targets
 from multidrop.shell.line_syntax import EVERYONE, join_target
 from multidrop.shell.log import files, steps
 from multidrop.shell.log.decoding import Decoding, printed
 from multidrop.shell.log.files import BEGIN
 from multidrop.shell.log.steps import Exchange, Step
-from multidrop.shell.log.twin_comparison import Place
+from multidrop.shell.log.targets import Place, targets
 from multidrop.shell.streams.stdout import write
 from multidrop.simulator import cells
 from multidrop.simulator.cell.spec import Cell, DriveSpec, Faults

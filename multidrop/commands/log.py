@@ -1,4 +1,4 @@
-r"""`multidrop log show|follow|grep|at|bisect|judge|replay`: session logs as text, searched, compared, taken again.
+r"""`multidrop log show|follow|grep`: session logs as text, and searched.
 
 2026-11-22 12:41:06.020 >  press:b PR P
 2026-11-22 12:41:06.020 >> press:b bPR P\n
@@ -7,7 +7,6 @@ r"""`multidrop log show|follow|grep|at|bisect|judge|replay`: session logs as tex
 from __future__ import annotations
 
 import argparse
-import json
 import os
 import re
 import sys
@@ -18,38 +17,30 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from multidrop.base.errors import Diagnostic
-from multidrop.base.text import counted, visible
+from multidrop.base.text import visible
 from multidrop.shell import configuration
 from multidrop.shell.line_syntax import join_target
-from multidrop.shell.log import files, steps
+from multidrop.shell.log import files
 from multidrop.shell.log.files import KINDS, TRAFFIC, Entry, Line
-from multidrop.shell.log.judge import RULES, judged
 from multidrop.shell.raw import text_of
 from multidrop.shell.streams.stdout import lose, write
 
 if TYPE_CHECKING:
-    from datetime import datetime
-
-    from multidrop.shell.log.moments import Known, Moments
-    from multidrop.shell.session import Session
+    pass
 
 NOTHING_FOUND = 1
-BROKEN = 1
-DIFFERENT = 1
 STAMP = 23
 """The length of a time in a shown entry."""
 PERIOD = 0.1
 """The time between two looks at a log that is followed, s."""
 LONGEST = 200
 """The bytes in one line, where no end of line came."""
-MOST_BACKS = 3
-"""The times when the clock was set back that are named."""
 LAST = 10
 """The entries before the end with which following begins."""
 
 
 def show(chosen: argparse.Namespace) -> int:
-    return _reported(lambda: _print(files.whole(_path(chosen)), chosen, _wanted(chosen)))
+    return reported(lambda: _print(files.whole(log_path(chosen)), chosen, _wanted(chosen)))
 
 
 def grep(chosen: argparse.Namespace) -> int:
@@ -67,7 +58,7 @@ def grep(chosen: argparse.Namespace) -> int:
         found += matches
         return matches
 
-    code = _reported(lambda: _print(files.whole(_path(chosen)), chosen, matching))
+    code = reported(lambda: _print(files.whole(log_path(chosen)), chosen, matching))
     return code or (0 if found else NOTHING_FOUND)
 
 
@@ -80,162 +71,19 @@ def follow(chosen: argparse.Namespace) -> int:
             _put(line, chosen, wanted)
 
     def work() -> None:
-        following = Following(_path(chosen))
+        following = Following(log_path(chosen))
         put(list(following.look())[-LAST:])
         while True:
             time.sleep(PERIOD)
             put(following.look())
 
     try:
-        return _reported(work)
+        return reported(work)
     except KeyboardInterrupt:
         return 0
 
 
-def judge(chosen: argparse.Namespace) -> int:
-    """Print each breach of a rule; the exit code says whether there is any. Raises Diagnostic for a wrong file."""
-    path = Path(chosen.file)
-    found = judged(files.whole(path))
-    if found.sessions == found.unmarked:
-        why = "marks no commands and stops, as older versions did" if found.unmarked else "is not a session log"
-        raise Diagnostic(why, str(path), "a log of this version is one JSON object a line")
-
-    def work() -> None:
-        for rule, line, entry, said in found.breaches:
-            if chosen.json:
-                fields = {"rule": rule, "time": entry.time.isoformat(), "where": line.where, "text": said}
-                write(sys.stdout, json.dumps(fields))
-            else:
-                write(sys.stdout, f"{line.where}: {text(entry)[:STAMP]} {rule}: {said}")
-
-    code = _reported(work)
-    if found.unreadable:
-        write(sys.stderr, files.left_out(found.unreadable, "judged"))
-    counts = [counted(found.commands, "command"), counted(found.stops, "stop")]
-    counts += [counted(found.gaps, "gap")] * bool(found.gaps) + ["older sessions left out"] * bool(found.unmarked)
-    held = "no breach in the rest" if found.unreadable or found.gaps else f"all {len(RULES)} rules held"
-    broken = counted(len(found.breaches), "breach", "breaches") if found.breaches else held
-    write(sys.stderr, f"{path}: {broken} ({', '.join(counts)})")
-    return code or (BROKEN if found.breaches or found.unreadable else 0)
-
-
-def at(chosen: argparse.Namespace) -> int:
-    """Print what was known at a time: the last entry of each kind and place, and the last polls."""
-    from multidrop.shell.log import moments
-
-    found = moments.known(_path(chosen), chosen.time)
-
-    def work() -> None:
-        if found.backs and not chosen.json:
-            write(sys.stdout, _set_back(found))
-        for each in found.known:
-            write(sys.stdout, *(_objects(each, found) if chosen.json else _lines(each)))
-
-    return _reported(work)
-
-
-def _set_back(found: Moments) -> str:
-    """The times when the clock of a log was set back, and what of the log is shown therefore, in one line."""
-    backs = [f"{_time(before)} to {_time(after)}" for before, after in found.backs[-MOST_BACKS:]]
-    more = len(found.backs) - len(backs)
-    times = ", ".join(([f"{more} more"] if more else []) + backs)
-    if found.total == 1:
-        return f"the clock was set back in this log, from {times}; it has this time once"
-    shown = "all" if found.total == len(found.known) else f"the last {len(found.known)}"
-    return f"the clock was set back in this log, from {times}; it has this time {found.total} times: {shown} are shown"
-
-
-def _objects(found: Known, all_: Moments) -> Iterator[str]:
-    """A moment as JSON: its facts, the entries, and a sample for each axis."""
-    session, stopped = found.session, found.stopped
-    fact: dict[str, object] = {"at": found.at.isoformat(), "file": str(found.path)}
-    fact |= {"session": "" if session is None else session.text}
-    fact |= {"since": None if session is None else session.time.isoformat()}
-    fact |= {"stopped": None if stopped is None else stopped.time.isoformat()}
-    if all_.backs:
-        backs = [[each.isoformat() for each in both] for both in all_.backs]
-        fact |= {"clock_set_back": backs, "moments": all_.total}
-    yield json.dumps({"moment": fact})
-    yield from (line.data.decode().rstrip("\n") for line in found.lines)
-    for (bus, drive), motions in found.motions.items():
-        for each in motions:
-            sample = {"time": each.at.isoformat(), "bus": bus, "drive": drive, "axis": each.axis}
-            yield json.dumps({"sample": sample | {"position": each.position, "velocity": each.velocity}})
-
-
-def _lines(found: Known) -> Iterator[str]:
-    """A moment for a person."""
-    begun = "" if found.session is None else f": {found.session.text} since {_stamp(found.session)}"
-    yield f"{found.path} at {_time(found.at)}{begun}"
-    if found.last is not None:
-        yield f"the log ends at {_stamp(found.last)}"
-    if found.stopped is not None:
-        yield f"stopped since {_stamp(found.stopped)}"
-    yield from (text(line.entry) for line in found.lines if line.entry is not None)
-    for place, motions in found.motions.items():
-        for each in motions:
-            velocity = "" if each.velocity is None else f", velocity {each.velocity}"
-            axis = each.axis and f" {each.axis}"
-            yield f"{_time(each.at)} =  {visible(join_target(*place))}{axis} position {each.position}{velocity}"
-
-
-def _time(moment: datetime) -> str:
-    return moment.isoformat(" ", "milliseconds")[:STAMP]
-
-
-def bisect(chosen: argparse.Namespace) -> int:
-    """Print the first difference between two runs; the exit code says whether there is any, or may be."""
-    from multidrop.shell.log import moments
-
-    runs = [moments.Run(Path(file)) for file in (chosen.file1, chosen.file2)]
-    found = moments.first_difference(*runs)
-    lines = [None if index is None else run.line(index) for run, index in zip(runs, found or (None, None), strict=True)]
-    damaged = [place for file in (chosen.file1, chosen.file2) for place in files.damaged(Path(file))]
-    if damaged:
-        write(sys.stderr, files.left_out(damaged, "compared"))
-
-    def work() -> None:
-        if chosen.json:
-            both = [None if line is None else {"where": line.where, **json.loads(line.data)} for line in lines]
-            fact = {"differ": found is not None, "lines": [len(run.steps) for run in runs], "first": both}
-            fact |= {"unreadable": damaged} if damaged else {}
-            write(sys.stdout, json.dumps(fact))
-        elif found is None:
-            readable = " that can be read" if damaged else ""
-            write(sys.stdout, f"no difference in {counted(len(runs[0].steps), 'line')}{readable}")
-        else:
-            for file, run, line in zip((chosen.file1, chosen.file2), runs, lines, strict=True):
-                none = f"{file}: nothing: its run has {counted(len(run.steps), 'line')}"
-                entry = None if line is None else line.entry
-                write(sys.stdout, none if line is None or entry is None else f"{line.where}: {text(entry)}")
-
-    return _reported(work) or (DIFFERENT if found or damaged else 0)
-
-
-def _stamp(entry: Entry) -> str:
-    return text(entry)[:STAMP]
-
-
-def replay(chosen: argparse.Namespace) -> int:
-    """Take a log again on other drives; report a wrong file before anything is opened."""
-    found = steps.read(Path(chosen.file))
-    if not found.steps:
-        raise Diagnostic("no line of the log was sent to a drive", chosen.file, "/log before the lines keeps them")
-    if found.damaged:  # a stop may be missing
-        write(sys.stderr, files.left_out(found.damaged, "sent"))
-    from multidrop.shell.batch import runner
-    from multidrop.shell.batch.replay import ReplayReport, VirtualLoop
-    from multidrop.shell.batch.replay import replay as run
-
-    async def body(session: Session) -> None:
-        await run(session, found, fast=chosen.fast, positions=bool(chosen.against), report=ReplayReport(chosen.json))
-
-    url = chosen.to or f"sim:{chosen.against.removeprefix('sim:')}"
-    loop = VirtualLoop if chosen.against else None
-    return runner.run([url], body, agreed=chosen.yes, unsolicited=False, replies=False, loop=loop)
-
-
-def _reported(work: Callable[[], None]) -> int:
+def reported(work: Callable[[], None]) -> int:
     """Do the work; return the exit code. A reader that goes away (`| head`) ends it well."""
     try:
         work()
@@ -244,7 +92,7 @@ def _reported(work: Callable[[], None]) -> int:
     return 0
 
 
-def _path(chosen: argparse.Namespace) -> Path:
+def log_path(chosen: argparse.Namespace) -> Path:
     """The log that is named, or the newest. Raises Diagnostic."""
     return Path(chosen.file) if chosen.file else files.newest(configuration.load())
 

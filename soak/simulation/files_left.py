@@ -7,9 +7,9 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from multidrop.base.errors import Diagnostic
+from multidrop.features.log_analysis.judge import judged
 from multidrop.macros import MacroStore
 from multidrop.shell.log.files import ENDING, entry_of, whole
-from multidrop.shell.log.judge import judged
 from soak.simulation.history import History
 
 

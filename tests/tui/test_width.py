@@ -18,7 +18,7 @@ from textual.pilot import Pilot
 
 from multidrop.dialects.values import Conditions
 from multidrop.drives.events import Conditioned, Sample
-from multidrop.shell.batch.replay import VirtualLoop
+from multidrop.shell.batch.virtual_loop import VirtualLoop
 from multidrop.shell.configuration import Settings
 from multidrop.shell.events import By, Entered, Failed, OnBus, ProgramRead
 from multidrop.shell.session import Session

@@ -124,7 +124,7 @@ async def test_a_line_that_comes_back_is_read_again(tmp_path: Path) -> None:
         assert len(of(cell, TwinEnded)) == 1
         (said,) = [each for each in cell.events if isinstance(each, Notified) and "its twins end" in each.text]
         assert said.outcome and said.text.endswith("they begin again once it is back"), "the piped shell shows outcomes"
-        assert not cell.session.part(Twins).running(cell.session.buses["press"])
+        assert not cell.session.predicted
         cell.device("press:a").execute("MR 400", cell.floor.now())
         cell.world("plug press")
         cell.events.clear()

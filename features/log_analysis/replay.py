@@ -4,7 +4,7 @@ A number that a drive prints while it may move may be another number. A drive ma
 until a wait or a stop. The replay ends at the first difference in an error, and stops the drives that it moved. Against
 a cell, it also compares the positions in the log with those of the simulated drives at the same times.
 
-Against a cell it runs in virtual time: where nothing is ready, time goes on to the next timer.
+Against a cell it runs in virtual time.
 """
 
 from __future__ import annotations
@@ -12,11 +12,9 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import json
-import selectors
 import sys
-from collections.abc import AsyncIterator, Callable, Mapping, Sequence
-from concurrent.futures import Executor, ThreadPoolExecutor, wait
-from typing import TYPE_CHECKING, Any
+from collections.abc import AsyncIterator
+from typing import TYPE_CHECKING
 
 from multidrop.base.errors import Diagnostic, DriveError, Stopped
 from multidrop.base.text import counted
@@ -24,15 +22,16 @@ from multidrop.shell import waits
 from multidrop.shell.automation import outcome, settled
 from multidrop.shell.events import By, Printed, SessionEvent
 from multidrop.shell.line_syntax import EVERYONE, join_target
-from multidrop.shell.log.steps import WORLD, Exchange, Step, Steps, compared, errors_differ
+from multidrop.shell.log.steps import WORLD, Step, Steps, compared, errors_differ
+from multidrop.shell.log.targets import targets
 from multidrop.shell.openings import model
 from multidrop.shell.streams.stdout import write
 from multidrop.shell.workspace import LATCHED
 
 if TYPE_CHECKING:
     from multidrop.drives.drive import Drive
+    from multidrop.features.log_analysis.positions import Divergence, Positions, Reading
     from multidrop.shell.channel import Channel
-    from multidrop.shell.log.twin_comparison import Divergence, Positions, Reading
     from multidrop.shell.session import Session
 
 
@@ -92,42 +91,6 @@ class ReplayReport:
 
     def _put(self, text: str, fact: dict[str, object]) -> None:
         write(sys.stdout, json.dumps(fact) if self._json else text)
-
-
-class _Impatient(selectors.DefaultSelector):
-    """Takes what is ready, and counts how long it would have waited."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.skipped = 0.0
-
-    def select(self, timeout: float | None = None) -> list[Any]:
-        ready = super().select(0)
-        if ready or timeout is None:
-            return ready or super().select(timeout)
-        self.skipped += max(0.0, timeout)
-        return ready
-
-
-class VirtualLoop(asyncio.SelectorEventLoop):
-    """Runs an hour of timers in no time. A call in a thread takes none either."""
-
-    def __init__(self) -> None:
-        self._impatient = _Impatient()
-        super().__init__(self._impatient)
-        self._clock_resolution = 1e-9  # that of the real clock, 16 ms on Windows, would let timers pass one another
-
-    def time(self) -> float:
-        return self._impatient.skipped
-
-    def run_in_executor(  # type: ignore[override]
-        self, executor: Executor | None, func: Callable[..., Any], *arguments: Any
-    ) -> Any:
-        """Wait for a thread's end here, so that time does not run on meanwhile."""
-        with ThreadPoolExecutor(1) as threads:
-            done = threads.submit(func, *arguments)
-            wait([done])
-        return asyncio.wrap_future(done, loop=self)
 
 
 async def replay(
@@ -211,7 +174,7 @@ class Replay:
         return self._report.words(len(self.steps), differences, measured)
 
     def _positions(self) -> Positions:
-        from multidrop.shell.log.twin_comparison import Positions
+        from multidrop.features.log_analysis.positions import Positions
 
         targets = {place: drive for place, drive in self._targets.items() if drive.address not in EVERYONE}
         polls = [each for each in self._found.polls if (each.bus, each.drive) in targets]
@@ -283,25 +246,3 @@ async def _beside(positions: Positions | None, began: float) -> AsyncIterator[No
 
 def _name(drive: Drive) -> str:
     return join_target(drive.link.name, drive.address) if drive.address else drive.link.name
-
-
-def targets(session: Session, steps: Sequence[Step | Exchange]) -> Mapping[tuple[str, str], Drive]:
-    """The drive for each place in the log. Raises Diagnostic."""
-    places = dict.fromkeys((step.bus, step.drive) for step in steps if step.bus)
-    return {place: _target(session, place, list(places)) for place in places}
-
-
-def _target(session: Session, place: tuple[str, str], places: Sequence[tuple[str, str]]) -> Drive:
-    """The drive for one place: of the same name, or the only one where the log has only one."""
-    name, address = place
-    if name not in session.buses and len({bus for bus, _ in places}) == len(session.buses) == 1:
-        name = next(iter(session.buses))
-    bus = session.buses.get(name)
-    if bus is not None and (address in bus.drives or address in EVERYONE):
-        return session.drive(name, address)
-    if bus is not None and len(bus.drives) == 1 and len([each for each in places if each[0] == place[0]]) == 1:
-        return next(iter(bus.drives.values()))
-    logged = ", ".join(join_target(*each) for each in places if each[1] not in EVERYONE)
-    opened = ", ".join(join_target(each, drive) for each, its in session.buses.items() for drive in its.drives)
-    what = f"a bus {place[0]}" if bus is None else f"a drive {join_target(*place)}"
-    raise Diagnostic(f"the log has {what}", hint=f"drives of the log: {logged or 'none'}; open: {opened or 'none'}")

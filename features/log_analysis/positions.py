@@ -16,12 +16,11 @@ from multidrop.shell.events import Diverged
 from multidrop.shell.line_syntax import EVERYONE, join_target
 from multidrop.shell.log.decoding import Decoding, Measured, printed
 from multidrop.shell.log.steps import Exchange, Step
+from multidrop.shell.log.targets import Place
 from multidrop.simulator.family import Shadow
 
 LATE = 0.05
 """Seconds by which a line may have left later than the log says that it was typed."""
-Place = tuple[str, str]
-"""Bus and address in the log."""
 Reading = tuple[Shadow, float]
 """A simulated drive, and its time."""
 

@@ -14,9 +14,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from multidrop.base.errors import Diagnostic
-from multidrop.shell.log import moments
+from multidrop.features.log_analysis import moments
+from multidrop.features.log_analysis.moments import BACK, Known, Run, first_difference, moment
 from multidrop.shell.log.files import Entry, Line, line_of, lines
-from multidrop.shell.log.moments import BACK, Known, Run, first_difference, moment
 from tests.support.examples import examples
 
 AT = datetime(2026, 11, 22, 12, 0, tzinfo=UTC)

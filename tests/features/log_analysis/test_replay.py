@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from multidrop.base.errors import Diagnostic, DriveError, Stopped
-from multidrop.shell.batch.replay import replay
+from multidrop.features.log_analysis.replay import replay
 from multidrop.shell.log.files import BEGIN, KINDS, Entry, line_of
 from multidrop.shell.log.steps import compared, read
 from multidrop.shell.log.writer import SessionLog

@@ -14,10 +14,10 @@ from datetime import UTC, datetime, timedelta
 from typing import NamedTuple
 
 from multidrop.base.errors import Diagnostic
+from multidrop.features.log_analysis.moments import BACK
 from multidrop.shell.events import By
 from multidrop.shell.line_syntax import EVERYONE, DriveLine, parse
 from multidrop.shell.log.files import BEGIN, Entry, Line
-from multidrop.shell.log.moments import BACK
 
 RULES = {
     "twice": "A typed command is sent once; again only after a NAK and a question, three times at most.",

@@ -17,7 +17,7 @@ from multidrop.base.errors import DriveError
 from multidrop.dialects import Priority
 from multidrop.dialects.families import FAMILIES
 from multidrop.drives.drive import Drive
-from multidrop.shell.batch.replay import ReplayReport, replay
+from multidrop.features.log_analysis.replay import ReplayReport, replay
 from multidrop.shell.log.decoding import Decoding
 from multidrop.shell.log.steps import Exchange, read
 from multidrop.shell.log.writer import SessionLog

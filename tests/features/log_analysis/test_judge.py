@@ -10,9 +10,9 @@ from typing import Any
 
 import pytest
 
+from multidrop.features.log_analysis.judge import RULES, judged
 from multidrop.shell.log import files
 from multidrop.shell.log.files import Entry, line_of
-from multidrop.shell.log.judge import RULES, judged
 
 Rows = list[dict[str, Any]]
 STOP = {"kind": "stop", "text": "stop of every drive"}
