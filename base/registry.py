@@ -58,6 +58,8 @@ class Failed(NamedTuple):
 
 
 IN_WHEEL: dict[str, tuple[str, ...]] = {
+    "certify": ("certify",),
+    "convert": ("program convert",),
     "log_analysis": ("log at", "log bisect", "log judge", "log replay"),
     "lsp": ("lsp",),
     "publishing": ("publish", "plant"),

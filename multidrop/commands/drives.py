@@ -12,7 +12,7 @@ from multidrop.base.errors import Diagnostic
 from multidrop.base.files import program_text_of
 from multidrop.base.new_file import STANDARD_OUTPUT
 from multidrop.dialects.families import correct_in, program_language_of, program_languages
-from multidrop.shell import certificate, configuration, program_listing, snapshots
+from multidrop.shell import configuration, program_listing, snapshots
 from multidrop.shell.batch import runner
 from multidrop.shell.line_syntax import split_target
 from multidrop.shell.params import file as files
@@ -184,24 +184,6 @@ def snapshot(chosen: argparse.Namespace) -> int:
         lambda session: snapshots.save(session, chosen.output, session.units.scales),
         unsolicited=not printed,
     )
-
-
-def certify(chosen: argparse.Namespace) -> int:
-    """Write a report, or compare a drive with one; report a wrong file before anything is opened."""
-    if is_several(chosen.drive):
-        raise Diagnostic(f"--drive {chosen.drive}: a report is of one drive", "certify", "name one")
-    theirs = certificate.load(chosen.compare) if chosen.compare else None
-    if theirs is None:
-        new_file.check(chosen.output, printed=True)
-
-    async def work(session: Session) -> int:
-        [drive] = targets(session, chosen.drive)
-        if theirs is not None:
-            return DIFFERS if await certificate.compare(session, drive, chosen.compare, theirs) else 0
-        await certificate.certify(session, drive, chosen.output)
-        return 0
-
-    return runner.run([chosen.url], work, agreed=chosen.yes, unsolicited=False, tried=[chosen.drive])
 
 
 def apply(chosen: argparse.Namespace) -> int:

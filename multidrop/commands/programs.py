@@ -1,5 +1,4 @@
-"""`multidrop program check|test|convert`: find the errors in program files; run them on a simulated drive in virtual
-time; convert them for other drives.
+"""`multidrop program check|test`: find the errors in program files; run them on a simulated drive in virtual time.
 
 Prints, facts and summaries go to standard output, errors to standard error. With --json everything is an object on
 standard output.
@@ -126,38 +125,3 @@ def _test(file: str, chosen: argparse.Namespace, given: DriveSpec | None, severa
             write(sys.stderr, f"{file}: interrupted")
         raise
     return FAILED if failed else 0
-
-
-SHOWN = 10
-"""The largest number of worlds with a difference that are shown."""
-
-
-def convert(chosen: argparse.Namespace) -> int:
-    """Convert a file; 1: something cannot be converted, so nothing is written, or a run beside the original differs."""
-    from multidrop.base import new_file
-    from multidrop.shell.programs import checking
-    from multidrop.shell.streams.stdout import StatusLine
-
-    new_file.check(chosen.output, printed=True)
-    converted = checking.convert(chosen.file, chosen.to, chosen.personality)
-    found, status = converted.found, StatusLine()
-    for each in found.refused:
-        write(sys.stderr, each.line_for(chosen.file))
-    if found.refused:
-        write(sys.stderr, f"{chosen.file}: nothing is written")
-        return WRONG
-    runs = []
-    for run in converted.differences(chosen.until):
-        runs.append(run)
-        status.show(f"{counted(len(runs), 'world')} run")
-    status.erase()
-    new_file.write(chosen.output, found.text, lambda line: write(sys.stdout, line))
-    differ = [run for run in runs if run[1]]
-    stream = sys.stderr if chosen.output == new_file.STANDARD_OUTPUT else sys.stdout
-    lines = [f"{each.where(chosen.file)}: {each.what}; {each.hint}" for each in found.changes]
-    lines += [f"differs with {world}: {difference}" for world, difference in differ[:SHOWN]]
-    lines += [f"and in {counted(len(differ) - SHOWN, 'more world')}"] if differ[SHOWN:] else []
-    count = counted(len(found.changes), "change")
-    beside = f"run beside each other in {counted(len(runs), 'world')}, {len(differ)} differ"
-    write(stream, *lines, f"{converted.source} to {converted.target}{new_file.place(chosen.output)}: {count}; {beside}")
-    return FAILED if differ else 0

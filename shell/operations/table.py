@@ -34,7 +34,7 @@ VERB_GROUPS = {
     "Simulated drives": "/sim",
 }
 """The verbs in the order and the groups of `/help`."""
-COMMAND_ORDER = """demo tui shell send run sim program params macro plot poll snapshot certify ports relay scan rescue
+COMMAND_ORDER = """demo tui shell send run sim program params macro plot poll snapshot ports relay scan rescue
     log config help report completion"""
 SCRIPT_VERBS: Mapping[str, tuple[str, str]] = {
     "/set": ("/set NAME EXPR", "gives a name a value, which is worked out once: a number, a text, a drive's word"),
@@ -82,6 +82,15 @@ _KEY = re.compile(r'"([^"]*)"|([\w-]+)')
 _ELSEWHERE = re.compile(r"@([\w.]+:\w+)")
 
 
+def place(after: Mapping[str, str], names: list[str]) -> None:
+    """Put each name behind the one that it comes after, which may be one of them; last, where that is not there."""
+    left = dict(after)
+    while left:
+        name = next((each for each, before in left.items() if before in names), next(iter(left)))
+        before = left.pop(name)
+        names.insert(names.index(before) + 1 if before in names else len(names), name)
+
+
 class Declared(Mapping[str, Operation]):
     """Operations by name: those of the sections, then those of features, each after the one that it names.
 
@@ -103,9 +112,9 @@ class Declared(Mapping[str, Operation]):
 
     def __iter__(self) -> Iterator[str]:
         names = [*self._sections]
-        for feature in registry.features():
-            for name, operation in self._added(feature).items():
-                names.insert(names.index(operation.after) + 1 if operation.after in names else len(names), name)
+        place(
+            {name: each.after for feature in registry.features() for name, each in self._added(feature).items()}, names
+        )
         return iter(names)
 
     def __len__(self) -> int:
@@ -212,11 +221,12 @@ COMMANDS = Declared(
 def groups() -> dict[str, list[str]]:
     """The verbs by the titles of `/help`, those of features among them."""
     found = {title: names.split() for title, names in VERB_GROUPS.items()}
-    for name in VERBS:
-        if name not in chain.from_iterable(found.values()):
-            operation = VERBS[name]
-            names = found.setdefault(operation.group or BY_OTHERS, [])
-            names.insert(names.index(operation.after) + 1 if operation.after in names else len(names), name)
+    added = dict[str, dict[str, str]]()
+    for name in set(VERBS) - set(chain.from_iterable(found.values())):
+        operation = VERBS[name]
+        added.setdefault(operation.group or BY_OTHERS, {})[name] = operation.after
+    for title, after in added.items():
+        place(dict(sorted(after.items())), found.setdefault(title, []))
     return found
 
 

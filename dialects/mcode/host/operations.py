@@ -8,7 +8,6 @@ from dataclasses import replace
 from functools import lru_cache, partial
 
 from multidrop.base.errors import DriveError, Inexpressible, NoAnswer, Refused, Stopped
-from multidrop.dialects.certifying import repaired
 from multidrop.dialects.codec import End, Kind, Priority, Procedure, Reply, Request
 from multidrop.dialects.exchange import unsent_if_stopped
 from multidrop.dialects.family import Motion
@@ -24,6 +23,7 @@ from multidrop.dialects.mcode.manual.mnemonic import EXPANDED
 from multidrop.dialects.mcode.manual.points import EXPANDED_INPUTS, INPUTS, STATUS, in_words
 from multidrop.dialects.mcode.manual.program_file import commented
 from multidrop.dialects.mcode.manual.table import lookup
+from multidrop.dialects.owed_settings import repaired
 from multidrop.dialects.state import Owed
 
 # Program mode: between `PG n` and `PG` the drive stores every line.

@@ -9,10 +9,11 @@ from dataclasses import replace
 from functools import partial
 
 from multidrop.base.errors import Inexpressible, NoAnswer, Refused, Stopped
-from multidrop.dialects.certifying import Certifying, repaired
+from multidrop.dialects.certifying import Certifying
 from multidrop.dialects.codec import End, Kind, Priority, Procedure, Reply, Request
 from multidrop.dialects.exchange import Exchange
 from multidrop.dialects.family import ADDRESSES, Hints, Motion, Referencing
+from multidrop.dialects.owed_settings import repaired
 from multidrop.dialects.tmcl.host.codec import (
     FACTORY,
     LENGTH,

@@ -21,7 +21,8 @@ from multidrop.base.errors import Diagnostic, DriveError, NoAnswer, Refused, Sto
 from multidrop.base.files import escaped_toml, text_of, toml_of
 from multidrop.base.on_demand import imported
 from multidrop.base.text import counted
-from multidrop.dialects.certifying import BYTES, FITS, MOVES, Occupied, Question, owed, restored
+from multidrop.dialects.certifying import BYTES, FITS, MOVES, Occupied, Question
+from multidrop.dialects.owed_settings import owed, restored
 from multidrop.drives.conversations import refuse_stranger
 from multidrop.drives.drive import Drive
 from multidrop.drives.events import Concluded, Transaction

@@ -58,7 +58,7 @@ def test_a_full_disk_is_said_before_anything_is_asked(certify, monkeypatch):
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr("multidrop.base.atomic.create_atomically", full)
-    monkeypatch.setattr("multidrop.shell.certificate.Asking", None)
+    monkeypatch.setattr("multidrop.features.certify.certificate.Asking", None)
     done = certify("sim:cell.toml", "-o", "r.toml", "--yes")
     assert (done.returncode, done.stderr) == (2, "r.toml: cannot be written: No space left on device\n")
 

@@ -12,11 +12,12 @@ from unittest import mock
 import pytest
 
 from multidrop.base.errors import Diagnostic, NoAnswer, Refused, Stopped, TransportLost
-from multidrop.dialects.certifying import BYTES, ERROR, FITS, MODE, MOVES, NOTHING, owed
+from multidrop.dialects.certifying import BYTES, ERROR, FITS, MODE, MOVES, NOTHING
 from multidrop.dialects.families import FAMILIES
+from multidrop.dialects.owed_settings import owed
 from multidrop.dialects.tmcl.manual import commands
 from multidrop.dialects.tmcl.manual.commands import Status
-from multidrop.shell.certificate import SLEEP, WAIT, Asking, certify, compare, load
+from multidrop.features.certify.certificate import SLEEP, WAIT, Asking, certify, compare, load
 from multidrop.shell.channel import Front
 from multidrop.shell.configuration import Guarding, Settings
 from multidrop.shell.session import Session

@@ -8,8 +8,9 @@ import pytest
 
 from multidrop.base.errors import NoAnswer, Refused
 from multidrop.dialects import DriveState
-from multidrop.dialects.certifying import Occupied, owed, repaired
+from multidrop.dialects.certifying import Occupied
 from multidrop.dialects.mcode.host.codec import MCode
+from multidrop.dialects.owed_settings import owed, repaired
 
 LINES = ("EM=1", "CK=0")
 
