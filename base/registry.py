@@ -74,8 +74,8 @@ _others: dict[str, tuple[Entry, Feature]] = {}
 """The features by others that are loaded, by their places."""
 
 
-class _Loading(isolated):
-    """The import of what others wrote, which may raise anything: an exit, too, ends only the import."""
+class Attempt(isolated):
+    """A call of what others wrote, which may raise anything: an exit, too, ends only the call. Nothing is logged."""
 
     def __exit__(
         self, kind: type[BaseException] | None, failure: BaseException | None, _: TracebackType | None
@@ -174,7 +174,7 @@ def load_others(own: bool = True) -> list[str]:
     for entry in entries(own):
         if entry.place not in _others and entry.place not in _failed:
             why: list[str] = []
-            with _Loading(entry.name, why):
+            with Attempt(entry.name, why):
                 _others[entry.place] = entry, _loaded(entry)
             if why:
                 _failed[entry.place] = failed = Failed(entry, why[0])

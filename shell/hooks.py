@@ -10,7 +10,6 @@ from collections.abc import Awaitable, Callable, Iterator, Mapping
 from typing import Any, NamedTuple
 
 from multidrop.base import registry
-from multidrop.base.isolation import isolated
 
 Session = Any
 """`shell.session.Session`, which knows this module."""
@@ -47,13 +46,22 @@ class Options(NamedTuple):
     opened: Callable[[Session, argparse.Namespace], Awaitable[None]] | None = None
 
 
-def begin(session: Session) -> None:
-    """Let every feature begin in a session; a defect of one ends neither the session nor the others."""
+def begin(session: Session, own: bool) -> list[str]:
+    """Load the features by others, with a person's `own`, and let every feature begin in a session.
+
+    Return a warning for each that cannot be loaded or cannot begin; the others and the session go on.
+    """
+    from multidrop.shell.operations.table import load_others
+
+    warnings = load_others(own)
     for feature in registry.features():
         for each in feature.adds:
             if isinstance(each, AtSession):
-                with isolated(f"the feature {feature.name}"):
+                why: list[str] = []
+                with registry.Attempt(feature.name, why):
                     each.begin(session)
+                warnings += [f"the feature {feature.name} cannot begin: {text}" for text in why]
+    return warnings
 
 
 def options(command: str) -> Iterator[Options]:

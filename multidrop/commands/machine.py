@@ -13,7 +13,8 @@ from datetime import date, datetime
 from importlib.metadata import PackageNotFoundError, requires, version
 from pathlib import Path
 
-from multidrop.base import places
+import multidrop
+from multidrop.base import places, registry
 from multidrop.base.errors import Diagnostic
 from multidrop.base.files import bounded, opened, split_lines, toml_of, utf8_of, why
 from multidrop.base.new_file import STANDARD_OUTPUT
@@ -268,6 +269,24 @@ def _state() -> Iterator[str]:
             yield f"{path.stat().st_size:>10} {path.relative_to(folder)}"
     except OSError as problem:
         yield f"problem: {why(problem)}"
+
+
+def features(chosen: argparse.Namespace) -> int:
+    """List every feature. One that cannot be loaded is listed with its error; the exit code is 0 all the same."""
+    import json
+
+    found = list(registry.states(multidrop.__version__, own=not configuration.IGNORED.get()))
+    if chosen.json:
+        for entry, meaning, state in found:
+            facts = {"name": entry.name, "source": entry.source, "version": entry.version, "state": state}
+            write(sys.stdout, json.dumps(facts | {"meaning": meaning}))
+        return 0
+    rows = [(entry.name, f"{entry.source} {entry.version}".strip(), state, meaning) for entry, meaning, state in found]
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    for row in rows:
+        cells = (f"{cell:<{width}}" for cell, width in zip(row, widths, strict=True))
+        write(sys.stdout, visible("  ".join(cells).rstrip()))
+    return 0
 
 
 SECTIONS: dict[str, Callable[[], Iterator[str]]] = {

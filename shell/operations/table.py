@@ -35,7 +35,7 @@ VERB_GROUPS = {
 }
 """The verbs in the order and the groups of `/help`."""
 COMMAND_ORDER = """demo tui shell send run sim program params macro plot poll snapshot ports relay scan rescue
-    log config help report completion"""
+    log config features help report completion"""
 SCRIPT_VERBS: Mapping[str, tuple[str, str]] = {
     "/set": ("/set NAME EXPR", "gives a name a value, which is worked out once: a number, a text, a drive's word"),
     "/if": ("/if EXPR", "executes the lines up to /else or /end if the expression holds"),
