@@ -178,6 +178,12 @@ class Workspace(Channel):
         assert isinstance(found, kind)
         return found
 
+    def _tell(self, hooks: list[Callable[[Bus], None]], bus: Bus) -> None:
+        """Call hooks with a bus; a defect of one keeps nothing else from being done."""
+        for hook in hooks:
+            with isolated(f"a hook on {bus.name}"):
+                hook(bus)
+
     # Buses
 
     def adopt(self, opened: Opened, place: int, connection: Connection | None = None, in_cell: str = "") -> OpenBus:
@@ -194,8 +200,7 @@ class Workspace(Channel):
 
     async def forget(self, bus: Bus) -> None:
         """Close a bus and drop everything known of it. A stop that ends the caller does not leave the port open."""
-        for forgotten in self.on_forgotten:
-            forgotten(bus)
+        self._tell(self.on_forgotten, bus)
         record = self._open.get(bus)
         for observer in record.debuggers.values() if record is not None else ():
             observer.close()
@@ -323,8 +328,7 @@ class Workspace(Channel):
         if record := self._open.get(bus):
             record.selected = next(iter(bus.drives.values()), None)
         self.changed()
-        for found in self.on_identified:
-            found(bus)
+        self._tell(self.on_identified, bus)
 
     def drive(self, bus: str = "", address: str | None = None) -> Drive:
         """Find the drive at an address (or label) of a bus, known or not; by default the selected one."""
@@ -441,8 +445,7 @@ class Workspace(Channel):
             self.publish(Notified(event.at, text, name, event.warning))
         elif isinstance(event, Changed):
             self.publish(StateChanged(event.at))
-            for changed in self.on_changed:
-                changed(bus)
+            self._tell(self.on_changed, bus)
 
 
 def _in_order(opened: dict[Bus, OpenBus]) -> tuple[dict[Bus, OpenBus], dict[str, Bus]]:

@@ -23,6 +23,8 @@ from soak.drawn.trial import LEFT_OUT
 ROOT = Path(__file__).parents[1]
 PATIENCE = 120.0
 """s; a step of a copy takes seconds."""
+LEFT = [f"--ignore=tests/{each}" for each in ("docs", "packaging", "soak")]
+"""Tests that are of the whole: pages, what is shipped, and the simulated life."""
 QUICK = "not process and not tui and not wide and not slow"
 IMPORTS = """
 import importlib, pkgutil, sys
@@ -107,7 +109,7 @@ def _tried(name: str, folder: Path) -> bool:
     ]
     if name == "all":
         options = ("-q", "-p", "no:cacheprovider", "-p", "no:xdist", "--no-header", "--tb=short", "-W", "default")
-        steps.append(("the quick tests of the core", ("-m", "pytest", *options, "-m", QUICK), ""))
+        steps.append(("the quick tests of the core", ("-m", "pytest", *options, "-m", QUICK, *LEFT), ""))
     wrong = [f"{what}: {said}" for what, command, typed in steps if (said := _run(command, tree, typed))]
     print(f"without {name}: {'works' if not wrong else 'DOES NOT WORK'}", *wrong, sep="\n    ", flush=True)
     shutil.rmtree(tree, ignore_errors=True)

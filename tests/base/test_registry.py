@@ -1,0 +1,156 @@
+"""Features by others: where they come from, what becomes of one that cannot be loaded, and of one that is not there."""
+
+from __future__ import annotations
+
+import importlib.metadata
+import os
+from collections.abc import Iterator
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from multidrop.base import registry
+from multidrop.base.errors import Diagnostic
+from multidrop.base.feature import Feature
+
+GOOD = 'from multidrop.base.feature import Feature\nFEATURE = Feature("{name}", "does something")\n'
+
+
+@pytest.fixture(autouse=True)
+def own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    """The folder of a person's own features; nothing is loaded before or after."""
+    monkeypatch.setenv("MULTIDROP_CONFIG_DIR", str(tmp_path))
+    monkeypatch.setenv("MULTIDROP_STATE_DIR", str(tmp_path / "state"))
+    monkeypatch.setattr(registry, "_others", {})
+    monkeypatch.setattr(registry, "_failed", {})
+    monkeypatch.setattr(importlib.metadata, "entry_points", lambda group: [])
+    folder = tmp_path / "features"
+    folder.mkdir()
+    yield folder
+
+
+def write(folder: Path, name: str, text: str = GOOD) -> Path:
+    path = folder / f"{name}.py"
+    path.write_text(text.replace("{name}", name))
+    return path
+
+
+def state(name: str) -> tuple[str, str]:
+    """Its source and its state."""
+    [(source, found)] = [(entry.source, said) for entry, _, said in registry.states("1.2") if entry.name == name]
+    return source, found
+
+
+def test_a_file_in_the_folder_is_a_feature(own: Path) -> None:
+    path = write(own, "clamp")
+    assert registry.load_others() == []
+    assert [each.name for each in registry.by_others()] == ["clamp"]
+    assert state("clamp") == (str(path), "ready")
+    assert registry.load_others() == [], "it is loaded once"
+
+
+def test_without_the_configuration_a_persons_own_files_are_not_loaded(own: Path) -> None:
+    write(own, "clamp")
+    assert registry.load_others(own=False) == [] and registry.by_others() == []
+
+
+@pytest.mark.parametrize(
+    ("text", "why"),
+    [
+        ("raise SystemExit(3)", "SystemExit: 3"),
+        ("import no_such_module", "ModuleNotFoundError: No module named 'no_such_module'"),
+        ("def (", "SyntaxError: "),
+        ("1 / 0", "ZeroDivisionError: division by zero"),
+        ("x = 1", "AttributeError: "),
+        ("FEATURE = 1", "TypeError: FEATURE is no multidrop.base.feature.Feature"),
+        (GOOD.replace("{name}", "other"), "its record has the name other"),
+        (GOOD.replace("{name}", "Bad"), "ValueError: the name of a feature"),
+    ],
+)
+def test_one_that_cannot_be_loaded_is_one_warning_and_the_others_are_there(own: Path, text: str, why: str) -> None:
+    path = write(own, "bad", text)
+    write(own, "fine")
+    [warning] = registry.load_others()
+    assert warning.startswith(f"the feature bad ({path}) cannot be loaded: {why}")
+    assert [each.name for each in registry.by_others()] == ["fine"]
+    assert registry.load_others() == [], "it is said once"
+    assert state("bad")[1].startswith(f"cannot be loaded: {why}")
+
+
+@pytest.mark.skipif(os.name != "posix", reason="folders of others are a matter of POSIX")
+def test_a_file_that_others_can_change_is_not_used(own: Path) -> None:
+    write(own, "clamp").chmod(0o666)
+    [warning] = registry.load_others()
+    assert "can be changed by every account" in warning and registry.by_others() == []
+
+
+def test_a_name_of_the_wheel_is_taken(own: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(registry, "IN_WHEEL", {"clamp": ()})
+    write(own, "clamp")
+    assert registry.load_others()[0].endswith("cannot be loaded: another feature has this name")
+
+
+def test_a_feature_tells_which_extras_are_missing() -> None:
+    assert Feature("x", "y", extras={"fit": "no_such_module", "here": "json"}).missing() == ["fit"]
+
+
+def package(name: str, value: str, version: str = "2.0") -> Any:
+    return SimpleNamespace(name=name, value=value, dist=SimpleNamespace(name=f"multidrop-{name}", version=version))
+
+
+def test_packages_are_read_once_until_the_environment_changes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    site = tmp_path / "site"
+    site.mkdir()
+    monkeypatch.syspath_prepend(str(tmp_path / "first"))
+    monkeypatch.setattr("sys.path", [str(tmp_path), str(site)])
+    reads = []
+
+    def entry_points(group: str) -> list[Any]:
+        reads.append(group)
+        return [package("gauge", "package_gauge:FEATURE")]
+
+    monkeypatch.setattr(importlib.metadata, "entry_points", entry_points)
+    first = registry.entries()
+    assert first == [registry.Entry("gauge", "multidrop-gauge", "2.0", "package_gauge:FEATURE")]
+    assert registry.entries() == first and reads == ["multidrop.features"]
+    os.utime(site, ns=(1, 1))
+    assert registry.entries() == first and len(reads) == 2
+
+
+def test_what_is_kept_of_packages_may_be_damaged(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(importlib.metadata, "entry_points", lambda group: [package("gauge", "g:FEATURE")])
+    first = registry.entries()
+    (tmp_path / "state" / registry.KEPT).write_text("[1")
+    assert registry.entries() == first
+
+
+def test_a_package_is_loaded_by_its_entry_point(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "package_clamp.py").write_text(GOOD.replace("{name}", "clamp"))
+    monkeypatch.syspath_prepend(str(tmp_path))
+    monkeypatch.setattr(importlib.metadata, "entry_points", lambda group: [package("clamp", "package_clamp:FEATURE")])
+    assert registry.load_others() == []
+    assert state("clamp") == ("multidrop-clamp", "ready")
+    [(entry, meaning, _)] = [each for each in registry.states("1.2") if each[0].name == "clamp"]
+    assert (entry.version, meaning) == ("2.0", "does something")
+
+
+def test_the_word_of_a_feature_that_was_deleted_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(registry, "IN_WHEEL", {"gone_away": ("gone", "/gone")})
+    with pytest.raises(Diagnostic, match="gone: the feature gone_away is not there; install multidrop again, whole"):
+        registry.with_word("gone")
+    assert list(registry.wheels()) == [] and registry.with_word("other") is None
+    assert [(entry.name, said) for entry, _, said in registry.states("1.2")] == [("gone_away", "not there")]
+
+
+def test_a_defect_of_a_feature_of_the_wheel_is_not_taken_for_its_absence(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(registry.importlib, "import_module", lambda name: (_ for _ in ()).throw(ImportError("no")))
+    with pytest.raises(ImportError):
+        registry._wheel("twins")
+
+
+def test_what_features_add_is_found_by_its_class(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(registry, "IN_WHEEL", {})
+    registry._others["p"] = registry.Entry("x", "dist", "1", "p"), Feature("x", "y", adds=(1, "a", 2.5, 3))
+    assert list(registry.added(int)) == [1, 3] and list(registry.added(str)) == ["a"]

@@ -1,0 +1,226 @@
+"""The stop never passes through a feature: its bytes leave while a hook of one raises, holds the loop up, or waits."""
+
+from __future__ import annotations
+
+import asyncio
+import threading
+from argparse import Namespace
+from collections.abc import AsyncIterator, Callable, Iterator
+from contextlib import AsyncExitStack, asynccontextmanager
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from multidrop.base import registry
+from multidrop.base.errors import Stopped
+from multidrop.base.feature import Feature
+from multidrop.base.registry import Entry
+from multidrop.drives.events import Changed
+from multidrop.shell import hooks
+from multidrop.shell.configuration import Settings
+from multidrop.shell.hooks import AtSession, Options
+from multidrop.shell.operations.operation import Operation
+from multidrop.shell.session import Session
+from multidrop.simulator.cells import load
+from multidrop.simulator.floor import Floor
+from multidrop.simulator.serving.endpoints import serve_bus
+from multidrop.simulator.serving.running import RunningFloor
+from tests.support.cell_session import TCP, CellSession, bus, party
+
+PATIENCE = 10.0
+"""s; far longer than a thread takes to write."""
+
+
+class Held:
+    """A hook that holds the event loop up, until the thread of the stop key has written."""
+
+    def __init__(self) -> None:
+        self.inside, self.written = threading.Event(), threading.Event()
+        self.was_written = False
+
+    def __call__(self, *_: Any) -> None:
+        if not self.inside.is_set():
+            self.inside.set()
+            self.was_written = self.written.wait(PATIENCE)
+
+
+def raising(*_: Any) -> None:
+    raise RuntimeError("a defect of a feature")
+
+
+@pytest.fixture
+def add(monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[..., None]]:
+    monkeypatch.setattr(registry, "_others", {})
+
+    def added(*adds: object) -> None:
+        registry._others["p"] = Entry("x", "dist", "1", "p"), Feature("x", "tries to be in the way", adds=adds)
+
+    yield added
+
+
+def key_thread(session: Any, held: Held) -> tuple[threading.Thread, list[bytes]]:
+    """The thread of the stop key, which presses it once the hook has the loop; and what each line was told to write."""
+    wrote: list[bytes] = []
+    for each in session.buses.values():
+        preempt = each.link.transport.preempt
+
+        def noted(whole: bool, make: Callable[[int], bytes], preempt: Any = preempt) -> bool:
+            def made(dropped: int) -> bytes:
+                wrote.append(make(dropped))
+                held.written.set()
+                return wrote[-1]
+
+            return bool(preempt(whole, made))
+
+        each.link.transport.preempt = noted
+
+    def press() -> None:
+        assert held.inside.wait(PATIENCE)
+        session.stop_ahead()
+
+    thread = threading.Thread(target=press)
+    thread.start()
+    return thread, wrote
+
+
+@asynccontextmanager
+async def served(folder: Path) -> AsyncIterator[Any]:
+    """A session with two lines over TCP, whose writes leave from any thread; a drive of the first one moves."""
+    (folder / "cell.toml").write_text(bus("press", party("a"), serve=TCP) + bus("lift", party("b"), serve=TCP))
+    session = Session(Settings({}, folder / "config", folder / "state"))
+    async with AsyncExitStack() as stack:
+        floor = RunningFloor(Floor(load(str(folder / "cell.toml"))))
+        stack.callback(floor.close)
+        for each, names in zip(floor.floor.cell.buses, "ab", strict=True):
+            [one] = await serve_bus(floor, each, stack)
+            await session.open(f"{one.endpoint}?drives={names}", each.name)
+        stack.push_async_callback(session.close)
+        await session.run("@press:a SL 1000")
+        yield session
+
+
+def at_session(place: str) -> Callable[[Any, Callable[..., None]], None]:
+    def begin(session: Any, hook: Callable[..., None]) -> None:
+        if place == "an event":
+            session.subscribe(hook)
+        else:
+            getattr(session, place).append(hook)
+
+    return begin
+
+
+HOOKS = ["an event", "on_changed", "on_identified", "on_forgotten"]
+
+
+@pytest.mark.parametrize("place", HOOKS)
+async def test_a_hook_that_holds_the_loop_up_delays_the_report_and_not_the_stop(
+    place: str, tmp_path: Path, add: Callable[..., None]
+) -> None:
+    held, armed = Held(), False
+
+    def hook(*_: Any) -> None:
+        if armed:
+            held()
+
+    add(AtSession(lambda session: at_session(place)(session, hook)))
+    async with served(tmp_path) as session:
+        thread, wrote = key_thread(session, held)
+        armed = True
+        match place:
+            case "on_identified":
+                session.identified(session.buses["press"])
+            case "on_forgotten":
+                await session.forget(session.buses["lift"])
+            case "on_changed":
+                link = session.buses["press"].link
+                link.publish(Changed(link.now()))
+            case _:
+                session.notify("something happens")
+        await asyncio.to_thread(thread.join, PATIENCE)
+        assert held.was_written and wrote and any(b"\x1b" in each for each in wrote)
+
+
+@pytest.mark.virtual
+@pytest.mark.parametrize("place", HOOKS)
+async def test_a_hook_that_raises_keeps_no_stop_from_any_line(
+    place: str, tmp_path: Path, add: Callable[..., None]
+) -> None:
+    add(AtSession(lambda session: at_session(place)(session, raising)))
+    async with CellSession(tmp_path, bus("press", party("a")), bus("lift", party("b"))) as cell:
+        await cell.session.run("@press:a SL 1000")
+        await cell.session.run("@lift:b SL 1000")
+        cell.session.stop("Ctrl+X")
+        await asyncio.sleep(5)
+        assert cell.moving() == set()
+
+
+@pytest.mark.virtual
+async def test_a_feature_that_cannot_begin_is_a_warning_and_the_session_works(
+    tmp_path: Path, add: Callable[..., None]
+) -> None:
+    add(AtSession(raising))
+    cell = CellSession(tmp_path, bus("press", party("a")))
+    await asyncio.sleep(0)
+    assert cell.warned() == ["the feature x cannot begin: RuntimeError: a defect of a feature"]
+    async with cell:
+        await cell.session.run("@a PR P")
+        assert cell.printed() == ["0"]
+
+
+@pytest.mark.virtual
+async def test_a_verb_that_never_returns_ends_with_the_stop(tmp_path: Path, add: Callable[..., None]) -> None:
+    async def forever(_: Any) -> None:
+        await asyncio.Event().wait()
+
+    add(Operation(usage="/forever", help="Wait.", work=forever))
+    async with CellSession(tmp_path, bus("press", party("a"))) as cell:
+        await cell.session.run("SL 1000")
+        verb = asyncio.create_task(cell.session.run("/forever"))
+        await asyncio.sleep(1)
+        cell.session.stop("Ctrl+X")
+        with pytest.raises(Stopped):
+            await verb
+        await asyncio.sleep(5)
+        assert cell.moving() == set()
+
+
+@pytest.mark.parametrize("kind", ["work", "checked", "fits"])
+async def test_a_verb_that_holds_the_loop_up_delays_no_stop(
+    kind: str, tmp_path: Path, add: Callable[..., None]
+) -> None:
+    held = Held()
+
+    async def work(_: Any) -> None:
+        if kind == "work":
+            held()
+
+    functions: dict[str, Any] = {"work": work, "checked": held, "fits": held}
+    verb = Operation(usage="/slow", help="Be slow.", work=work)._replace(**{kind: functions[kind]})
+    add(verb)
+    async with served(tmp_path) as session:
+        thread, wrote = key_thread(session, held)
+        match kind:
+            case "work":
+                await session.run("/slow")
+            case "checked":
+                verb.check("")
+            case _:
+                assert verb.fits is not None
+                verb.fits(session)
+        await asyncio.to_thread(thread.join, PATIENCE)
+        assert held.was_written and wrote
+
+
+async def test_options_that_hold_the_loop_up_delay_no_stop(tmp_path: Path, add: Callable[..., None]) -> None:
+    held = Held()
+
+    async def opened(*_: Any) -> None:
+        held()
+
+    add(Options("shell", {"--slow": "be slow"}, opened=opened))
+    async with served(tmp_path) as session:
+        thread, wrote = key_thread(session, held)
+        await hooks.opened(session, Namespace(command="shell", twin=False))
+        await asyncio.to_thread(thread.join, PATIENCE)
+        assert held.was_written and wrote
