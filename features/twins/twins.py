@@ -31,11 +31,8 @@ def begin(session: Session) -> None:
 
 def _apart(session: Session, drive: Drive, axis: str, steps: int) -> str:
     """A distance of an axis in its unit, ` (0.5 mm)`; empty where it has no scale."""
-    if not session.scaled:
-        return ""
-    from multidrop.shell.setting_units import apart
-
-    return apart(session.units, drive, axis, steps)
+    found = session.in_units(drive, axis, steps)
+    return f" ({found})" if found else ""
 
 
 class Twins:
