@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import asyncio
 import ctypes
+import importlib.util
+import sys
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from types import SimpleNamespace
@@ -365,3 +367,21 @@ async def test_a_rate_that_the_port_has_not_is_told_as_that(windows: Windows) ->
 
 def test_an_error_without_a_number_of_windows_is_told_as_it_is(windows: Windows) -> None:
     assert str(open_error("COM3", OSError(13, "Permission denied"))) == "COM3 could not be opened: Permission denied"
+
+
+@for_each(
+    "name, has, lacks", [("serial_port", "SerialDevice", "SerialEndpoint"), ("sockets", "SocketDevice", "output_queue")]
+)
+def test_nothing_of_posix_is_asked_for_where_it_is_not(name: str, has: str, lacks: str) -> None:
+    found = importlib.import_module(f"multidrop.transports.{name}").__file__
+    assert found is not None
+    spec = importlib.util.spec_from_file_location(f"{name}_on_windows", found)
+    assert spec is not None and spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    with pytest.MonkeyPatch.context() as patched:
+        for each in ("fcntl", "termios", "grp", "pwd"):
+            patched.setitem(sys.modules, each, None)
+        patched.setattr("multidrop.transports.port_users.mark", None, raising=False)
+        patched.setattr("sys.platform", "win32")
+        spec.loader.exec_module(module)
+    assert has in vars(module) and lacks not in vars(module)
