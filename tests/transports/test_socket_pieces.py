@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import errno
+import gc
 import os
 import socket
 import sys
@@ -270,6 +271,24 @@ async def test_a_look_up_that_takes_long_serves_all_who_wait_for_it_and_no_other
         await each.close()
     await (await open_udp("drive", 503)).close()
     assert here.asked[2:] == [("drive", 503, socket.SOCK_DGRAM)]
+
+
+@pytest.mark.virtual
+async def test_a_look_up_that_ends_when_nobody_waits_any_more_is_no_failure(net: Callable[[], Net]) -> None:
+    here, loop, failures = net(), asyncio.get_running_loop(), list[object]()
+    loop.set_exception_handler(lambda _, context: failures.append(context))
+    here.look_up_takes, here.hosts["drive"] = 0.9, socket.gaierror(-2, "Name or service not known")
+    for cancel in (False, True):
+        with pytest.raises(Unreachable, match=r"no reply within 0.5 s"):
+            await open_tcp("drive", 503, within=0.5)
+        (look_up,) = asyncio.all_tasks() - {asyncio.current_task()}
+        if cancel:  # as at the end of the program
+            look_up.cancel()
+        del look_up
+        await asyncio.sleep(1)
+        gc.collect()
+        assert failures == [], "a person would see it as a defect"
+    assert len(here.asked) == 2
 
 
 @pytest.mark.virtual
