@@ -13,6 +13,7 @@ from multidrop.transports.port_users import User, beside, holder, in_use, lock_o
 from tests.support.cases import for_each
 from tests.support.machine_files import Machine, hide
 
+pytestmark = pytest.mark.fork
 PORT = "/dev/ttyUSB7"
 
 
@@ -37,7 +38,6 @@ def machine(tmp_path: Path) -> Machine:
         ("", "None"),
     ],
 )
-@pytest.mark.fork
 def test_who_has_locked_a_port_is_read_from_the_locks_of_the_kernel(
     line: str, told: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
