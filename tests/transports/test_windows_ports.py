@@ -34,6 +34,7 @@ class Port:
     exclusive: bool
     arrived: bytearray = field(default_factory=bytearray)
     written: bytearray = field(default_factory=bytearray)
+    pieces: list[int] = field(default_factory=list)
     out_waiting: int = 0
     waited: float = 0.0
     done: list[str] = field(default_factory=list)
@@ -70,6 +71,7 @@ class Port:
         if self.fails is not None:
             raise self.fails
         self.written += data
+        self.pieces.append(len(data))
 
     def reset_output_buffer(self) -> None:
         self._do("reset output")
@@ -306,6 +308,7 @@ async def test_an_open_port_passes_bytes_on_through_threads_and_is_free_after_it
     transport.start(data.extend, lambda loss: None)
     transport.write(b"x" * 1000)
     await until(lambda: data == b"51200\r\n" and len(port.written) == 1000)
+    assert port.pieces == [256, 256, 256, 232], "no more than one of them cannot be taken back"
     await transport.close()
     await until(lambda: "COM3" not in closing)
     assert windows.closed_marks == ["COM3"]
