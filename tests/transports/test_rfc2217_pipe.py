@@ -261,6 +261,14 @@ async def test_bytes_before_the_start_come_first_and_none_after_the_close() -> N
 
 
 @pytest.mark.virtual
+async def test_where_nothing_came_nothing_is_delivered() -> None:
+    pipe, heard = await negotiated(Server(), 9600), list[bytes]()
+    pipe.start(heard.append, lambda loss: None)
+    await asyncio.sleep(1)
+    assert heard == []
+
+
+@pytest.mark.virtual
 async def test_a_pipe_that_is_closed_right_behind_its_start_delivers_nothing() -> None:
     server = Server()
     pipe = await negotiated(server, 9600)
