@@ -88,6 +88,7 @@ def test_a_stop_is_explained_in_the_note() -> None:
         ("F2 H^M^d99999999", "a pause of more than a day"),
         ("F2 H^M^d1234567890", "needs a number"),
         ("F2 ^M", "an empty line cannot be sent"),
+        ("F2 ^[ ^M", "keys.txt:1:7: an empty line cannot be sent"),
         ("F2 /stop^M", "/ at the beginning of a line would be multidrop's own"),
         ("F2 @b MR 1^M", "@ at the beginning"),
         ("F2 a\x1bb^M", "keys.txt:1: control character (U+001B)"),
