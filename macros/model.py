@@ -310,7 +310,7 @@ def checked_values(macro: Macro, given: Mapping[str, str]) -> dict[str, str]:
 def filled(macro: Macro, given: Mapping[str, str]) -> tuple[str, ...]:
     """The lines of a macro's steps with their values. Raises Diagnostic as `checked_values` does."""
     values = checked_values(macro, given)
-    return tuple(fill(line, _with_own(line, values), macro.where(n)) for n, line in enumerate(macro.lines, 1))
+    return tuple(fill(line, _with_own(line, values)) for line in macro.lines)
 
 
 def missing(macro: Macro, given: Mapping[str, str]) -> list[Parameter]:

@@ -128,9 +128,8 @@ class Relay:
         self.queue = bytearray()
         """What the port has not taken yet."""
         self._frames = Frames()
-        self._settled = self._taken = self._reported = 0
+        self._settled = self._reported = 0
         """Bytes for the port since the beginning: dropped or taken by the driver; reported as sent."""
-        self._dropped = False
 
     def receive(self, data: bytes) -> None:
         """Take in what arrived, and pass it on. Raises Garbled; OSError where the port is lost."""

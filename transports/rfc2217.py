@@ -32,8 +32,7 @@ _HELLO = b"".join(
         (telnet.DO, telnet.SGA),
     )
 )
-_OURS = (telnet.OPTION, telnet.BINARY, telnet.SGA)
-_THEIRS = (telnet.BINARY, telnet.SGA)
+_OFFERED = (telnet.BINARY, telnet.SGA)
 _LINES = {
     "DTR": (Control.DTR_ON, Control.DTR_OFF),
     "RTS": (Control.RTS_ON, Control.RTS_OFF),
@@ -169,9 +168,7 @@ class Rfc2217Pipe(Transport):
                 # refused.
                 if event.option == telnet.OPTION and event.verb in (telnet.DO, telnet.WILL):
                     self._agreed.set()
-                elif event.verb in telnet.REFUSAL and event.option not in (
-                    _OURS if event.verb == telnet.DO else _THEIRS
-                ):
+                elif event.verb in telnet.REFUSAL and event.option not in _OFFERED:
                     self._inner.write(telnet.option(telnet.REFUSAL[event.verb], event.option))
             elif isinstance(event, telnet.Subnegotiation) and (found := telnet.parsed(event.body)):
                 self._confirmed(*found)

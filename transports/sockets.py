@@ -111,7 +111,7 @@ def explain(error: OSError | None) -> str:
         return "closed by the other end; check its power and the network"
     if isinstance(error, socket.gaierror):
         return "unknown host name; check the spelling, or give its address"
-    number = _WINDOWS.get(getattr(error, "winerror", 0) or 0, error.errno or 0)
+    number = _WINDOWS.get(getattr(error, "winerror", None) or 0, error.errno or 0)
     known = number < 10000  # greater ones are of Windows' sockets, which `os.strerror` does not know
     return _WHY.get(number) or (os.strerror(number) if number and known else error.strerror or str(error))
 

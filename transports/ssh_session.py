@@ -264,8 +264,8 @@ async def _measured(session: SshSession, early: bytes) -> tuple[bytes, float]:
     """Ask for a sign of life; return all bytes that have arrived by its reply, and the time that it took, s."""
     frames, began = Frames(), time.monotonic()
     session.mark()
-    session.write(frame(Kind.BEAT))
-    with contextlib.suppress(Garbled):  # which the pipe reports
+    with contextlib.suppress(Garbled, OSError):  # which the pipe reports
+        session.write(frame(Kind.BEAT))
         replied = any(kind is Kind.BEAT for kind, _ in frames.take(early))
         while not replied and (data := await session.read_some()):
             early += data

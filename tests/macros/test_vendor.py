@@ -35,6 +35,26 @@ def test_a_string_becomes_lines_and_pauses(text: str, lines: list[tuple[float, s
     assert steps(text) == lines
 
 
+def test_a_day_and_ten_thousand_lines_are_the_most() -> None:
+    assert steps("F2 ^d86400000H^M") == [(86400, "H")]
+    assert steps("F2 H^M^r10000") == [(0, "H")] * 10_000
+    assert steps("F2 H^M^r5000^r2") == [(0, "H")] * 10_000
+    for text, says in (
+        ("F2 ^d86400001H^M", "keys.txt:1:4: a pause of more than a day"),
+        ("F2 ^d86400000^mH^M", "keys.txt:1:14: a pause of more than a day"),
+        ("F2 ^d999999999H^M", "keys.txt:1:4: a pause of more than a day"),
+        ("F2 H^M^r10001", "keys.txt:1:7: ^r10001 makes more than 10000 lines"),
+        ("F2 H^M^r10000H^M", "keys.txt:1:1: more than 10000 lines"),
+    ):
+        with pytest.raises(Diagnostic) as caught:
+            steps(text)
+        assert str(caught.value).startswith(says)
+    day = Macro("f2", (Step(86400.0, "H"),))
+    assert exported([day]) == "F2 ^d86400000H^M\n"
+    with pytest.raises(Diagnostic, match="a pause of 86400 s has no counterpart"):
+        exported([Macro("f2", (Step(86400.001, "H"),))])
+
+
 def test_comments_blank_lines_and_keys() -> None:
     text = "; shuttle\r\nF2 MR 1^M ; there ; and back\r\n\n# old\nf12 H^M ;\nF13 PR P^M\n"
     assert imported(text, "keys.txt") == [
@@ -68,6 +88,7 @@ def test_a_stop_is_explained_in_the_note() -> None:
         ("F2 H^M^d99999999", "a pause of more than a day"),
         ("F2 H^M^d1234567890", "needs a number"),
         ("F2 ^M", "an empty line cannot be sent"),
+        ("F2 ^[ ^M", "keys.txt:1:7: an empty line cannot be sent"),
         ("F2 /stop^M", "/ at the beginning of a line would be multidrop's own"),
         ("F2 @b MR 1^M", "@ at the beginning"),
         ("F2 a\x1bb^M", "keys.txt:1: control character (U+001B)"),

@@ -18,31 +18,9 @@ from multidrop.transports import port_users, serial_pipe
 from multidrop.transports.port_users import holder, in_use, other, suspects, taker
 from multidrop.transports.serial_port import open_error, open_serial
 from tests.support.front_door import Command
+from tests.support.machine_files import Machine, hide
 
 PORT = "/dev/ttyUSB7"
-
-
-class Machine:
-    """The files of an imaginary machine."""
-
-    def __init__(self, root: Path) -> None:
-        self.root = root
-        for folder in ("proc", "run/lock", "var/lock/lockdev"):
-            (root / folder).mkdir(parents=True)
-
-    def process(self, pid: int, name: str, *files: str, line: str = "") -> Path:
-        """Start a process that has some files open."""
-        folder = self.root / "proc" / str(pid)
-        (folder / "fd").mkdir(parents=True)
-        (folder / "fdinfo").mkdir()
-        (folder / "comm").write_text(f"{name}\n")
-        (folder / "cmdline").write_bytes((line or name).replace(" ", "\0").encode() + b"\0")
-        for number, file in enumerate(files, 3):
-            (folder / "fd" / str(number)).symlink_to(file)
-        return folder
-
-    def lock(self, name: str, pid: str, folder: str = "run/lock") -> None:
-        (self.root / folder / name).write_text(pid)
 
 
 @pytest.fixture
@@ -94,18 +72,6 @@ def test_the_program_that_serves_a_pseudo_terminal_is_not_another_user_of_it(mac
     assert str(other("/dev/pts/7", machine.root)) == "screen (pid 41)"
 
 
-def hide(monkeypatch: pytest.MonkeyPatch, *pids: int) -> None:
-    """Make processes those of another account."""
-    every = Path.iterdir
-
-    def listed(path: Path) -> Iterator[Path]:
-        if path.name == "fd" and int(path.parent.name) in pids:
-            raise PermissionError(path)
-        return every(path)
-
-    monkeypatch.setattr(Path, "iterdir", listed)
-
-
 def test_services_are_suspected_only_where_nobody_may_look(machine: Machine, monkeypatch: pytest.MonkeyPatch) -> None:
     machine.process(50, "ModemManager")
     machine.process(51, "agetty", line="/sbin/agetty -o -p 115200 ttyUSB7 vt220")
@@ -144,7 +110,11 @@ def test_a_refusal_names_the_holder_or_the_suspects_or_a_command_that_names_it(
 def test_a_port_that_is_not_there_names_the_service_that_takes_adapters(machine: Machine) -> None:
     assert taker(machine.root) == ""
     machine.process(70, "brltty")
-    assert taker(machine.root).startswith("; brltty (pid 70) is running, and may have taken it: ")
+    machine.process(69, "gpsd")
+    assert taker(machine.root) == (
+        "; brltty (pid 70) is running, and may have taken it: it takes adapters for Braille displays: "
+        "`sudo systemctl stop brltty`"
+    )
 
 
 # On this machine
