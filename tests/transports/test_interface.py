@@ -148,11 +148,12 @@ class Port:
 @pytest.mark.fork
 @pytest.mark.virtual
 async def test_who_has_a_port_is_looked_up_when_asked_and_again_after_10_s(monkeypatch: pytest.MonkeyPatch) -> None:
-    machine, port, control = Machine(), Port(), object()
+    machine = Machine()
+    port: Any = Port()
+    control: Any = object()
     monkeypatch.setattr(here, "beside", machine.find)
     monkeypatch.setattr(here, "suspects", machine.suspect)
-    given: Any = (port, control)
-    pipe = SerialPipe(*given, other_user="minicom has it, too")
+    pipe = SerialPipe(port, control, "minicom has it, too")
     assert pipe.name == "/dev/ttyUSB0" and pipe.control is control
     assert pipe.limits == "minicom has it, too" and machine.looked == []
     assert (pipe.other_user(), pipe.suspects()) == ("", "perhaps ModemManager"), "minicom has gone"
@@ -172,8 +173,8 @@ async def test_either_question_looks(monkeypatch: pytest.MonkeyPatch, ask: str) 
     machine = Machine()
     monkeypatch.setattr(here, "beside", machine.find)
     monkeypatch.setattr(here, "suspects", machine.suspect)
-    given: Any = (Port(), None)
-    pipe = SerialPipe(*given, other_user="")
+    port: Any = Port()
+    pipe = SerialPipe(port, port, "")
     getattr(pipe, ask)()
     assert machine.looked == ["/dev/ttyUSB0"]
     await pipe.close()
