@@ -406,7 +406,7 @@ async def test_early_bytes_of_a_pipe_that_is_closed_first_are_not_delivered() ->
     other = Open(frame(Kind.DATA, b"early") + frame(Kind.LOST, b"the port is gone"))
     other.start()
     assert other.data == b"", "in a later turn"
-    await until(lambda: bool(other.losses))
+    assert await until(lambda: bool(other.losses)) < 0.1, "it does not wait for the end of the connection"
     assert other.data == b"early" and str(other.losses[0]) == "ssh://pc/dev/ttyS0 was lost: the port is gone"
     await each.close()
     await other.close()
@@ -452,4 +452,32 @@ async def test_closing_waits_until_the_frames_that_wait_have_left() -> None:
     loop.call_later(0.3, free)
     await each.pipe.close()
     assert taken > 4096 and 0.3 <= loop.time() - begin <= 1.01
+    await each.close()
+
+
+@pytest.mark.virtual
+@pytest.mark.parametrize(("reported", "closed"), [(0.3, 0.3), (5.0, 1.0)])
+async def test_closing_waits_for_the_port_to_send_but_no_longer_than_1_s(reported: float, closed: float) -> None:
+    each = Open()
+    each.start()
+    each.pipe.write(ESC)
+    loop = asyncio.get_running_loop()
+    begin = loop.time()
+    later = loop.call_later(reported, each.far.send, frame(Kind.DONE, (1).to_bytes(8)))
+    await each.pipe.close()
+    assert loop.time() - begin == pytest.approx(closed, abs=0.006)
+    later.cancel()
+    await each.close()
+
+
+@pytest.mark.virtual
+async def test_all_that_arrived_before_a_break_is_delivered() -> None:
+    each = Open()
+    each.start()
+    each.sent()
+    each.far.send(frame(Kind.DATA, bytes(4000)) * 3)
+    each.far.close()
+    each.pipe.write(b"x")
+    await until(lambda: bool(each.losses))
+    assert len(each.data) == 12000
     await each.close()
