@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import importlib.util
 import socket
+import sys
 from typing import Any
 
 import pytest
@@ -110,6 +112,17 @@ def test_what_the_system_holds_of_a_stream_is_counted_and_of_anything_else_is_no
             assert 1000 < transports.output_queue(near.fileno()) <= sent
     with open(tmp_path / "file", "wb") as file:
         assert transports.output_queue(file.fileno()) == 0
+
+
+def test_windows_needs_nothing_of_posix_for_the_interface(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in ("fcntl", "termios"):
+        monkeypatch.setitem(sys.modules, name, None)
+    monkeypatch.setattr(sys, "platform", "win32")
+    spec = importlib.util.spec_from_file_location("transports_of_windows", transports.__file__)
+    assert spec is not None and spec.loader is not None
+    made = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(made)
+    assert made.NotOpen.preemptible is False and not hasattr(made, "output_queue")
 
 
 # The pipe of a serial port

@@ -195,10 +195,13 @@ async def test_what_waits_is_dropped_and_no_room_is_watched_for_after_that(makes
     owner.end.full()
     owner.end.held = 5
     owner.pipe.write(b"abcde")
-    assert owner.pipe.discard(whole) == (5 if whole else 10) and owner.pipe.pending == 0
+    dropped = owner.pipe.discard(whole=True) if whole else owner.pipe.discard()
+    assert dropped == (5 if whole else 10) and owner.pipe.pending == 0
+    owner.end.room = 10
+    assert owner.pipe.write(b"ESC") and owner.end.taken == b"ESC", "a stop waits for no turn of the loop"
     owner.end.free()
     await asyncio.sleep(60)
-    assert owner.end.taken == b"" and owner.end.held == (5 if whole else 0)
+    assert owner.end.taken == b"ESC" and owner.end.held == (5 if whole else 0)
     owner.end.held = 0
     await owner.pipe.close()
 
@@ -290,11 +293,12 @@ async def test_closing_waits_for_what_has_not_left_but_no_longer_than_1_s(
             loop.call_later(leaves_after, owner.end.free)
         if not leaves_after:
             await asyncio.sleep(0.01)
-        begin = loop.time()
+        begin, descriptor = loop.time(), owner.end.fileno()
         closing = asyncio.create_task(owner.pipe.close())
         await asyncio.sleep(0)
         owner.end.far.send(b"too late")
         await closing
+        assert not loop.remove_reader(descriptor) and not loop.remove_writer(descriptor), "it watches nothing"
         assert loop.time() - begin == pytest.approx(closed_after, abs=0.006)
         assert owner.seen == [] and len(owner.end.closed_in) == 1
         assert where == "system" or owner.end.taken == (b"ESC" if leaves_after < 1 else b"")

@@ -173,15 +173,19 @@ async def test_what_was_read_is_delivered_in_order() -> None:
     async with opened() as (_, device, seen):
         device.give(b"ab", b"", b"cd")
         await until(lambda: b"".join(seen) == b"abcd")
+        assert b"" not in seen
 
 
 @pytest.mark.parametrize("error", [OSError(5, "gone"), None])
 async def test_a_break_of_the_reading_side_is_a_loss_and_nothing_is_written_after_it(error: OSError | None) -> None:
     async with opened() as (pipe, device, seen):
-        device.give(error)
-        await until(lambda: bool(seen))
-        [loss] = seen
-        assert isinstance(loss, TransportLost) and f"it broke: {error}" in str(loss)
+        device.give(b"ab", error, b"never read")
+        reader = running("held")["held reader"]
+        reader.join(5.0)  # the loop does nothing meanwhile
+        assert not reader.is_alive() and device.coming == [b"never read"]
+        await until(lambda: len(seen) == 2)
+        data, loss = seen
+        assert data == b"ab" and isinstance(loss, TransportLost) and f"it broke: {error}" in str(loss)
         assert not pipe.write(b"x") and pipe.discard() == 0
         assert not pipe.preempt(False, lambda dropped: b"!") and not pipe.follow(lambda waiting: b"!", key=True)
 
@@ -229,7 +233,7 @@ async def test_a_loss_gives_the_device_back_once_with_its_threads_at_their_end()
         device.begun()
         device.give(None)
         await until(lambda: "close" in device.ended)
-        assert device.beside == [] and device.written == [b"ab"], "what waits is dropped"
+        assert device.beside == [] and device.written == [b"ab"] and pipe.pending == 0, "what waits is dropped"
         assert [type(each) for each in seen] == [TransportLost]
     assert device.ended == ["cancel", "close"]
 
@@ -250,7 +254,8 @@ class Stuck(Held):
 
 @pytest.mark.virtual
 async def test_a_close_that_the_driver_holds_up_is_given_up_after_1_s_and_stays_known() -> None:
-    device = Stuck()
+    device, problems = Stuck(), list[object]()
+    asyncio.get_running_loop().set_exception_handler(lambda loop, context: problems.append(context))
     pipe = ThreadedPipe(device)
     begin = asyncio.get_running_loop().time()
     await pipe.close()
@@ -263,6 +268,7 @@ async def test_a_close_that_the_driver_holds_up_is_given_up_after_1_s_and_stays_
     assert "stuck" not in closing and device.ended == ["cancel", "close"]
     await asyncio.sleep(2)
     await pipe.close()
+    assert problems == []
 
 
 @pytest.mark.virtual

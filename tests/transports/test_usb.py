@@ -254,6 +254,16 @@ async def test_each_reply_of_a_stop_is_waited_for_and_one_too_many_is_not_counte
     assert carrier.sent[3:] == ["PX"] and host.heard == b"nobody asked\rOK\r7\r"
 
 
+async def test_a_key_that_is_the_first_of_all_waits_for_nothing_and_its_reply_is_flushed(carrier: Played) -> None:
+    host = await opened(carrier)
+    assert host.pipe.follow(lambda waiting: b"ABORT\r", key=True) and host.pipe.yielded()
+    carrier.end("ABORT")
+    host.pipe.write(b"PX\r")
+    assert carrier.sent == ["ABORT", "FLUSH"]
+    await asyncio.sleep(0)
+    assert carrier.sent == ["ABORT", "FLUSH", "PX"]
+
+
 @pytest.mark.parametrize("way", ["loop", "thread"])
 async def test_a_stop_drops_what_waits_and_the_begin_of_a_command(carrier: Played, way: str) -> None:
     host = await opened(carrier)
