@@ -169,6 +169,20 @@ async def test_a_stop_is_followed_by_its_pieces_and_a_key_counts_as_one_more() -
         assert device.written == [b"ab", b"!1", b"!2"]
 
 
+async def test_a_write_that_no_thread_has_taken_has_not_begun(monkeypatch: pytest.MonkeyPatch) -> None:
+    late: list[threading.Thread] = []
+    with monkeypatch.context() as patched:
+        patched.setattr(threading.Thread, "start", lambda thread: late.append(thread))
+        device = Held()
+        pipe = ThreadedPipe(device)
+    pipe.write(b"abcd")
+    assert pipe.discard(whole=True) == 4 and pipe.pending == 0
+    for each in late:
+        each.start()
+    await pipe.close()
+    assert device.written == []
+
+
 async def test_what_was_read_is_delivered_in_order() -> None:
     async with opened() as (_, device, seen):
         device.give(b"ab", b"", b"cd")
