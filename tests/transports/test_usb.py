@@ -30,6 +30,7 @@ class Played:
         """Transfers that have not ended."""
         self.gone = False
         self.closed = 0
+        self.halted = False
         self.helpful = True
         """Requests are confirmed by themselves."""
 
@@ -62,7 +63,7 @@ class Played:
             self.loop.call_soon_threadsafe(self.end, self.open[number], CANCELLED)
 
     def halt(self) -> None:
-        """Nothing more is reported."""
+        self.halted = True
 
     def close(self) -> None:
         self.closed += 1
@@ -367,6 +368,7 @@ async def test_a_controller_that_takes_nothing_is_lost(carrier: Played, what: st
     await asyncio.sleep(1.1 * LATE + REPLY)
     assert [str(each) for each in host.losses] == ["usb:2ED00@1-1 was lost: the controller takes nothing"]
     assert type(host.losses[0]) is TransportLost and carrier.closed == 1
+    assert carrier.halted and host.pipe.pending == 0
 
 
 @pytest.mark.parametrize(
@@ -398,10 +400,10 @@ async def test_closing_gives_the_last_stop_its_time(carrier: Played) -> None:
     host.pipe.write(b"ABORT\r")
     closing = asyncio.create_task(host.pipe.close())
     await asyncio.sleep(0.05)
-    assert carrier.closed == 0
+    assert carrier.closed == 0 and not carrier.halted
     carrier.reply("OK")
     await closing
-    assert carrier.closed == 1
+    assert carrier.closed == 1 and carrier.halted
 
 
 @pytest.mark.parametrize(
