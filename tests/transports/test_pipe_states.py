@@ -527,12 +527,20 @@ def test_the_clock_of_windows_loops_goes_on_with_a_finer_one_before_python_3_13(
         before = loop.time()
         assert running_loop() is loop
         now[0] += 2.5
-        assert running_loop() is loop, "asked again, it goes on"
+        clock = loop.time
+        assert running_loop() is loop and loop.time == clock, "asked again, it is the same"
         return loop.time() - before
 
     with asyncio.Runner() as runner:
         passed = runner.run(measured())
     assert (passed > 2) == finer and (not finer or passed == pytest.approx(2.5, abs=0.5))
+
+
+@pytest.mark.virtual
+async def test_a_loop_with_a_clock_of_its_own_keeps_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(here, "sys", SimpleNamespace(platform="win32", version_info=(3, 12)))
+    clock = asyncio.get_running_loop().time
+    assert running_loop().time == clock
 
 
 def test_with_the_finer_clock_no_timer_is_early(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import asyncio
+import errno
+import os
 import socket
 import threading
 from collections.abc import Callable
@@ -10,7 +12,7 @@ from typing import Any
 
 import pytest
 
-from multidrop.transports import TransportLost
+from multidrop.transports import TransportLost, relay_pipe
 from multidrop.transports.relay import CREDIT, Frames, Kind, frame
 from multidrop.transports.relay_pipe import RelayControl, RelayEndpoint, RelayPipe, SocketStream
 from tests.support.cases import for_each
@@ -360,9 +362,10 @@ async def test_a_discard_has_the_far_side_drop_unless_what_has_begun_is_to_leave
     each = Open()
     each.start()
     assert each.pipe.write(b"x" * 300) and each.pipe.pending == 44
-    assert each.pipe.discard(whole) == (0 if whole else 300) and each.pipe.pending == (44 if whole else 0)
-    dropped = [] if whole else [(Kind.DROP, b"")]
-    assert each.sent(Kind.BEAT) == [(Kind.DATA, b"x" * 256), *dropped]
+    dropped = each.pipe.discard(whole=True) if whole else each.pipe.discard()
+    assert dropped == (0 if whole else 300) and each.pipe.pending == (44 if whole else 0)
+    told = [] if whole else [(Kind.DROP, b"")]
+    assert each.sent(Kind.BEAT) == [(Kind.DATA, b"x" * 256), *told]
     await each.close()
     assert each.pipe.discard() == 0
 
@@ -387,6 +390,7 @@ async def test_what_follows_a_stop_needs_no_credit_and_nothing_to_send_asks_for_
     each = Open()
     each.start()
     each.pipe.write(b"x" * 256)
+    assert not each.pipe.follow(lambda waiting: b"y"), "no stop came"
     assert each.pipe.preempt(False, lambda dropped: ESC) and each.pipe.follow(lambda waiting: b"y" * 300)
     assert each.pipe.follow(lambda waiting: b"") and not each.pipe.follow(lambda waiting: None)
     assert each.pipe.follow(lambda waiting: b"K", key=True) and not each.pipe.yielded() and each.pipe.yielded()
@@ -417,6 +421,8 @@ async def test_early_bytes_of_a_pipe_that_is_closed_first_are_not_delivered() ->
 async def test_a_connection_that_cannot_be_written_to_is_a_loss(what: str) -> None:
     each = Open()
     each.start()
+    await asyncio.sleep(0.1)
+    each.sent()
     each.far.close()
     control = each.pipe.control
     assert control is not None
@@ -428,7 +434,8 @@ async def test_a_connection_that_cannot_be_written_to_is_a_loss(what: str) -> No
         changing = threading.Thread(target=lambda: pytest.raises(OSError, control.set_baud, 19200), daemon=True)
         changing.start()
     await until(lambda: bool(each.losses))
-    assert str(each.losses[0]).startswith("ssh://pc/dev/ttyS0 was lost: ")
+    why = str(each.losses[0]).removeprefix("ssh://pc/dev/ttyS0 was lost: ")
+    assert why == f"{os.strerror(errno.EPIPE)}; check the network and the other machine" or what == "setting", why
     assert not each.pipe.write(b"x")
     await each.close()
 
@@ -480,4 +487,36 @@ async def test_all_that_arrived_before_a_break_is_delivered() -> None:
     each.pipe.write(b"x")
     await until(lambda: bool(each.losses))
     assert len(each.data) == 12000
+    await each.close()
+
+
+@pytest.mark.virtual
+async def test_what_waits_for_its_credit_as_it_is_closed_leaves_with_the_report() -> None:
+    each = Open()
+    each.start()
+    each.pipe.write(b"x" * 300)
+    loop = asyncio.get_running_loop()
+    begin = loop.time()
+    for after, sent in ((0.3, 256), (0.5, 300)):
+        loop.call_later(after, each.far.send, frame(Kind.DONE, sent.to_bytes(8)))
+    await each.pipe.close()
+    assert loop.time() - begin == pytest.approx(0.5, abs=0.006)
+    assert each.sent(Kind.BEAT) == [(Kind.DATA, b"x" * 256), (Kind.DATA, b"x" * 44)]
+    await each.close()
+
+
+@pytest.mark.virtual
+async def test_no_setting_is_changed_while_it_is_closed(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(relay_pipe, "_PATIENCE", 0.0)
+    each = Open()
+    each.start()
+    each.pipe.write(ESC)
+    closing = asyncio.create_task(each.pipe.close())
+    await asyncio.sleep(0.1)
+    control = each.pipe.control
+    assert control is not None and not closing.done()
+    with pytest.raises(OSError, match="the far side does not reply"):
+        control.set_dtr(True)
+    await closing
+    assert each.sent() == [(Kind.BEAT, b""), (Kind.DATA, ESC)]
     await each.close()
