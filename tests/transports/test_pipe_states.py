@@ -121,18 +121,12 @@ async def owner() -> AsyncIterator[Owner]:
     await made.pipe.close()
 
 
-@pytest.fixture
-def makes() -> Any:
-    """Makes an owner in the loop of a test in virtual time."""
-    return Owner
-
-
 # What is read
 
 
 @pytest.mark.virtual
-async def test_only_what_arrived_is_delivered_and_a_read_in_vain_is_no_loss(makes: type[Owner]) -> None:
-    owner = makes()
+async def test_only_what_arrived_is_delivered_and_a_read_in_vain_is_no_loss() -> None:
+    owner = Owner()
     owner.end.before = [BlockingIOError(), InterruptedError(), b"", b"early"]
     owner.start()
     owner.end.far.send(b"abcdef")
@@ -146,8 +140,8 @@ async def test_only_what_arrived_is_delivered_and_a_read_in_vain_is_no_loss(make
 
 @pytest.mark.virtual
 @pytest.mark.parametrize("error", [OSError(5, "gone"), None])
-async def test_a_read_that_fails_or_ends_is_one_loss_with_its_reason(makes: type[Owner], error: OSError | None) -> None:
-    owner = makes()
+async def test_a_read_that_fails_or_ends_is_one_loss_with_its_reason(error: OSError | None) -> None:
+    owner = Owner()
     owner.end.before = [b"last", error, b"arrived before", error, b"never read"]
     owner.start()
     owner.end.far.send(b"!")
@@ -168,8 +162,8 @@ async def test_a_read_that_fails_or_ends_is_one_loss_with_its_reason(makes: type
 
 
 @pytest.mark.virtual
-async def test_what_the_system_does_not_take_waits_and_follows_in_order(makes: type[Owner]) -> None:
-    owner = makes()
+async def test_what_the_system_does_not_take_waits_and_follows_in_order() -> None:
+    owner = Owner()
     owner.start()
     owner.end.full()
     owner.end.room = 3
@@ -189,8 +183,8 @@ async def test_what_the_system_does_not_take_waits_and_follows_in_order(makes: t
 
 @pytest.mark.virtual
 @pytest.mark.parametrize("whole", [False, True])
-async def test_what_waits_is_dropped_and_no_room_is_watched_for_after_that(makes: type[Owner], whole: bool) -> None:
-    owner = makes()
+async def test_what_waits_is_dropped_and_no_room_is_watched_for_after_that(whole: bool) -> None:
+    owner = Owner()
     owner.start()
     owner.end.full()
     owner.end.held = 5
@@ -207,8 +201,8 @@ async def test_what_waits_is_dropped_and_no_room_is_watched_for_after_that(makes
 
 
 @pytest.mark.virtual
-async def test_a_write_that_breaks_the_pipe_tells_it_later_and_what_arrived_comes_first(makes: type[Owner]) -> None:
-    owner = makes()
+async def test_a_write_that_breaks_the_pipe_tells_it_later_and_what_arrived_comes_first() -> None:
+    owner = Owner()
     owner.start()
     owner.end.far.send(b"the end")
     owner.end.breaks = BrokenPipeError(32, "closed")
@@ -222,8 +216,8 @@ async def test_a_write_that_breaks_the_pipe_tells_it_later_and_what_arrived_come
 
 
 @pytest.mark.virtual
-async def test_of_a_flood_that_goes_on_in_spite_of_a_break_only_some_is_read(makes: type[Owner]) -> None:
-    owner = makes()
+async def test_of_a_flood_that_goes_on_in_spite_of_a_break_only_some_is_read() -> None:
+    owner = Owner()
     owner.start()
     owner.end.far.send(bytes(100 * SYSTEM))
     owner.end.breaks = BrokenPipeError(32, "closed")
@@ -234,8 +228,8 @@ async def test_of_a_flood_that_goes_on_in_spite_of_a_break_only_some_is_read(mak
 
 
 @pytest.mark.virtual
-async def test_the_first_reason_counts(makes: type[Owner]) -> None:
-    owner = makes()
+async def test_the_first_reason_counts() -> None:
+    owner = Owner()
     owner.start()
     owner.end.before = [OSError(5, "the second")]
     owner.end.breaks = BrokenPipeError(32, "the first")
@@ -250,8 +244,8 @@ async def test_the_first_reason_counts(makes: type[Owner]) -> None:
 
 
 @pytest.mark.virtual
-async def test_a_pipe_is_started_once_and_one_that_broke_before_tells_it_then(makes: type[Owner]) -> None:
-    owner = makes()
+async def test_a_pipe_is_started_once_and_one_that_broke_before_tells_it_then() -> None:
+    owner = Owner()
     owner.end.breaks = BrokenPipeError(32, "closed")
     owner.pipe.write(b"x")
     await asyncio.sleep(1)
@@ -265,8 +259,8 @@ async def test_a_pipe_is_started_once_and_one_that_broke_before_tells_it_then(ma
 
 
 @pytest.mark.virtual
-async def test_a_closed_pipe_delivers_and_tells_nothing(makes: type[Owner]) -> None:
-    owner = makes()
+async def test_a_closed_pipe_delivers_and_tells_nothing() -> None:
+    owner = Owner()
     await owner.pipe.close()
     owner.start()
     assert not owner.pipe.write(b"x") and owner.pipe.write(b"") and owner.pipe.discard() == 0
@@ -278,11 +272,11 @@ async def test_a_closed_pipe_delivers_and_tells_nothing(makes: type[Owner]) -> N
 @pytest.mark.virtual
 @pytest.mark.parametrize(("leaves_after", "closed_after"), [(0.0, 0.0), (0.3, 0.3), (0.95, 0.95), (5.0, 1.0)])
 async def test_closing_waits_for_what_has_not_left_but_no_longer_than_1_s(
-    makes: type[Owner], leaves_after: float, closed_after: float
+    leaves_after: float, closed_after: float
 ) -> None:
     loop = asyncio.get_running_loop()
     for where in ("here", "system"):
-        owner = makes()
+        owner = Owner()
         owner.start()
         if where == "system":
             owner.end.held = 5
@@ -305,8 +299,8 @@ async def test_closing_waits_for_what_has_not_left_but_no_longer_than_1_s(
 
 
 @pytest.mark.virtual
-async def test_a_break_while_it_is_closed_ends_the_wait_and_is_not_told(makes: type[Owner]) -> None:
-    owner = makes()
+async def test_a_break_while_it_is_closed_ends_the_wait_and_is_not_told() -> None:
+    owner = Owner()
     owner.start()
     owner.end.full()
     owner.pipe.write(b"ESC")
@@ -339,8 +333,8 @@ async def test_every_caller_waits_for_the_close_which_a_cancelled_one_does_not_e
 
 
 @pytest.mark.virtual
-async def test_a_stop_that_breaks_the_pipe_is_a_loss_and_a_broken_pipe_takes_none(makes: type[Owner]) -> None:
-    owner = makes()
+async def test_a_stop_that_breaks_the_pipe_is_a_loss_and_a_broken_pipe_takes_none() -> None:
+    owner = Owner()
     owner.start()
     asked: list[int] = []
 
@@ -360,8 +354,8 @@ async def test_a_stop_that_breaks_the_pipe_is_a_loss_and_a_broken_pipe_takes_non
 
 @pytest.mark.virtual
 @pytest.mark.parametrize("way", ["preempt", "follow"])
-async def test_the_loop_is_told_of_a_stop_that_cannot_be_written(makes: type[Owner], way: str) -> None:
-    owner = makes()
+async def test_the_loop_is_told_of_a_stop_that_cannot_be_written(way: str) -> None:
+    owner = Owner()
     owner.start()
     owner.end.breaks = BrokenPipeError(32, "closed")
     if way == "preempt":
@@ -376,8 +370,8 @@ async def test_the_loop_is_told_of_a_stop_that_cannot_be_written(makes: type[Own
 
 @pytest.mark.virtual
 @pytest.mark.parametrize("way", ["preempt", "follow"])
-async def test_a_stop_that_waits_leaves_when_there_is_room(makes: type[Owner], way: str) -> None:
-    owner = makes()
+async def test_a_stop_that_waits_leaves_when_there_is_room(way: str) -> None:
+    owner = Owner()
     owner.start()
     owner.end.full()
     owner.end.room = 1
@@ -395,8 +389,8 @@ async def test_a_stop_that_waits_leaves_when_there_is_room(makes: type[Owner], w
 
 
 @pytest.mark.virtual
-async def test_the_loop_writes_again_when_it_has_followed_every_stop_and_key(makes: type[Owner]) -> None:
-    owner = makes()
+async def test_the_loop_writes_again_when_it_has_followed_every_stop_and_key() -> None:
+    owner = Owner()
     pipe, noted = owner.pipe, list[bool]()
     owner.end.held = 5
     dropped: list[int] = []
