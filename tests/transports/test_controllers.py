@@ -108,6 +108,7 @@ def test_the_numbers_are_those_of_the_makers_driver_and_the_ends_those_of_linux(
     assert (performax.REQUEST_TYPE, performax.REQUEST) == (0x40, 0x02)
     assert {each.name: int(each) for each in Control} == {"FLUSH": 1, "OPEN": 2, "CLOSE": 4}
     assert (performax.CANCELLED, performax.STALLED, performax.GONE, performax.TIMEOUT) == (-104, -32, -19, -110)
+    assert (here.STATUS, here.OTHER) == ({-4: -19, -7: -110, -9: -32}, -5)
 
 
 def test_ports_are_listed_with_their_numbers(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -74,8 +74,15 @@ class Transfer:
         return self.actual
 
 
+class Context:
+    """The library's context."""
+
+    def __init__(self, bus: Bus) -> None:
+        self.handleEventsTimeout = bus.take_events
+
+
 class Bus:
-    """The library, its context, one device and its handle."""
+    """The library, one device and its handle."""
 
     USBError, USBErrorInterrupted = USBError, USBErrorInterrupted
     TRANSFER_COMPLETED, TRANSFER_CANCELLED, TRANSFER_STALL, TRANSFER_NO_DEVICE, TRANSFER_TIMED_OUT = range(5)
@@ -96,18 +103,19 @@ class Bus:
         self.ready = False
         """Requests end by themselves."""
         self.waits: list[float] = []
+        self.context = Context(self)
         self.polls = threading.Semaphore(0)
 
     @contextlib.contextmanager
-    def USBContext(self) -> Iterator[Bus]:
+    def USBContext(self) -> Iterator[Context]:
         if self.finds is not None:
             raise USBError(self.finds)
         try:
-            yield self
+            yield self.context
         finally:
             self.calls.append("context closed")
 
-    def handleEventsTimeout(self, seconds: float) -> None:
+    def take_events(self, seconds: float) -> None:
         self.waits.append(seconds)
         self.polls.acquire(timeout=0.001)
         if self.breaks:
@@ -145,7 +153,7 @@ def bus(monkeypatch: pytest.MonkeyPatch) -> Bus:
     made = Bus()
     found = type("Found", (), {"device": made, "url": "usb:00"})()
     monkeypatch.setattr(libusb, "library", lambda: made)
-    monkeypatch.setattr(libusb, "controllers", lambda usb1, context: [found] if usb1 is context is made else [])
+    monkeypatch.setattr(libusb, "controllers", lambda *given: [found] if given == (made, made.context) else [])
     monkeypatch.setattr(libusb, "chosen", lambda found, target: found[0] if target == "00" else None)
     monkeypatch.setattr(libusb, "refusal", lambda value, found: f"refused with {value}")
     return made
