@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import asyncio
 import errno
+import gc
 import os
 import socket
 import threading
+import weakref
 from collections.abc import Callable
 from typing import Any
 
@@ -520,3 +522,15 @@ async def test_no_setting_is_changed_while_it_is_closed(monkeypatch: pytest.Monk
     await closing
     assert each.sent() == [(Kind.BEAT, b""), (Kind.DATA, ESC)]
     await each.close()
+
+
+@pytest.mark.virtual
+async def test_the_loop_lets_go_of_a_closed_pipe() -> None:
+    each = Open()
+    each.start()
+    await each.close()
+    kept = weakref.ref(each.pipe)
+    del each
+    await asyncio.sleep(60)
+    gc.collect()
+    assert kept() is None

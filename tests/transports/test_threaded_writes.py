@@ -169,6 +169,21 @@ async def test_a_stop_is_followed_by_its_pieces_and_a_key_counts_as_one_more() -
         assert device.written == [b"ab", b"!1", b"!2"]
 
 
+async def test_a_piece_waits_until_the_device_has_it_and_no_longer() -> None:
+    async with opened() as (pipe, device, _):
+
+        def waiting() -> int:
+            numbers: list[int] = []
+            assert not pipe.follow(lambda number: numbers.append(number), key=True)
+            return numbers[0]
+
+        pipe.write(b"ab")
+        device.begun()
+        assert waiting() == 1
+        device.may.release()
+        await until(lambda: waiting() == 0, 5.0)
+
+
 async def test_a_write_that_no_thread_has_taken_has_not_begun(monkeypatch: pytest.MonkeyPatch) -> None:
     late: list[threading.Thread] = []
     with monkeypatch.context() as patched:
