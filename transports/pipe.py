@@ -283,7 +283,7 @@ class DescriptorPipe(Pipe):
     def _after_push(self, problem: OSError | None) -> None:
         if problem is not None:
             self._break(problem)
-        elif self._usable:
+        elif self._broken is None and self._released is None:  # also while it closes, which waits for what has not left
             self._watch_writable(self._wants_room())
 
     def _wants_room(self) -> bool:

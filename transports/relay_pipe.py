@@ -7,6 +7,7 @@ drop is followed by the stop whatever the credit, because the far side obeys the
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import socket
 import threading
 from collections import deque
@@ -147,7 +148,7 @@ class RelayEndpoint:
 
     def flush(self) -> None:
         """Write waiting frames until the system takes no more."""
-        try:
+        with contextlib.suppress(BlockingIOError, InterruptedError):
             while self._rest:
                 first = self._rest[0]
                 taken = self._connection.write(first)
@@ -155,8 +156,6 @@ class RelayEndpoint:
                     self._rest[0] = first[taken:]
                 else:
                     self._rest.popleft()
-        except (BlockingIOError, InterruptedError):
-            return
 
     def unsent(self) -> int:
         return max(0, self._sent - self._done)
@@ -219,7 +218,6 @@ class RelayPipe(DescriptorPipe):
         super().__init__(self._relay, RelayControl(self._relay, self._send_frame, baud))
         self._answered = self._missed = 0
         """Replies to signs of life by the last one, and signs of life in turn that had none."""
-        self._beat: asyncio.TimerHandle | None = None
         self._show_life()
 
     def _show_life(self) -> None:
@@ -231,7 +229,7 @@ class RelayPipe(DescriptorPipe):
         if self._missed >= MISSED:
             self._break(OSError(f"the far side has not replied for {MISSED * BEAT:g} s; check the network"))
             return
-        self._beat = self._loop.call_later(BEAT, self._show_life)
+        self._loop.call_later(BEAT, self._show_life)
         self._send_frame(frame(Kind.BEAT))
 
     def _send_frame(self, made: bytes) -> None:
@@ -274,7 +272,7 @@ class RelayPipe(DescriptorPipe):
         more = super()._read()
         if self._relay.over and self._usable:
             self._break(None)
-        if self._pending and self._usable:
+        if self._pending:  # also while it closes, which waits for what has not left
             self._send()
         return more
 
@@ -293,8 +291,6 @@ class RelayPipe(DescriptorPipe):
 
     def _halt(self) -> None:
         super()._halt()
-        if self._beat is not None:
-            self._beat.cancel()
         self._relay.end()
 
 

@@ -18,7 +18,7 @@ from dataclasses import dataclass
 from multidrop.transports import Unreachable
 from multidrop.transports.performax import IN, OUT, PACKET, PRODUCT, REQUEST, REQUEST_TYPE, VENDOR, Control
 from multidrop.transports.sockets import connected, explain, host_port
-from multidrop.transports.usb import Broken, Done
+from multidrop.transports.usb import Broken, Done, TransferFailed
 
 PORT = 3240
 VERSION = 0x0111
@@ -308,6 +308,6 @@ class UsbipCarrier:
                 await asyncio.sleep(0)  # a server that sends without a pause does not hold up the loop
             self._broken(None)
         except Malformed as error:
-            self._broken(OSError(errno.EPROTO, str(error)))
+            self._broken(TransferFailed(-errno.EPROTO, str(error)))
         except OSError as error:
             self._broken(error)

@@ -58,6 +58,7 @@ async def test_a_flood_is_not_read_ahead_of_a_loop_that_is_held_up_and_arrives_w
 
     pipe.start(data.extend, lost)
     assert not device.most.wait(0.1), "what the loop has not taken is bounded"
+    assert device.reads == 32 * 1024 // PIECE + 1, "the last one waits for room"
     await asyncio.wait_for(over.wait(), PATIENCE)
     assert data == b"".join(bytes([number]) * PIECE for number in range(1, MANY + 1))
     assert [str(each) for each in losses] == ["endless was lost: it ended"]

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import asyncio
+import errno
+import os
 import threading
+from collections.abc import Callable
 
 import pytest
 
@@ -11,6 +14,8 @@ from multidrop.base.errors import TransportLost
 from multidrop.transports import Undelivered, Unreachable
 from multidrop.transports.performax import CANCELLED, GONE, STALLED, Control
 from multidrop.transports.usb import LATE, REPLY, TAKEN, Broken, Done, TransferFailed, UsbPipe, open_usb
+from tests.support.cases import for_each
+from tests.support.until import until
 
 pytestmark = pytest.mark.virtual
 
@@ -26,6 +31,7 @@ class Played:
         """Transfers that have not ended."""
         self.gone = False
         self.closed = 0
+        self.halted = False
         self.helpful = True
         """Requests are confirmed by themselves."""
 
@@ -58,7 +64,7 @@ class Played:
             self.loop.call_soon_threadsafe(self.end, self.open[number], CANCELLED)
 
     def halt(self) -> None:
-        """Nothing more is reported."""
+        self.halted = True
 
     def close(self) -> None:
         self.closed += 1
@@ -189,9 +195,25 @@ async def test_a_stop_of_the_loop_waits_for_no_transfer_either(carrier: Played) 
     assert carrier.sent == ["X1000", "ABORT", "FLUSH", "PX"]  # X1000 may have a reply
 
 
-async def test_a_stop_that_is_not_taken_follows_a_flush_once_more_and_then_the_pipe_is_lost(carrier: Played) -> None:
+def by_the_loop(pipe: UsbPipe) -> None:
+    pipe.discard()
+    pipe.write(b"ABO")
+    pipe.write(b"RT\r")
+
+
+WAYS: dict[str, Callable[[UsbPipe], object]] = {
+    "loop": by_the_loop,
+    "thread": lambda pipe: pipe.preempt(False, lambda dropped: b"ABORT\r"),
+    "another": lambda pipe: pipe.follow(lambda waiting: b"ABORT\r", key=True),
+}
+
+
+@pytest.mark.parametrize("way", WAYS)
+async def test_a_stop_that_is_not_taken_follows_a_flush_once_more_and_then_the_pipe_is_lost(
+    carrier: Played, way: str
+) -> None:
     host = await opened(carrier)
-    host.pipe.preempt(False, lambda dropped: b"ABORT\r")
+    WAYS[way](host.pipe)
     await asyncio.sleep(0.9 * TAKEN)
     assert carrier.sent == ["ABORT"]
     await asyncio.sleep(0.2 * TAKEN)
@@ -200,6 +222,129 @@ async def test_a_stop_that_is_not_taken_follows_a_flush_once_more_and_then_the_p
     assert carrier.sent == ["ABORT", "FLUSH", "ABORT"]
     assert [type(each) for each in host.losses] == [Undelivered]
     assert str(host.losses[0]) == "usb:2ED00@1-1 was lost: the controller does not take the stop"
+
+
+async def test_of_a_stop_of_several_commands_all_are_sent_again_where_one_is_not_taken(carrier: Played) -> None:
+    host = await opened(carrier)
+    assert host.pipe.preempt(False, lambda dropped: f"ABORTX\r\rV{dropped}=1\r".encode())
+    assert carrier.sent == ["ABORTX", "V0=1"]
+    carrier.end("ABORTX")
+    await asyncio.sleep(1.5 * TAKEN)
+    assert carrier.sent[2:] == ["FLUSH", "ABORTX", "V0=1"]
+    carrier.end("ABORTX")
+    carrier.end("V0=1")
+    carrier.end("IN", 0, b"OK\0")
+    carrier.end("IN", 0, b"OK\0")
+    await asyncio.sleep(2 * LATE)
+    host.pipe.yielded()
+    host.pipe.write(b"PX\r")
+    assert carrier.sent[5:] == ["PX"] and host.losses == [] and host.heard == b"OK\rOK\r"
+
+
+async def test_each_reply_of_a_stop_is_waited_for_and_one_too_many_is_not_counted(carrier: Played) -> None:
+    host = await opened(carrier)
+    carrier.end("IN", 0, b"nobody asked\0")
+    host.pipe.preempt(False, lambda dropped: b"ABORTX\rABORTY\r")
+    host.pipe.yielded()
+    carrier.end("ABORTX")
+    carrier.end("ABORTY")
+    carrier.end("IN", 0, b"OK\0")
+    host.pipe.write(b"PX\r")
+    assert carrier.sent == ["ABORTX", "ABORTY", "FLUSH"], "a stop waits for no reply, and what it owes is flushed"
+    await asyncio.sleep(0)
+    carrier.reply("7")
+    assert carrier.sent[3:] == ["PX"] and host.heard == b"nobody asked\rOK\r7\r"
+
+
+async def test_a_key_that_is_the_first_of_all_waits_for_nothing_and_its_reply_is_flushed(carrier: Played) -> None:
+    host = await opened(carrier)
+    assert host.pipe.follow(lambda waiting: b"ABORT\r", key=True) and host.pipe.yielded()
+    carrier.end("ABORT")
+    host.pipe.write(b"PX\r")
+    assert carrier.sent == ["ABORT", "FLUSH"]
+    await asyncio.sleep(0)
+    assert carrier.sent == ["ABORT", "FLUSH", "PX"]
+
+
+@pytest.mark.parametrize("way", ["loop", "thread"])
+async def test_a_stop_drops_what_waits_and_the_begin_of_a_command(carrier: Played, way: str) -> None:
+    host = await opened(carrier)
+    assert host.pipe.write(b"X1\rX2\rV1=") and host.pipe.pending == 6
+    if way == "loop":
+        assert host.pipe.discard() == 0
+    else:
+        assert host.pipe.preempt(False, lambda dropped: b"") and host.pipe.yielded()
+    assert host.pipe.pending == 0
+    await asyncio.sleep(0)
+    host.pipe.write(b"PX\r")
+    await asyncio.sleep(0)
+    assert carrier.sent == ["X1", "FLUSH", "PX"] and "X1" not in carrier.open.values()
+    await asyncio.sleep(0.9 * LATE)
+    carrier.reply("7")
+    await asyncio.sleep(LATE)
+    assert host.losses == []
+
+
+async def test_only_what_is_written_in_the_same_turn_as_a_discard_is_a_stop(carrier: Played) -> None:
+    host = await opened(carrier)
+    host.pipe.discard()
+    await asyncio.sleep(0)
+    host.pipe.write(b"PX\rPY\r")
+    assert carrier.sent == ["PX"] and host.pipe.pending == 3
+
+
+async def test_what_follows_a_stop_leaves_at_once_and_a_key_counts_as_one_more(carrier: Played) -> None:
+    host = await opened(carrier)
+    pipe, noted, asked = host.pipe, list[bool](), list[int]()
+
+    def nothing(waiting: int) -> None:
+        asked.append(waiting)
+
+    assert not pipe.follow(lambda waiting: b"PX\r"), "no stop came"
+    assert pipe.preempt(False, lambda dropped: b"ABORT\r")
+    assert pipe.follow(lambda waiting: b"V1=1\rV2=2\r") and pipe.follow(lambda waiting: b"")
+    assert not pipe.follow(nothing) and not pipe.follow(nothing, key=True) and asked == [0, 0]
+    assert pipe.follow(lambda waiting: b"ABORT\r", key=True)
+    assert carrier.sent == ["ABORT", "V1=1", "V2=2", "ABORT"]
+    assert not pipe.yielded(noted.append) and not pipe.write(b"PX\r")
+    assert pipe.yielded(noted.append) and pipe.yielded(noted.append) and noted == [False, True, True]
+    assert not pipe.follow(lambda waiting: b"PX\r"), "the loop writes again"
+    assert pipe.preempt(False, lambda dropped: b"ABORT\r") and not pipe.write(b"PX\r") and pipe.yielded()
+    assert pipe.write(b"PX\r") and pipe.preemptible
+    carrier.gone = True
+    assert pipe.follow(lambda waiting: b"ABORT\r", key=True)
+    await until(lambda: bool(host.losses))
+    assert not pipe.follow(nothing, key=True) and asked == [0, 0]
+    assert [type(each) for each in host.losses] == [Undelivered]
+
+
+@pytest.mark.parametrize("delay", [0.0, 0.5])
+async def test_a_slow_way_gets_its_time_on_top(carrier: Played, delay: float) -> None:
+    """A reply has 250 ms, a stop 100 ms, a command and a request 1 s; what comes within 20 ms of a flush is old."""
+    carrier.delay = delay
+    opening = asyncio.create_task(open_usb(carrier))
+    assert await until(opening.done) == pytest.approx(0.02 + delay, abs=0.006)
+    host = Host(carrier, await opening)
+    host.pipe.write(b"PX\rPY\r")
+    carrier.end("PX")
+    assert await until(lambda: "FLUSH" in carrier.sent) == pytest.approx(0.25 + delay, abs=0.006)
+    carrier.reply("7")
+    host.pipe.preempt(False, lambda dropped: b"ABORT\r")
+    assert await until(lambda: carrier.sent.count("ABORT") == 2) == pytest.approx(0.1 + delay, abs=0.006)
+    assert await until(lambda: bool(host.losses)) == pytest.approx(0.1 + delay, abs=0.006)
+    assert [type(each) for each in host.losses] == [Undelivered]
+
+    slow = Played()
+    slow.delay = delay
+    host = Host(slow, await open_usb(slow))
+    host.pipe.write(b"PX\r")
+    assert await until(lambda: bool(host.losses)) == pytest.approx(1.0 + delay, abs=0.006)
+    deaf = Played()
+    deaf.delay, deaf.helpful = delay, False
+    opening = asyncio.create_task(open_usb(deaf))
+    assert await until(opening.done) == pytest.approx(1.0 + delay, abs=0.006)
+    assert isinstance(opening.exception(), Unreachable)
+    deaf.end("OPEN")  # too late: no one waits for it
 
 
 async def test_a_stop_that_is_taken_at_the_second_time_is_no_loss(carrier: Played) -> None:
@@ -214,15 +359,6 @@ async def test_a_stop_that_is_taken_at_the_second_time_is_no_loss(carrier: Playe
     assert carrier.sent[-2:] == ["ABORT", "PX"]
 
 
-async def test_a_slow_way_gets_its_time_on_top(carrier: Played) -> None:
-    carrier.delay = 0.5
-    host = await opened(carrier)
-    host.pipe.preempt(False, lambda dropped: b"ABORT\r")
-    await asyncio.sleep(0.5)
-    assert carrier.sent == ["ABORT"]
-    await host.pipe.close()
-
-
 @pytest.mark.parametrize("what", ["PX", "FLUSH"])
 async def test_a_controller_that_takes_nothing_is_lost(carrier: Played, what: str) -> None:
     host = await opened(carrier)
@@ -233,6 +369,7 @@ async def test_a_controller_that_takes_nothing_is_lost(carrier: Played, what: st
     await asyncio.sleep(1.1 * LATE + REPLY)
     assert [str(each) for each in host.losses] == ["usb:2ED00@1-1 was lost: the controller takes nothing"]
     assert type(host.losses[0]) is TransportLost and carrier.closed == 1
+    assert carrier.halted and host.pipe.pending == 0
 
 
 @pytest.mark.parametrize(
@@ -264,10 +401,10 @@ async def test_closing_gives_the_last_stop_its_time(carrier: Played) -> None:
     host.pipe.write(b"ABORT\r")
     closing = asyncio.create_task(host.pipe.close())
     await asyncio.sleep(0.05)
-    assert carrier.closed == 0
+    assert carrier.closed == 0 and not carrier.halted
     carrier.reply("OK")
     await closing
-    assert carrier.closed == 1
+    assert carrier.closed == 1 and carrier.halted
 
 
 @pytest.mark.parametrize(
@@ -282,3 +419,81 @@ async def test_a_device_that_takes_no_request_is_given_back(carrier: Played, sta
     with pytest.raises(Unreachable, match=f"^usb:2ED00@1-1: {why}"):
         await opening
     assert carrier.closed == 1
+
+
+@pytest.mark.parametrize("at", ["request", "wait"])
+async def test_a_device_that_vanishes_while_it_is_opened_is_given_back(carrier: Played, at: str) -> None:
+    carrier.helpful = at == "wait"
+    opening = asyncio.create_task(open_usb(carrier))
+    await asyncio.sleep(0.01)
+    carrier.helpful = True
+    carrier.broken(OSError(errno.ECONNRESET, "reset"))
+    with pytest.raises(Unreachable, match=r"^usb:2ED00@1-1 was lost: the other end cut the connection; check"):
+        await opening
+    assert carrier.closed == 1
+
+
+async def test_an_opening_that_is_cancelled_gives_the_device_back(carrier: Played) -> None:
+    opening = asyncio.create_task(open_usb(carrier))
+    await asyncio.sleep(0.01)
+    opening.cancel()
+    with pytest.raises(asyncio.CancelledError):
+        await opening
+    assert carrier.closed == 1
+
+
+@for_each(
+    ("status", "why"),
+    [
+        (GONE, "unplugged, or without power"),
+        (-108, "unplugged"),
+        (STALLED, "the controller refused a transfer"),
+        (-errno.EPROTO, f"a transfer failed ({os.strerror(errno.EPROTO)})"),
+    ],
+)
+def test_each_end_of_a_transfer_has_its_words_and_its_number(status: int, why: str) -> None:
+    failure = TransferFailed(status)
+    assert (failure.errno, failure.strerror) == (-status, why)
+    assert TransferFailed(status, "otherwise").strerror == "otherwise"
+
+
+@pytest.mark.parametrize("what", ["command", "wait for a reply", "flush"])
+async def test_a_transfer_that_cannot_begin_is_a_loss_of_the_device(carrier: Played, what: str) -> None:
+    host = await opened(carrier)
+    if what != "command":
+        host.pipe.write(b"PX\rPY\r")
+        carrier.end("PX")
+    carrier.gone = True
+    if what == "command":
+        host.pipe.write(b"PX\r")
+    elif what == "wait for a reply":
+        carrier.end("IN", 0, b"7\0")
+        assert host.heard == b"7\r"
+    await until(lambda: bool(host.losses))
+    assert type(host.losses[0]) is TransportLost
+    assert str(host.losses[0]) == "usb:2ED00@1-1 was lost: unplugged, or without power"
+
+
+async def test_closing_waits_for_the_commands_that_wait_and_is_no_loss(carrier: Played) -> None:
+    host = await opened(carrier)
+    host.pipe.write(b"PX\rPY\r")
+    carrier.end("PX")
+    closing = asyncio.create_task(host.pipe.close())
+    await until(lambda: carrier.sent == ["PX", "FLUSH", "PY"])
+    assert not closing.done()
+    assert host.pipe.write(b"") and not host.pipe.write(b"PZ\r")
+    assert not host.pipe.preempt(False, lambda dropped: b"ABORT\r")
+    carrier.end("PY")
+    await closing
+    await asyncio.sleep(2 * LATE)
+    assert carrier.closed == 1 and carrier.sent == ["PX", "FLUSH", "PY"] and host.losses == []
+
+
+async def test_what_ends_that_the_pipe_has_not_begun_means_nothing(carrier: Played) -> None:
+    host = await opened(carrier)
+    host.pipe.write(b"PX\rPY\r")
+    carrier.done(99, 0, b"12\0")
+    carrier.done(99, CANCELLED, b"")
+    assert host.heard == b"" and carrier.sent == ["PX"]
+    await host.pipe.close()
+    assert host.losses == []
