@@ -13,8 +13,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from multidrop.macros import atomic
-from multidrop.macros.atomic import (
+from multidrop.base import atomic
+from multidrop.base.atomic import (
     create_atomically,
     make_folder,
     open_private,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from multidrop.dialects.errors import Diagnostic
+from multidrop.base.errors import Diagnostic
 from multidrop.macros import (
     Macro,
     Parameter,

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from multidrop.dialects.errors import Diagnostic
+from multidrop.base.errors import Diagnostic
 from multidrop.macros import Macro, MacroStore, Step, format_macro, parse_macro
 from multidrop.macros.store import listed
 from multidrop.macros.toml_format import quoted, with_values

@@ -5,7 +5,8 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Callable
 
-from multidrop.transports import Lost, Received, Transport, TransportLost, telnet
+from multidrop.base.errors import TransportLost
+from multidrop.transports import Lost, Received, Transport, telnet
 from multidrop.transports.telnet import OPTION, REPLY, message, parsed
 
 

@@ -11,16 +11,8 @@ import pytest
 
 import multidrop
 from multidrop import transports
-from multidrop.transports import (
-    Lost,
-    NotOpen,
-    PortControl,
-    Received,
-    Transport,
-    TransportLost,
-    Undelivered,
-    Unreachable,
-)
+from multidrop.base.errors import TransportLost
+from multidrop.transports import Lost, NotOpen, PortControl, Received, Transport, Undelivered, Unreachable
 from multidrop.transports import serial_pipe as here
 from multidrop.transports.serial_pipe import SerialPipe
 from tests.support.until import until

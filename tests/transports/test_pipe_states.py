@@ -13,7 +13,8 @@ from typing import Any
 
 import pytest
 
-from multidrop.transports import Lost, TransportLost, Undelivered
+from multidrop.base.errors import TransportLost
+from multidrop.transports import Lost, Undelivered
 from multidrop.transports import pipe as here
 from multidrop.transports.pipe import DescriptorPipe, Pipe, begun, in_thread, running_loop
 from tests.support.until import PATIENCE, until

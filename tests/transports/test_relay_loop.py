@@ -14,7 +14,8 @@ from typing import Any
 
 import pytest
 
-from multidrop.transports import TransportLost, relay
+from multidrop.base.errors import TransportLost
+from multidrop.transports import relay
 from multidrop.transports.relay import CREDIT, GREETING, MOST, SILENCE, Frames, Garbled, Kind, Relay, frame, serve
 from tests.support.cases import for_each
 

@@ -14,7 +14,8 @@ from typing import Any
 
 import pytest
 
-from multidrop.transports import TransportLost, relay_pipe
+from multidrop.base.errors import TransportLost
+from multidrop.transports import relay_pipe
 from multidrop.transports.relay import CREDIT, Frames, Kind, frame
 from multidrop.transports.relay_pipe import RelayControl, RelayEndpoint, RelayPipe, SocketStream
 from tests.support.cases import for_each

@@ -7,7 +7,8 @@ from collections.abc import Callable
 
 import pytest
 
-from multidrop.transports import TransportLost, Unreachable, telnet
+from multidrop.base.errors import TransportLost
+from multidrop.transports import Unreachable, telnet
 from multidrop.transports.rfc2217 import Rfc2217Pipe, negotiated
 from multidrop.transports.telnet import OPTION, REPLY, Control, Setting, message
 from tests.support.server_2217 import Server

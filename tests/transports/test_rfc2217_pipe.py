@@ -8,7 +8,8 @@ from typing import Any
 
 import pytest
 
-from multidrop.transports import TransportLost, Unreachable, rfc2217, telnet
+from multidrop.base.errors import TransportLost
+from multidrop.transports import Unreachable, rfc2217, telnet
 from multidrop.transports.rfc2217 import Rfc2217Pipe, negotiated, open_rfc2217
 from multidrop.transports.telnet import OPTION, REPLY, Control, Setting, message
 from tests.support.cases import for_each

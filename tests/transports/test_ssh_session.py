@@ -13,7 +13,8 @@ from functools import partial
 
 import pytest
 
-from multidrop.transports import Transport, TransportLost, Unreachable, ssh_session
+from multidrop.base.errors import TransportLost
+from multidrop.transports import Transport, Unreachable, ssh_session
 from multidrop.transports.relay import Kind, frame
 from multidrop.transports.relay_pipe import SocketStream
 from multidrop.transports.ssh import FarPort, NotInstalled
