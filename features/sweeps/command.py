@@ -79,7 +79,7 @@ def run(chosen: argparse.Namespace) -> int:
 
 def _agree(address: str, yes: bool, what: str, interruption: Interruption) -> None:
     """Return once a person has agreed to a cluster: by `--yes`, now, or before. Raises Diagnostic."""
-    known = configuration.load().clusters
+    known = configuration.load().section("sweep")
     if yes or address in known:
         return
     import asyncio

@@ -232,20 +232,17 @@ def groups() -> dict[str, list[str]]:
 
 def load_others(own: bool = True) -> list[str]:
     """Load the features by others; return a warning for each that cannot be, or whose verb or command is taken."""
-    known = {feature.name for feature in registry.by_others()}
-    warnings = registry.load_others(own)
+    registry.load_others(own)
     taken = {*VERBS._sections, *COMMANDS._sections, *registry.words()}
     for feature in registry.by_others():
         adds = [each for each in feature.adds if isinstance(each, Operation)]
         words = [word for each in adds for word in (each.name, each.command) if word]
-        if feature.name in known:
-            taken.update(words)
-        elif wrong := next((word for word in words if word in taken or not _WORD.fullmatch(word)), ""):
+        if wrong := next((word for word in words if word in taken or not _WORD.fullmatch(word)), ""):
             why = f"{wrong} is taken" if wrong in taken else f"{wrong} is no name of a verb or a command"
-            warnings.append(registry.refuse(feature.name, why))
+            registry.refuse(feature.name, why)
         else:
             taken.update(words)
-    return warnings
+    return registry.warnings()
 
 
 def find(name: str) -> Operation:
