@@ -19,7 +19,7 @@ from tests.support.cell_session import ETHERNET, CellSession, bus, party, pmx
 from tests.support.mcode_drives import Witness
 from tests.support.until import until
 
-pytestmark = [pytest.mark.virtual, pytest.mark.slow]
+pytestmark = pytest.mark.virtual
 
 LINE = bus("line", party("a"), party("b"))
 PROGRAM = "".join(f"R1=R1+{number}\n" for number in range(40))
@@ -47,6 +47,7 @@ async def back(shop: CellSession, name: str = "line") -> float:
     return await until(lambda: not shop.session.buses[name].lost and not shop.session.reconnections.trying)
 
 
+@pytest.mark.slow
 async def test_a_bus_comes_back_as_it_was(shop: CellSession) -> None:
     line, drives = shop.session.buses["line"], dict(shop.session.buses["line"].drives)
     shop.session.select("b")
@@ -68,6 +69,7 @@ async def test_a_bus_comes_back_as_it_was(shop: CellSession) -> None:
     assert said[3:] == ["line: a is at rest at 0", "line: b is at rest at 0"]
 
 
+@pytest.mark.slow
 async def test_a_port_that_is_back_is_noticed_within_a_second_however_long_it_was_away(tmp_path: Path) -> None:
     async with opened(tmp_path, bus("line", ETHERNET)) as shop:
         for away in (0.01, 0.3, 5.0, 3000.0):
@@ -106,6 +108,7 @@ async def test_a_question_that_was_in_flight_leaves_nothing_open(shop: CellSessi
     assert "not known" not in str(failed.value) and b"\x1b" not in shop.written("line")
 
 
+@pytest.mark.slow
 async def test_a_download_ends_and_the_drive_is_put_right(tmp_path: Path, shop: CellSession) -> None:
     (tmp_path / "long.mxt").write_text(PROGRAM.join(("PG 1\n", "E\nPG\n")))
     device = shop.device("line:a")
@@ -315,6 +318,7 @@ async def test_another_drive_on_the_same_port_is_said_in_one_line(shop: CellSess
     assert "product LMDOM before, LMDCM now" in said
 
 
+@pytest.mark.slow
 async def test_a_silent_line_is_said_once_and_asked_until_a_drive_replies(shop: CellSession) -> None:
     await lost(shop)
     for name in "ab":
@@ -329,6 +333,7 @@ async def test_a_silent_line_is_said_once_and_asked_until_a_drive_replies(shop: 
     await shop.session.run("@a PR P")
 
 
+@pytest.mark.slow
 async def test_a_bus_that_never_comes_back_is_given_up_by_close(shop: CellSession) -> None:
     before = len(asyncio.all_tasks())
     await lost(shop)
@@ -341,6 +346,7 @@ async def test_a_bus_that_never_comes_back_is_given_up_by_close(shop: CellSessio
     assert not shop.told() and len(asyncio.all_tasks()) <= before
 
 
+@pytest.mark.slow
 async def test_plugged_out_and_in_ten_times_nothing_is_left_behind(shop: CellSession) -> None:
     line = shop.session.buses["line"]
     subscription = line.telemetry.subscribe(["a"], 0.1)
@@ -359,6 +365,7 @@ async def test_plugged_out_and_in_ten_times_nothing_is_left_behind(shop: CellSes
     assert len(shop.session.cells["line"]._listeners["line"]) == listeners
 
 
+@pytest.mark.slow
 async def test_several_buses_come_back_side_by_side(tmp_path: Path) -> None:
     module = 'personality = "TMCM"\nname = "1"'
     cell = [LINE, bus("eth", ETHERNET, baud=0), bus("pmx", pmx("00")), bus("tmcl", module)]
@@ -384,6 +391,7 @@ async def test_an_ethernet_drive_that_was_switched_off_comes_back_once_it_has_bo
         assert not shop.moving()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("polled", [False, True], ids=["quiet", "polled"])
 @pytest.mark.parametrize(
     ("saved", "changed"),
