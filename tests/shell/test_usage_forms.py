@@ -1,4 +1,4 @@
-"""What a line of usage allows: its forms, the words that may follow, the part that fits, and how many words it takes."""
+"""What a line of usage allows: its forms, the words that may follow, the part that fits, and how many it takes."""
 
 from __future__ import annotations
 
