@@ -13,13 +13,14 @@ from multidrop.shell.events import Phase, ProgramRead, ProgramSeen
 from multidrop.shell.program_listing import Listing, Sight
 from tests.support.cases import for_each
 
+PROGRAMS: Any = FAMILIES["mcode"].programs
 ROWS = tuple(Stored(at, text) for at, text in ((1, "LB G1"), (5, "MR 51200"), (12, "H"), (14, "MR -51200"), (21, "H"),
                                               (23, "BR G1"), (27, "E"), (100, "LB G2")))  # fmt: skip
 
 
 @pytest.fixture
 def listing(tmp_path: Path) -> Listing:
-    return Listing(tmp_path, FAMILIES["mcode"].programs, ROWS)
+    return Listing(tmp_path, PROGRAMS, ROWS)
 
 
 def test_a_line_holds_the_addresses_up_to_the_next_one(listing: Listing) -> None:
@@ -54,7 +55,7 @@ def test_around_no_line_there_is_nothing(listing: Listing, address: int | None) 
 
 
 def test_without_a_program_there_is_no_line(tmp_path: Path) -> None:
-    empty = Listing(tmp_path, FAMILIES["mcode"].programs)
+    empty = Listing(tmp_path, PROGRAMS)
     assert empty.lines == () and empty.around(5) == [] and empty.row(5) == Stored(5, "")
 
 

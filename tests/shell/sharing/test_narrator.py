@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import json
 import re
+import time
 from collections.abc import Callable
 
 import pytest
 
-from multidrop.shell.sharing import server
 from multidrop.shell.sharing.server import AGAIN, Narrator
 from multidrop.shell.sharing.writer_turns import Say
 
@@ -18,7 +18,7 @@ Shown = Callable[..., bool]
 @pytest.fixture
 def clock(monkeypatch: pytest.MonkeyPatch) -> list[float]:
     now = [100.0]
-    monkeypatch.setattr(server.time, "monotonic", lambda: now[0])
+    monkeypatch.setattr(time, "monotonic", lambda: now[0])
     return now
 
 
@@ -87,7 +87,7 @@ def test_for_a_person_it_is_a_line_with_its_time_on_standard_error(
 def test_for_a_program_every_event_is_an_object(
     clock: list[float], capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(server.time, "time", lambda: 5.12345)
+    monkeypatch.setattr(time, "time", lambda: 5.12345)
     narrator = Narrator(True)
     narrator.ready("press", "tcp://127.0.0.1:4000")
     for _ in range(2):
