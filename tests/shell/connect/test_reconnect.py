@@ -454,3 +454,15 @@ async def test_a_bus_that_is_lost_while_it_is_opened_is_not_tried_again(tmp_path
     with pytest.raises(Diagnostic):
         await shop.session.run("/close line")
     await shop.session.close()
+
+
+async def test_only_a_line_that_is_lost_and_tried_again_is_said_to_get_the_stop_later(tmp_path: Path) -> None:
+    async with opened(tmp_path, bus("line", party("a")), bus("other", party("b"))) as cell:
+        await lost(cell)
+        cell.session.stop()
+        later = [text for text in cell.warned() if "the first to be sent when" in text]
+        assert later == ["line: the stop is the first to be sent when the line is back"]
+    async with opened(tmp_path, bus("line", party("a")), reconnect=False) as cell:
+        await lost(cell)
+        cell.session.stop()
+        assert not any("the first to be sent when" in text for text in cell.warned())
