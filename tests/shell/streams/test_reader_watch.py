@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import os
 import signal
 import sys
@@ -142,3 +143,31 @@ def test_a_message_is_shortened_in_its_middle_only_where_it_is_too_long() -> Non
     text = "a" * LONGEST + "b"
     half = LONGEST // 2 - 20
     assert shortened(text) == f"{'a' * half} ... ({LONGEST + 1 - 2 * half} characters) ... {'a' * (half - 1)}b"
+
+
+class Screen(io.StringIO):
+    def isatty(self) -> bool:
+        return True
+
+
+def test_a_status_line_covers_the_one_before_and_leaves_nothing_behind(monkeypatch: pytest.MonkeyPatch) -> None:
+    screen = Screen()
+    monkeypatch.setattr(sys, "stderr", screen)
+    monkeypatch.setattr(stdout, "get_terminal_size", lambda: os.terminal_size((9, 3)))
+    line = stdout.StatusLine()
+    line.erase()
+    for text in ("1 of 3", "done", "much too long"):
+        line.show(text)
+    line.erase()
+    line.erase()
+    line.show("a\x1bb")
+    assert screen.getvalue() == "\r1 of 3\rdone  \rmuch too\r        \r\ra\\x1bb"
+
+
+def test_where_there_is_no_terminal_a_status_line_shows_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    plain = io.StringIO()
+    monkeypatch.setattr(sys, "stderr", plain)
+    line = stdout.StatusLine()
+    line.show("1 of 3")
+    line.erase()
+    assert plain.getvalue() == ""
