@@ -127,6 +127,23 @@ async def test_a_program_is_asked_for_again_after_each_start(shop: CellSession) 
         assert [each for each in await in_motion(shop.session) if each.startswith("press:b ")] == found
 
 
+async def test_beside_polls_that_read_no_programs_a_drive_at_rest_is_asked_for_its_program(shop: CellSession) -> None:
+    polls = shop.session.buses["press"].telemetry.subscribe(("a", "b"), 0.1)
+    await shop.session.run("@press:a SL 20000")
+    await asyncio.sleep(12)
+    shop.device("press:b").execute("EX Ga", shop.floor.now())  # as another host does it
+    await asyncio.sleep(0.5)
+    polls.close()
+    await asyncio.sleep(0.05)
+    shop.events.clear()
+    assert await in_motion(shop.session) == [
+        "press:a moves at 20000 a second",
+        "press:b runs a program, which may move it",
+    ]
+    asked = shop.written("press")
+    assert b"bPR" in asked and b"aPR" not in asked
+
+
 async def test_a_silent_drive_leaves_time_to_read_those_that_were_heard_last(tmp_path: Path) -> None:
     names = ("a", "b", "c")
     async with CellSession(tmp_path, bus("press", *(party(name, **SLOW) for name in names))) as shop:
@@ -184,3 +201,15 @@ async def test_of_an_outcome_that_was_judged_before_the_next_wait_says_the_same(
             shop.device("press:a").execute("MA 9000", shop.floor.now())
             await shop.session.run("/wait ended")
         assert shop.moving() == set()
+
+
+async def test_a_drive_that_would_store_the_question_ends_a_wait_before_it_begins_whatever_moves(
+    shop: CellSession,
+) -> None:
+    await shop.session.run("@press:a SL 20000")
+    await shop.session.run("@press:b PG 500")
+    shop.events.clear()
+    begun = shop.session.now()
+    with pytest.raises(DriveError, match="press:b is in program mode and would store the question"):
+        await shop.session.run("/wait stopped 5")
+    assert shop.session.now() == begun and shop.written("press") == b""
