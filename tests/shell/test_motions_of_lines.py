@@ -5,6 +5,8 @@ from __future__ import annotations
 import asyncio
 from collections.abc import AsyncIterator
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import pytest
 
@@ -142,6 +144,16 @@ async def test_beside_polls_that_read_no_programs_a_drive_at_rest_is_asked_for_i
     ]
     asked = shop.written("press")
     assert b"bPR" in asked and b"aPR" not in asked
+
+
+async def test_a_drive_that_read_velocity_0_once_and_cannot_be_asked_again_is_not_taken_for_at_rest() -> None:
+    once = SimpleNamespace(at=4.9, velocity=0, at_rest=lambda: False)
+    drive = SimpleNamespace(
+        seen=once, started_at=1.0, link=SimpleNamespace(away=None), programming=True, transferring=False
+    )
+    line = SimpleNamespace(all_drives=[drive], now=lambda: 5.0)
+    workspace: Any = SimpleNamespace(now=line.now, buses={"press": line}, display_name=lambda _: "a")
+    assert await in_motion(workspace) == ["a had velocity 0 once, but not twice at one position"]
 
 
 async def test_a_silent_drive_leaves_time_to_read_those_that_were_heard_last(tmp_path: Path) -> None:
