@@ -12,7 +12,7 @@ import pytest
 from multidrop.dialects import StopPiece
 from multidrop.drives import pacing
 from multidrop.shell.sharing.key_stop import AGAIN, KeyStop, pause
-from multidrop.shell.sharing.stop_bytes import StopBytes
+from multidrop.shell.sharing.stop_bytes import StopBytes, stop_bytes
 
 PIECES = (StopPiece(b"AAAA"), StopPiece(b"BB", 0.1), StopPiece(b"C", 0.5))
 STOP = StopBytes(re.compile(b"AAAA"), False, b"~\r", own=PIECES)
@@ -164,3 +164,23 @@ def test_what_was_begun_at_a_port_that_is_lost_is_forgotten(port: Port) -> None:
     port.key.forget()
     assert port.go_on(0.1) == -1.0 and port.written == [b"AAAA"]
     assert port.key.take() is None
+
+
+@pytest.mark.parametrize(
+    ("family", "drives", "party", "ends"),
+    [
+        ("", (), None, b"\r\n"),
+        ("", ("a",), None, b"\r\n"),
+        ("", ("a", "b"), None, b"\n"),
+        ("", ("a",), True, b"\n"),
+        ("", ("a",), False, b"\r"),
+        ("pmx", ("00",), None, b"\r"),
+        ("pmx", ("00",), True, b"\r"),
+        ("pmx", ("00", "01"), None, b"\r"),
+        ("tmcl", ("1",), None, b""),
+    ],
+)
+def test_the_byte_that_ends_a_line_is_that_of_its_language_and_mode(
+    family: str, drives: tuple[str, ...], party: bool | None, ends: bytes
+) -> None:
+    assert sorted(stop_bytes(family, drives, party).ends) == sorted(ends)
