@@ -22,7 +22,7 @@ from tests.support.cell_session import CellSession, bus, pmx
 from tests.support.until import until
 from tests.support.usb_stand_in import UsbFaults
 
-pytestmark = [pytest.mark.virtual, pytest.mark.slow]
+pytestmark = pytest.mark.virtual
 
 FAST = "[bus.drive.world.x]\nlimit_plus = 100000"
 CELL = bus("first", pmx("00", FAST)), bus("second", pmx("07"))
@@ -124,6 +124,7 @@ async def test_samples_of_both_axes_arrive(shop: CellSession) -> None:
     assert {each.axis for each in seen} == {"x", "y"} and any(each.velocity > 0 for each in seen if each.axis == "x")
 
 
+@pytest.mark.slow
 async def test_settings_go_into_a_file_and_back(shop: CellSession) -> None:
     await say(shop, "/params backup kept.toml first:", "@first: HSPD=9000", "@first: V40=6")
     assert len(await say(shop, "/params diff kept.toml first:")) == 2
