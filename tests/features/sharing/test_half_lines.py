@@ -12,12 +12,8 @@ from hypothesis import strategies as st
 
 from multidrop.dialects.tmcl.host import codec
 from multidrop.dialects.tmcl.manual import commands
-<<<<<<< HEAD:tests/features/sharing/test_half_lines.py
-from multidrop.features.sharing.writer_turns import SILENT
-=======
 from multidrop.features.sharing.stop_bytes import stop_bytes
 from multidrop.features.sharing.writer_turns import SILENT, Exchange, Say, Write
->>>>>>> sh:tests/features/sharing/test_half_lines.py
 from multidrop.simulator.lexium.ports.mcode import MCodePort
 from multidrop.simulator.lexium.ports.replies import checksum
 from multidrop.simulator.pmx.device import PmxPort
