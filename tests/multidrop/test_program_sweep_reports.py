@@ -137,13 +137,13 @@ def test_one_case_in_a_file_is_one(sweep: Sweep, tmp_path: Path) -> None:
 
 
 def test_simpler_worlds_are_looked_for_during_ten_seconds(sweep: Sweep, monkeypatch: pytest.MonkeyPatch) -> None:
-    clock = Clock(monkeypatch, 4.0)
+    clock = Clock(monkeypatch, 3.5)
     stalled = ("--vary", "b.stall_at=100000,110000", *LOADS, "--vary", "b.A=500000,900000")
     done = sweep(*stalled, "--jobs", "1")
-    assert clock.tries == [*range(1, 13), 1, 1, 1], "each takes 4 s, and the fourth would begin after 12 s"
+    assert clock.tries == [*range(1, 13), 1, 1, 1], "each takes 3.5 s, and the fourth would begin after 10.5 s"
     searches = [each for each in Shown.texts if "left" not in each]
     assert searches == ["12 of 12 cases failed; looking for the simplest worlds"] * 3
-    assert done.returncode == 1 and "12 cases, 12 failed, 48.0 s" in done.stdout
+    assert done.returncode == 1 and "12 cases, 12 failed, 42.0 s" in done.stdout
 
 
 def test_after_an_early_end_they_are_looked_for_during_one_second(
@@ -333,6 +333,15 @@ def test_a_picture_is_made_beside_json_too(sweep: Sweep, tmp_path: Path) -> None
         assert (refused.returncode, refused.stdout, refused.stderr) == (2, "", what)
     refused = sweep(*GRID, "--search", "b.load", "--svg", "one.svg")
     assert (refused.returncode, refused.stdout) == (2, "") and "shows two keys" in refused.stderr
+
+
+def test_a_report_replaces_only_a_report_of_its_kind(sweep: Sweep, tmp_path: Path) -> None:
+    for option, begin, kind in (("--svg", "<sv", "picture"), ("--junit", "<testsuit", "JUnit report")):
+        (tmp_path / "own").write_text(f"{begin}>")
+        done = sweep(*GRID, option, "own")
+        assert done == Done(2, "", f"own: exists already and is not a {kind}; name a new file for the report\n")
+        (tmp_path / "own").write_text(f"{begin}{'ge'[option == '--junit']}>")
+        assert sweep(*GRID, option, "own").returncode == 1 and (tmp_path / "own").stat().st_size > 100
 
 
 def fails_for(name: str) -> Callable[[Path, bytes], None]:
