@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import json
 import tomllib
 from pathlib import Path
@@ -9,6 +10,7 @@ from typing import Any
 
 import pytest
 
+from multidrop.shell.batch.replay import VirtualLoop
 from tests.support.cases import for_each
 from tests.support.cell_session import bus, drive, party, pmx
 from tests.support.front_door import Command, Done
@@ -36,7 +38,10 @@ URL = "sim:cell.toml"
 
 
 @pytest.fixture
-def run(multidrop: Command, tmp_path: Path) -> Command:
+def run(multidrop: Command, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Command:
+    """Run commands beside these files; time does not wait."""
+    runner = asyncio.Runner
+    monkeypatch.setattr(asyncio, "Runner", lambda **more: runner(**more | {"loop_factory": VirtualLoop}))
     for name, text in FILES.items():
         (tmp_path / name).write_text(text)
     return multidrop

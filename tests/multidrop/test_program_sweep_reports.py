@@ -336,11 +336,11 @@ def test_a_picture_is_made_beside_json_too(sweep: Sweep, tmp_path: Path) -> None
 
 
 def test_a_report_replaces_only_a_report_of_its_kind(sweep: Sweep, tmp_path: Path) -> None:
-    for option, begin, kind in (("--svg", "<sv", "picture"), ("--junit", "<testsuit", "JUnit report")):
-        (tmp_path / "own").write_text(f"{begin}>")
+    for option, sign, kind in (("--svg", "<svg", "picture"), ("--junit", "<testsuite", "JUnit report")):
+        (tmp_path / "own").write_text(f"{sign[:-1]}>")
         done = sweep(*GRID, option, "own")
         assert done == Done(2, "", f"own: exists already and is not a {kind}; name a new file for the report\n")
-        (tmp_path / "own").write_text(f"{begin}{'ge'[option == '--junit']}>")
+        (tmp_path / "own").write_text(sign)
         assert sweep(*GRID, option, "own").returncode == 1 and (tmp_path / "own").stat().st_size > 100
 
 
