@@ -11,7 +11,7 @@ import pytest
 from multidrop import AsyncDrive, AsyncSession, Diagnostic, Inexpressible, Refused, connect_async
 from multidrop.drives.events import Traffic
 from tests.support.cases import for_each
-from tests.support.cell_session import bus, drive, party, pmx
+from tests.support.cell_session import bus, drive, moves, party, pmx
 
 pytestmark = pytest.mark.virtual
 
@@ -45,6 +45,14 @@ class Asked:
 
 def axes(session: AsyncSession) -> dict[str, bool]:
     return {name: session.drive("pmx:00", name).referenced for name in ("", "x", "y", "X", "Y")}
+
+
+async def test_a_session_that_is_closed_lets_its_drives_go_on(session: AsyncSession) -> None:
+    cell: Any = next(iter(session._shell.cells.values()))
+    await session.drive("press:b").run_at(1000)
+    await session.close()
+    assert [each.spec.name for each in cell.floor.drives if moves(each.device, cell.now() + 1.0)] == ["b"]
+    assert repr(session) == "<multidrop: a closed session>"
 
 
 async def test_a_position_that_does_not_count_is_that_of_its_axis_and_of_the_drive(session: AsyncSession) -> None:
