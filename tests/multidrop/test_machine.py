@@ -215,7 +215,7 @@ class Terminal(io.StringIO):
         return True
 
 
-@pytest.mark.skipif(sys.platform == "win32", reason="there a console has facts of its own")
+@pytest.mark.fork  # a console of Windows has facts of its own
 def test_the_report_names_terminals_and_the_variables_that_matter() -> None:
     kept = {"TERM": "xterm", "NO_COLOR": "1", "SSH_CONNECTION": "1.2.3.4", "TMUX": "/tmp/x", "HOME": "/root"}
     kept |= {"COLUMNS": "100", "LINES": "30"}
