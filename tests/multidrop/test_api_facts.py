@@ -184,3 +184,23 @@ async def test_a_drive_without_errors_to_read_says_so(session: AsyncSession) -> 
             await call()
     a: AsyncDrive = session.drive("press:a")
     assert await a.error() is None and await a.read_error() is None
+
+
+async def test_a_backup_to_a_file_that_exists_asks_nothing(session: AsyncSession, tmp_path: Path) -> None:
+    a, asked = session.drive("press:a"), Asked(session, "press")
+    with pytest.raises(Diagnostic, match="exists already"):
+        await a.parameters.backup(str(tmp_path / "cell.toml"))
+    assert asked.since() == 0
+
+
+async def test_telemetry_reads_fifty_times_a_second_unless_it_is_told(session: AsyncSession) -> None:
+    read = session._shell.buses["press"].telemetry
+    begin: Any
+    for begin, rate in (
+        (session.drive("press:a").telemetry, 50),
+        (lambda: session.telemetry("press:a", rate=20), 20),
+        (lambda: session.telemetry("press:a"), 50),
+    ):
+        opened = begin()
+        assert read.period("a") == 1 / rate
+        opened.close()
