@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from multidrop.shell.batch.replay import VirtualLoop
+from multidrop.shell.batch.virtual_loop import VirtualLoop
 from tests.support.cases import for_each
 from tests.support.cell_session import bus, drive, party, pmx
 from tests.support.front_door import Command, Done

@@ -18,7 +18,7 @@ import pytest
 
 from multidrop.__main__ import main
 from multidrop.cli import parse
-from multidrop.shell.batch.replay import VirtualLoop
+from multidrop.shell.batch.virtual_loop import VirtualLoop
 from multidrop.transports.serial_ports import PortInfo
 from tests.support.cases import for_each
 from tests.support.cell_session import bus, party
@@ -216,8 +216,8 @@ def test_a_plant_is_a_screen_at_a_terminal_and_lines_elsewhere(
 ) -> None:
     with pytest.MonkeyPatch.context() as patched:
         shown, watched = Called(3), Called(4)
-        patched.setattr("multidrop.tui.plant.run", shown)
-        patched.setattr("multidrop.shell.publishing.watch.run", watched)
+        patched.setattr("multidrop.features.publishing.screen.run", shown)
+        patched.setattr("multidrop.features.publishing.watch.run", watched)
         done = person("plant", "mqtt://h/plant", *words, closed=[closed] if closed else [])
     assert done.returncode == (3 if screen else 4)
     assert shown.calls == ([("mqtt://h/plant",)] if screen else [])
@@ -342,7 +342,7 @@ def test_the_language_server_gets_its_arguments_and_a_person_is_told(
 ) -> None:
     with pytest.MonkeyPatch.context() as patched:
         served = Called(1)
-        patched.setattr("multidrop.lsp.serving.serve", served)
+        patched.setattr("multidrop.features.lsp.serving.serve", served)
         assert person("lsp", *words, closed=closed) == Done(1, "", said) and served.calls == [given]
 
 
@@ -353,14 +353,14 @@ class Without:
         self._missing = missing
 
     def find_spec(self, name: str, *_: object) -> None:
-        if name == "multidrop.lsp.serving":
+        if name == "multidrop.features.lsp.serving":
             raise ModuleNotFoundError(f"No module named {self._missing!r}", name=self._missing)
 
 
 @for_each("missing, hint", [("pygls", True), ("pygls.server", True), ("lsprotocol", True), ("attrs", False)])
 def test_a_language_server_without_its_library_names_the_extra(person: Person, missing: str, hint: bool) -> None:
     with pytest.MonkeyPatch.context() as patched:
-        patched.delitem(sys.modules, "multidrop.lsp.serving", raising=False)
+        patched.delitem(sys.modules, "multidrop.features.lsp.serving", raising=False)
         patched.setattr(sys, "meta_path", [Without(missing), *sys.meta_path])
         if not hint:
             with pytest.raises(ModuleNotFoundError, match="attrs"):

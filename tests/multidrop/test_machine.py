@@ -14,9 +14,9 @@ from unittest import mock
 import pytest
 
 import multidrop as package
+from multidrop.base.errors import Diagnostic
 from multidrop.commands import machine
 from multidrop.commands.machine import SECTIONS, not_in_force, shown
-from multidrop.dialects import Diagnostic
 from multidrop.dialects.units import scale
 from multidrop.shell.configuration import Guarding, SavedConnection, Settings
 from multidrop.transports.serial_ports import PortInfo

@@ -17,7 +17,7 @@ from unittest import mock
 import pytest
 
 from multidrop.__main__ import main
-from multidrop.shell.batch.replay import VirtualLoop
+from multidrop.shell.batch.virtual_loop import VirtualLoop
 from tests.support.cases import for_each
 from tests.support.cell_session import bus, party
 from tests.support.front_door import Command, Done

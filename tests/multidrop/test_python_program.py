@@ -18,7 +18,7 @@ import pytest
 from multidrop import script
 from multidrop.api import threads
 from multidrop.commands import python_program
-from multidrop.shell.batch.replay import VirtualLoop
+from multidrop.shell.batch.virtual_loop import VirtualLoop
 from tests.support.cases import for_each
 from tests.support.cell_session import bus, party
 from tests.support.front_door import Command, Done

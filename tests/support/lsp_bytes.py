@@ -7,8 +7,8 @@ import json
 import re
 from typing import Any
 
-from multidrop.lsp import serving
-from multidrop.lsp.server import Server
+from multidrop.features.lsp import serving
+from multidrop.features.lsp.server import Server
 from tests.support.until import PATIENCE
 
 URI = "file:///a.mxt"

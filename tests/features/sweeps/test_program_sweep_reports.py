@@ -16,13 +16,12 @@ from xml.etree import ElementTree
 import pytest
 
 from multidrop.__main__ import main
-from multidrop.commands import sweep as command
-from multidrop.dialects import Diagnostic
+from multidrop.base.errors import Diagnostic, TransportLost
+from multidrop.features.sweeps import command as command
+from multidrop.features.sweeps import trial, workers
+from multidrop.features.sweeps.trial import Case, Job, Result
 from multidrop.shell import configuration
 from multidrop.shell.prompt import terminal_input
-from multidrop.shell.sweeps import trial, workers
-from multidrop.shell.sweeps.trial import Case, Job, Result
-from multidrop.transports import TransportLost
 from tests.support.cases import for_each
 from tests.support.cell_session import bus, drive
 from tests.support.front_door import Command, Done

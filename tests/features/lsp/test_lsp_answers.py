@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from multidrop.lsp.replies import LEGEND
+from multidrop.features.lsp.replies import LEGEND
 from tests.support.lsp_bytes import URI, Client, message
 
 TEXT = "pg 1\nlb g1\nmr 5\nh\ne\npg\n"
