@@ -83,7 +83,7 @@ def test_one_that_cannot_be_loaded_is_one_warning_and_the_others_are_there(own: 
     assert state("bad")[1].startswith(f"cannot be loaded: {why}")
 
 
-@pytest.mark.skipif(os.name != "posix", reason="folders of others are a matter of POSIX")
+@pytest.mark.fork
 def test_a_file_that_others_can_change_is_not_used(own: Path) -> None:
     write(own, "clamp").chmod(0o666)
     registry.load_others()

@@ -73,20 +73,21 @@ def person(tmp_path: Path) -> Person:
 
 
 @for_each("words, given", [
-    ([], ([], True, False, False, False)),
-    (["demo"], (["sim:"], True, False, False, False)),
-    (["tui"], ([], True, False, False, False)),
-    (["tui", "a", "b"], (["a", "b"], True, False, False, False)),
-    (["tui", "a", "--no-reconnect"], (["a"], False, False, False, False)),
-    (["tui", "a", "--raw"], (["a"], True, True, False, False)),
-    (["tui", "a", "--twin"], (["a"], True, False, True, False)),
-    (["tui", "a", "--share"], (["a"], True, False, False, True)),
+    ([], ([], True, False, False)),
+    (["demo"], (["sim:"], True, False, False)),
+    (["tui"], ([], True, False, False)),
+    (["tui", "a", "b"], (["a", "b"], True, False, False)),
+    (["tui", "a", "--no-reconnect"], (["a"], False, False, False)),
+    (["tui", "a", "--raw"], (["a"], True, True, False)),
+    (["tui", "a", "--share"], (["a"], True, False, True)),
 ])  # fmt: skip
 def test_the_screen_gets_urls_and_options(person: Person, words: list[str], given: tuple[Any, ...]) -> None:
     with pytest.MonkeyPatch.context() as patched:
         screen = Called(7)
         patched.setattr("multidrop.tui.launch.run", screen)
-        assert person(*words) == Done(7, "", "") and screen.calls == [given]
+        assert person(*words) == Done(7, "", "")
+    [(*urls_and_more, prepare, share)] = screen.calls
+    assert (*urls_and_more, share) == given and callable(prepare)
 
 
 @for_each("closed", ["stdin", "stdout"])
@@ -115,15 +116,15 @@ def test_a_watcher_joins_one_screen_and_opens_nothing(person: Person, monkeypatc
     (["--yes"], {"agreed": True}),
     (["--beyond"], {"beyond": True}),
     (["--raw"], {"raw": True}),
-    (["--twin"], {"twin": True}),
 ])  # fmt: skip
 def test_the_prompt_gets_urls_and_options(person: Person, words: list[str], given: dict[str, bool]) -> None:
     with pytest.MonkeyPatch.context() as patched:
         prompt = Called(6)
         patched.setattr("multidrop.shell.prompt.prompt.run", prompt)
         assert person("shell", "a", "b", *words).returncode == 6
-    usual = {"reconnect": True, "agreed": False, "beyond": False, "raw": False, "twin": False}
-    assert prompt.calls == [(["a", "b"], usual | given)]
+    usual = {"reconnect": True, "agreed": False, "beyond": False, "raw": False}
+    [(urls, named)] = prompt.calls
+    assert callable(named.pop("prepare")) and (urls, named) == (["a", "b"], usual | given)
 
 
 @pytest.fixture
@@ -173,13 +174,6 @@ def test_options_of_the_prompt_count_for_lines_from_a_file(piped: Callable[..., 
      ("a", ["b", "c"], {"to": "x.csv", "serve": None, "rate": "2", "reconnect": True})),
     (["plot", "a", "--to", "x.csv", "--drive", "b", "--drive", "all"], "plots.command.run",
      ("a", [], {"to": "x.csv", "serve": None, "rate": "50", "reconnect": True})),
-    (["share", "a", "--rfc2217", "5000"], "sharing.server.run", ("a", "5000", {"as_json": False})),
-    (["share", "a", "--rfc2217", "h:5000", "--json"], "sharing.server.run", ("a", "h:5000", {"as_json": True})),
-    (["publish", "a", "b", "--to", "mqtt://h/p"], "publishing.command.run",
-     (["a", "b"], {"to": ["mqtt://h/p"], "rate": "2", "home_assistant": False, "reconnect": True})),
-    (["publish", "a", "--to", "mqtt://h/p", "--rate", "5", "--home-assistant", "--no-reconnect"],
-     "publishing.command.run",
-     (["a"], {"to": ["mqtt://h/p"], "rate": "5", "home_assistant": True, "reconnect": False})),
 ])  # fmt: skip
 def test_what_serves_gets_its_arguments(
     multidrop: Command, words: list[str], place: str, given: tuple[Any, ...]

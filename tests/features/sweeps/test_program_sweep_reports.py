@@ -278,7 +278,7 @@ def test_a_cluster_needs_a_yes_which_is_kept(
             again = sweep(*LOADS, "--cluster", "tcp://h:1")
             assert (again.returncode, again.stderr, len(asked)) == (0, "", 1), "it is known from now on"
             with mock.patch.dict(os.environ, MULTIDROP_CONFIG_DIR=str(tmp_path / "conf")):
-                assert configuration.load().clusters == ("tcp://other:2", "tcp://h:1")
+                assert configuration.load().section("sweep") == ("tcp://other:2", "tcp://h:1")
 
 
 # Colours
