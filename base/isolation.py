@@ -34,10 +34,6 @@ class isolated:  # noqa: N801
         if not isinstance(failure, TransportLost | OSError):  # a defect, of whatever kind
             text = f"a defect: {type(failure).__name__}"
             LOG.error("%s failed", self._what, exc_info=failure)
-        self.tell(text)
-        return True
-
-    def tell(self, text: str) -> None:
-        """Add a text to `failed`, if somebody wants it."""
         if self._failed is not None:
             self._failed.append(text)
+        return True

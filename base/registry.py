@@ -12,21 +12,17 @@ loaded is a warning, and the rest works.
 from __future__ import annotations
 
 import importlib
-import importlib.util
 import os
 import sys
 from collections.abc import Iterator
 from contextlib import suppress
 from functools import cache
-from pathlib import Path
 from types import TracebackType
 from typing import Any, NamedTuple, TypeVar
 
 from multidrop.base.errors import Diagnostic
-from multidrop.base.feature import Feature
-from multidrop.base.isolation import isolated
+from multidrop.base.feature import NAME, Feature
 from multidrop.base.on_demand import importing
-from multidrop.base.places import config_folder, state_folder
 
 T = TypeVar("T")
 GROUP = "multidrop.features"
@@ -76,15 +72,22 @@ _others: dict[str, tuple[Entry, Feature]] = {}
 """The features by others that are loaded, by their places."""
 
 
-class Attempt(isolated):
-    """A call of what others wrote, which may raise anything: an exit, too, ends only the call. Nothing is logged."""
+class Attempt:
+    """A call of what others wrote, which may raise anything: an exit, too, ends only the call. `failed` gets a text."""
+
+    def __init__(self, failed: list[str]) -> None:
+        self._failed = failed
+
+    def __enter__(self) -> None:
+        return None
 
     def __exit__(
         self, kind: type[BaseException] | None, failure: BaseException | None, _: TracebackType | None
     ) -> bool:
         if not isinstance(failure, Exception | SystemExit):
             return False
-        self.tell(str(failure) if isinstance(failure, Diagnostic) else f"{type(failure).__name__}: {failure}")
+        text = str(failure) if isinstance(failure, Diagnostic) else f"{type(failure).__name__}: {failure}"
+        self._failed.append(text)
         return True
 
 
@@ -132,9 +135,10 @@ def entries(own: bool = True) -> list[Entry]:
 
 
 def _of_packages() -> Iterator[Entry]:
-    from multidrop.base.store import Store, digest
+    from multidrop.base.places import state_folder
+    from multidrop.base.store import Store
 
-    store, environment = Store(state_folder()), digest(_environment(), 32)
+    store, environment = Store(state_folder()), _environment()
     kept = store.find(KEPT, _parse_kept)
     if kept is None or kept[0] != environment:
         kept = environment, sorted(_read_entry_points())
@@ -165,6 +169,8 @@ def _environment() -> str:
 
 
 def _own() -> Iterator[Entry]:
+    from multidrop.base.places import config_folder
+
     with suppress(OSError):
         for path in sorted((config_folder() / "features").glob("*.py")):
             yield Entry(path.stem, str(path), "", str(path))
@@ -175,7 +181,7 @@ def load_others(own: bool = True) -> None:
     for entry in entries(own):
         if entry.place not in _others and entry.place not in _failed:
             why: list[str] = []
-            with Attempt(entry.name, why):
+            with Attempt(why):
                 _others[entry.place] = entry, _loaded(entry)
             if why:
                 _failed[entry.place] = failed = Failed(entry, why[0])
@@ -201,11 +207,11 @@ def _loaded(entry: Entry) -> Feature:
     """Import a feature by others. Raises anything."""
     if entry.name in IN_WHEEL or entry.name in (known.name for known, _ in _others.values()):
         raise Diagnostic("another feature has this name")
-    found = _of_file(Path(entry.place)) if entry.place == entry.source else _of_place(entry.place)
+    found = _of_file(entry.place) if entry.place == entry.source else _of_place(entry.place)
     if not isinstance(found, Feature):
         raise TypeError(f"{RECORD} is no multidrop.base.feature.Feature")
-    if found.name != entry.name:
-        raise Diagnostic(f"its record has the name {found.name}")
+    if found.name != entry.name or not NAME.fullmatch(found.name):
+        raise Diagnostic(f"its record has the name {found.name}; a name is a Python word in small letters")
     return found
 
 
@@ -214,15 +220,19 @@ def _of_place(place: str) -> Any:
     return getattr(importlib.import_module(module), attribute or RECORD)
 
 
-def _of_file(path: Path) -> Any:
+def _of_file(place: str) -> Any:
+    from importlib import util
+    from pathlib import Path
+
     from multidrop.base.file_owners import other_writer
 
+    path = Path(place)
     if writer := other_writer(path):
         raise Diagnostic(f"can be changed by {writer}, so it is not used")
-    spec = importlib.util.spec_from_file_location(f"multidrop_own_{path.stem}", path)
+    spec = util.spec_from_file_location(f"multidrop_own_{path.stem}", path)
     if spec is None or spec.loader is None:
         raise ImportError("it is no module")
-    module = importlib.util.module_from_spec(spec)
+    module = util.module_from_spec(spec)
     sys.modules[spec.name] = module
     spec.loader.exec_module(module)
     return getattr(module, RECORD)

@@ -24,7 +24,7 @@ def nothing(session: Session) -> None:
 class AtSession(NamedTuple):
     """What is done as a session begins, before anything is open: subscribe to its events (`Session.subscribe`).
 
-    `Session.keep` keeps an object for as long as the session lives, and `Session.part` finds it.
+    `shell.session_hooks.SessionHooks`, the session's `hooks`, has lists of functions that take a line.
     """
 
     begin: Callable[[Session], None]
@@ -58,7 +58,7 @@ def begin(session: Session, own: bool) -> list[str]:
         for each in feature.adds:
             if isinstance(each, AtSession):
                 why: list[str] = []
-                with registry.Attempt(feature.name, why):
+                with registry.Attempt(why):
                     each.begin(session)
                 warnings += [f"the feature {feature.name} cannot begin: {text}" for text in why]
     return warnings

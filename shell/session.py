@@ -114,12 +114,6 @@ class Session(Workspace):
         for text in hooks.begin(self, own=not IGNORED.get()):
             asyncio.get_running_loop().call_soon(partial(self.notify, text, warning=True))
 
-    def in_units(self, drive: Drive, axis: str, steps: int) -> str:
-        """A distance of an axis of a drive in its unit, as in `0.5 mm`; empty where the axis has no scale."""
-        if not self.scaled:
-            return ""
-        return str(imported("multidrop.shell.setting_units:apart")(self.units, drive, axis, steps)).strip(" ()")
-
     # Buses
 
     async def open(self, url: str, name: str | None = None, *, raw: bool = False) -> list[Bus]:

@@ -8,6 +8,7 @@ from multidrop.dialects.units import Takes
 
 if TYPE_CHECKING:
     from multidrop.drives.drive import Drive
+    from multidrop.shell.session import Session
     from multidrop.shell.units import Units
 
 
@@ -39,6 +40,6 @@ def example(units: Units, drive: Drive, name: str) -> str:
     return f"{found[1].value}, as in {{12.5 {unit}}}; 1 {unit} is {one} ({axis.scale}){'' if axis.sure else '?'}"
 
 
-def apart(units: Units, drive: Drive, axis: str, steps: int) -> str:
-    """A distance of an axis in its unit, ` (0.5 mm)`; empty where it has no scale."""
-    return units.words(drive, axis, steps, Takes.DISTANCE)
+def distance(session: Session, drive: Drive, axis: str, steps: int) -> str:
+    """A distance of an axis of a drive in its unit, as in `0.5 mm`; empty where the axis has no scale."""
+    return session.units.words(drive, axis, steps, Takes.DISTANCE).strip(" ()") if session.scaled else ""

@@ -13,7 +13,7 @@ import re
 from collections.abc import Awaitable, Callable
 from dataclasses import dataclass, field
 from functools import partial
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING
 
 from multidrop.base.errors import Diagnostic, NoAnswer
 from multidrop.base.isolation import isolated
@@ -28,6 +28,7 @@ from multidrop.shell.events import Failed, Notified, OnBus, Printed, StateChange
 from multidrop.shell.line_syntax import EVERYONE, Place, join_target
 from multidrop.shell.playing import Playing, played_by
 from multidrop.shell.remembered import KnownNames, Lately, Observing
+from multidrop.shell.session_hooks import SessionHooks
 
 if TYPE_CHECKING:
     from multidrop.drives.bus import Bus
@@ -42,9 +43,6 @@ if TYPE_CHECKING:
 
 LATCHED = "stopped; /resume lets macros and scripts run again"
 """The refusal of automation after a stop."""
-
-
-P = TypeVar("P")
 
 
 @dataclass(frozen=True, eq=False)
@@ -141,16 +139,10 @@ class Workspace(Channel):
         """An axis may have a scale."""
         self.on_opened: list[Callable[[Bus], Awaitable[None]]] = []
         """Awaited with each bus whose drives were found, where an axis may have a scale."""
-        self.on_changed: list[Callable[[Bus], None]] = []
-        """Called with each bus that has changed, once that is published."""
-        self.on_identified: list[Callable[[Bus], None]] = []
-        """Called with each bus whose drives were found."""
-        self.on_forgotten: list[Callable[[Bus], None]] = []
-        """Called with each bus that is about to be closed."""
+        self.hooks = SessionHooks()
+        """What features hear of lines, and what they keep."""
         self.predicted: set[Bus] = set()
         """The buses of which a feature predicts drives: `shell.events.Predicted` comes beside their samples."""
-        self._parts: dict[type, object] = {}
-        """What features keep for as long as the session lives, by class."""
         self.plots: list[RunningPlot] = []
         self.plotted: tuple[Series, ...] = ()
         """The series that the screen plots; empty: the selected drive."""
@@ -168,22 +160,6 @@ class Workspace(Channel):
         """The buses that are tried again when they are lost."""
         self._closing: set[asyncio.Future[None]] = set()
 
-    def keep(self, part: object) -> None:
-        """Keep an object of a feature for as long as the session lives; `part` finds it by its class."""
-        self._parts[type(part)] = part
-
-    def part(self, kind: type[P]) -> P:
-        """What a feature keeps. Raises LookupError where it keeps none."""
-        found = self._parts[kind]
-        assert isinstance(found, kind)
-        return found
-
-    def _tell(self, hooks: list[Callable[[Bus], None]], bus: Bus) -> None:
-        """Call hooks with a bus; a defect of one keeps nothing else from being done."""
-        for hook in hooks:
-            with isolated(f"a hook on {bus.name}"):
-                hook(bus)
-
     # Buses
 
     def adopt(self, opened: Opened, place: int, connection: Connection | None = None, in_cell: str = "") -> OpenBus:
@@ -200,7 +176,7 @@ class Workspace(Channel):
 
     async def forget(self, bus: Bus) -> None:
         """Close a bus and drop everything known of it. A stop that ends the caller does not leave the port open."""
-        self._tell(self.on_forgotten, bus)
+        self.hooks.tell(self.hooks.forgotten, bus)
         record = self._open.get(bus)
         for observer in record.debuggers.values() if record is not None else ():
             observer.close()
@@ -328,7 +304,7 @@ class Workspace(Channel):
         if record := self._open.get(bus):
             record.selected = next(iter(bus.drives.values()), None)
         self.changed()
-        self._tell(self.on_identified, bus)
+        self.hooks.tell(self.hooks.identified, bus)
 
     def drive(self, bus: str = "", address: str | None = None) -> Drive:
         """Find the drive at an address (or label) of a bus, known or not; by default the selected one."""
@@ -445,7 +421,7 @@ class Workspace(Channel):
             self.publish(Notified(event.at, text, name, event.warning))
         elif isinstance(event, Changed):
             self.publish(StateChanged(event.at))
-            self._tell(self.on_changed, bus)
+            self.hooks.tell(self.hooks.changed, bus)
 
 
 def _in_order(opened: dict[Bus, OpenBus]) -> tuple[dict[Bus, OpenBus], dict[str, Bus]]:

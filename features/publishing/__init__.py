@@ -4,10 +4,15 @@ from __future__ import annotations
 
 import argparse
 import sys
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
 
 from multidrop.base.feature import Feature
-from multidrop.features.publishing.login import SECTION
 from multidrop.shell.operations.operation import Operation
+from multidrop.shell.sections import Section
+
+if TYPE_CHECKING:
+    from multidrop.features.publishing.login import MqttSettings
 
 
 def _publish(chosen: argparse.Namespace) -> int:
@@ -30,6 +35,18 @@ def _plant(chosen: argparse.Namespace) -> int:
     from multidrop.features.publishing.screen import run
 
     return run(chosen.url)
+
+
+def _read_login(table: Mapping[str, Any], where: str) -> MqttSettings:
+    from multidrop.features.publishing.login import read
+
+    return read(table, where)
+
+
+def _shown_login(login: MqttSettings) -> Mapping[str, object]:
+    from multidrop.features.publishing.login import shown
+
+    return shown(login)
 
 
 FEATURE = Feature(
@@ -91,7 +108,14 @@ FEATURE = Feature(
             },
             after="publish",
         ),
-        SECTION,
+        Section(
+            "mqtt",
+            ("username", "password", "password_file", "ca", "cert", "key"),
+            "[mqtt]",
+            _read_login,
+            _shown_login,
+            lambda login: login.unreadable(),
+        ),
     ),
     extras={"mqtt": "paho", "opcua": "asyncua", "prometheus": "prometheus_client"},
 )

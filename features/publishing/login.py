@@ -18,10 +18,8 @@ from typing import Any
 from multidrop.base.errors import Diagnostic
 from multidrop.base.files import opened, text_of
 from multidrop.shell.secrets import HIDDEN
-from multidrop.shell.sections import Section
 
 MQTT_FILES = ("password_file", "ca", "cert", "key")
-KEYS = ("username", "password", *MQTT_FILES)
 
 
 @dataclass(frozen=True)
@@ -55,7 +53,7 @@ class MqttSettings:
 def read(table: Mapping[str, Any], where: str) -> MqttSettings:
     """Check the table. Raises Diagnostic without a value, which may be a secret."""
     texts: dict[str, str] = {}
-    for key in KEYS:
+    for key in ("username", "password", *MQTT_FILES):
         text = table.get(key, "")
         if not isinstance(text, str) or "\0" in text:
             raise Diagnostic(f"mqtt.{key} is not text", where, f'as in {key} = "..."')
@@ -74,8 +72,5 @@ def read(table: Mapping[str, Any], where: str) -> MqttSettings:
     return MqttSettings(**texts)
 
 
-def _shown(found: MqttSettings) -> Mapping[str, object]:
+def shown(found: MqttSettings) -> Mapping[str, object]:
     return {key: HIDDEN if key == "password" and value else value for key, value in asdict(found).items()}
-
-
-SECTION = Section("mqtt", KEYS, "[mqtt]", read, _shown, MqttSettings.unreadable)

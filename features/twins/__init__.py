@@ -34,7 +34,7 @@ def _want(session: Session, chosen: argparse.Namespace) -> None:
     if chosen.twin:
         from multidrop.features.twins.twins import Twins
 
-        session.part(Twins).wanted = True
+        session.hooks.part(Twins).wanted = True
 
 
 async def _start(session: Session, chosen: argparse.Namespace) -> None:
@@ -43,7 +43,7 @@ async def _start(session: Session, chosen: argparse.Namespace) -> None:
         from multidrop.features.twins.twins import Twins
 
         for bus in list(session.buses.values()):
-            await session.part(Twins).start(bus)
+            await session.hooks.part(Twins).start(bus)
 
 
 FEATURE = Feature(

@@ -23,15 +23,17 @@ if TYPE_CHECKING:
 def begin(session: Session) -> None:
     """Let a session have twins: they begin where they are wanted, and end with their bus."""
     twins = Twins(session, partial(_apart, session))
-    session.keep(twins)
-    session.on_changed.append(twins.changed)
-    session.on_identified.append(twins.identified)
-    session.on_forgotten.append(twins.stop)
+    session.hooks.keep(twins)
+    session.hooks.changed.append(twins.changed)
+    session.hooks.identified.append(twins.identified)
+    session.hooks.forgotten.append(twins.stop)
 
 
 def _apart(session: Session, drive: Drive, axis: str, steps: int) -> str:
     """A distance of an axis in its unit, ` (0.5 mm)`; empty where it has no scale."""
-    found = session.in_units(drive, axis, steps)
+    from multidrop.shell.setting_units import distance
+
+    found = distance(session, drive, axis, steps) if session.scaled else ""
     return f" ({found})" if found else ""
 
 

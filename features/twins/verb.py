@@ -12,7 +12,7 @@ MOST = 1_000_000_000
 
 
 async def twin(call: Call) -> None:
-    twins, workspace = call.session.part(Twins), call.session
+    twins, workspace = call.session.hooks.part(Twins), call.session
     match call.split():
         case []:
             rows = list(twins.rows())

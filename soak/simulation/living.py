@@ -16,6 +16,7 @@ from random import Random
 from types import SimpleNamespace
 from typing import Any
 
+from multidrop.base import registry
 from multidrop.base.isolation import LOG
 from multidrop.dialects.state import DriveState
 from multidrop.drives.conversations import Conversations
@@ -78,6 +79,7 @@ def lived(seed: int, steps: Iterable[int], keep: bool = False, without: Collecti
             stack.enter_context(contextlib.chdir(folder))
             for seam in ((wire, "harmed", world.harmed), (Conversations, "keep", _kept(world)), *SEAMS):
                 stack.enter_context(_replaced(*seam))
+            stack.enter_context(_replaced(registry, "entries", lambda own=True: []))  # none of this machine's
             locks = SimpleNamespace(**{**vars(threading), "Lock": cut_ins.lock})
             for shared in (pipe, usb):
                 stack.enter_context(_replaced(shared, "threading", locks))

@@ -68,7 +68,6 @@ def test_without_the_configuration_a_persons_own_files_are_not_loaded(own: Path)
         ("x = 1", "AttributeError: "),
         ("FEATURE = 1", "TypeError: FEATURE is no multidrop.base.feature.Feature"),
         (GOOD.replace("{name}", "other"), "its record has the name other"),
-        (GOOD.replace("{name}", "Bad"), "ValueError: the name of a feature"),
     ],
 )
 def test_one_that_cannot_be_loaded_is_one_warning_and_the_others_are_there(own: Path, text: str, why: str) -> None:

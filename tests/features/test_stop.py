@@ -105,12 +105,12 @@ def at_session(place: str) -> Callable[[Any, Callable[..., None]], None]:
         if place == "an event":
             session.subscribe(hook)
         else:
-            getattr(session, place).append(hook)
+            getattr(session.hooks, place).append(hook)
 
     return begin
 
 
-HOOKS = ["an event", "on_changed", "on_identified", "on_forgotten"]
+HOOKS = ["an event", "changed", "identified", "forgotten"]
 
 
 @pytest.mark.parametrize("place", HOOKS)
@@ -128,11 +128,11 @@ async def test_a_hook_that_holds_the_loop_up_delays_the_report_and_not_the_stop(
         thread, wrote = key_thread(session, held)
         armed = True
         match place:
-            case "on_identified":
+            case "identified":
                 session.identified(session.buses["press"])
-            case "on_forgotten":
+            case "forgotten":
                 await session.forget(session.buses["lift"])
-            case "on_changed":
+            case "changed":
                 link = session.buses["press"].link
                 link.publish(Changed(link.now()))
             case _:

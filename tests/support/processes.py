@@ -202,3 +202,9 @@ class Tap:
                 if not held:
                     client.sendall(late)
                     late.clear()
+
+
+def names_of_packages(folder: Path) -> None:
+    """Read the entry points of this environment, as the first session does, so that the next one need not."""
+    code = "from multidrop.base.registry import entries; entries()"
+    subprocess.run([sys.executable, "-c", code], env=environment(folder), cwd=folder, timeout=PATIENCE, check=True)

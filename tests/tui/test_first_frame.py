@@ -8,7 +8,7 @@ from textual.css.stylesheet import Stylesheet
 
 from multidrop.tui.screens.page import PAGES
 from tests.support.fake_session import demo_session, make_app
-from tests.support.processes import environment
+from tests.support.processes import environment, names_of_packages
 from tests.support.until import PATIENCE
 
 CHILD = """
@@ -71,6 +71,7 @@ LATER = {
 
 @pytest.mark.process
 def test_the_first_frame_imports_no_page_no_family_and_no_simulator_and_the_first_letter_nothing(tmp_path):
+    names_of_packages(tmp_path)
     child = [sys.executable, "-c", CHILD]
     done = subprocess.run(
         child, capture_output=True, text=True, timeout=PATIENCE, cwd=tmp_path, env=environment(tmp_path)

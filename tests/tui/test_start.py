@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from multidrop.base import store
 from multidrop.base.errors import Diagnostic
+from multidrop.shell.state import opened as store
 from multidrop.transports import Unreachable
 from multidrop.tui.app import MultidropApp
 from multidrop.tui.assist import StartEntry

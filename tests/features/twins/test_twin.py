@@ -63,5 +63,5 @@ def test_raw_bytes_have_no_twin(multidrop: Command) -> None:
 @for_each("words, wanted", [(["shell", "a", "--twin"], True), (["tui", "a", "--twin"], True), (["tui", "a"], False)])
 def test_the_option_wants_twins_of_the_session_that_is_opened(words: list[str], wanted: bool) -> None:
     chosen, twins = parse(words), SimpleNamespace(wanted=False)
-    hooks.prepare(SimpleNamespace(part=lambda kind: twins), chosen)
+    hooks.prepare(SimpleNamespace(hooks=SimpleNamespace(part=lambda kind: twins)), chosen)
     assert twins.wanted is wanted

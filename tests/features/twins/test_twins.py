@@ -88,7 +88,7 @@ async def test_another_acceleration_is_named_a_setting(tmp_path: Path) -> None:
 
 
 async def nothing_is_read(cell: CellSession) -> None:
-    assert list(cell.session.part(Twins).rows()) == []
+    assert list(cell.session.hooks.part(Twins).rows()) == []
     cell.events.clear()
     await asyncio.sleep(2)
     assert cell.written("press") == b"" and not cell.session.buses["press"].witnesses.all
@@ -98,7 +98,7 @@ async def test_off_while_drives_are_read_begins_no_twin_more(tmp_path: Path) -> 
     async with CellSession(tmp_path, bus("press", party("a"), party("b"))) as cell:
         task = cell.session.start("/twin on")
         await asyncio.sleep(2.5)
-        assert len(list(cell.session.part(Twins).rows())) == 1, "the second is being read"
+        assert len(list(cell.session.hooks.part(Twins).rows())) == 1, "the second is being read"
         await run(cell, "/twin off")
         assert not await task
         assert not any(each.startswith("b: a twin runs") for each in cell.told())
@@ -107,11 +107,11 @@ async def test_off_while_drives_are_read_begins_no_twin_more(tmp_path: Path) -> 
 
 async def test_off_ends_twins_that_each_drive_was_to_get(tmp_path: Path) -> None:
     async with CellSession(tmp_path, bus("press", party("a"))) as cell:
-        cell.session.part(Twins).wanted = True
-        cell.session.part(Twins).identified(cell.session.buses["press"])
+        cell.session.hooks.part(Twins).wanted = True
+        cell.session.hooks.part(Twins).identified(cell.session.buses["press"])
         await asyncio.sleep(0.5)
         await run(cell, "/twin off")
-        cell.session.part(Twins).identified(cell.session.buses["press"])
+        cell.session.hooks.part(Twins).identified(cell.session.buses["press"])
         await asyncio.sleep(5)
         await nothing_is_read(cell)
 
@@ -133,7 +133,7 @@ async def test_each_drive_that_gets_no_twin_is_said(tmp_path: Path) -> None:
         with pytest.raises(DriveError, match="^a: it moves"):
             await cell.session.run("/twin on")
         assert [each[:21] for each in cell.warned()] == ["press: no twin: b: it"]
-        assert len(list(cell.session.part(Twins).rows())) == 1
+        assert len(list(cell.session.hooks.part(Twins).rows())) == 1
 
 
 async def test_a_drive_may_get_another_name_while_others_are_read(tmp_path: Path) -> None:
@@ -142,7 +142,7 @@ async def test_a_drive_may_get_another_name_while_others_are_read(tmp_path: Path
         await asyncio.sleep(0.5)
         await run(cell, '@b DN="k"')
         assert await task
-        assert [each[:2] for each in cell.session.part(Twins).rows()] == ["a:", "k:"]
+        assert [each[:2] for each in cell.session.hooks.part(Twins).rows()] == ["a:", "k:"]
 
 
 LATE = 0.15

@@ -146,7 +146,7 @@ async def test_a_drive_that_moves_gets_no_twin(tmp_path: Path) -> None:
         await run(cell, "SL 500")
         with pytest.raises(DriveError, match="a twin begins at rest"):
             await cell.session.run("/twin on")
-        assert list(cell.session.part(Twins).rows()) == []
+        assert list(cell.session.hooks.part(Twins).rows()) == []
         cell.events.clear()
         await asyncio.sleep(1)
         assert cell.written("press") == b""
@@ -232,4 +232,4 @@ async def test_a_stop_while_a_drive_is_read_leaves_nothing_behind(tmp_path: Path
 async def test_a_closed_bus_has_no_twins(tmp_path: Path) -> None:
     async with CellSession(tmp_path, bus("press", party("a"))) as cell:
         await run(cell, "/twin on", "/close press")
-        assert len(of(cell, TwinEnded)) == 1 and list(cell.session.part(Twins).rows()) == []
+        assert len(of(cell, TwinEnded)) == 1 and list(cell.session.hooks.part(Twins).rows()) == []

@@ -1,0 +1,41 @@
+"""What features hear of the lines of a session, and what they keep with it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import TypeVar
+
+from multidrop.base.isolation import isolated
+from multidrop.drives.bus import Bus
+
+P = TypeVar("P")
+OnBus = Callable[[Bus], None]
+
+
+class SessionHooks:
+    """The functions that are called with a line, each isolated from the others; and the objects that features keep."""
+
+    def __init__(self) -> None:
+        self.changed: list[OnBus] = []
+        """Called with each line that has changed, once that is published."""
+        self.identified: list[OnBus] = []
+        """Called with each line whose drives were found."""
+        self.forgotten: list[OnBus] = []
+        """Called with each line that is about to be closed."""
+        self._parts: dict[type, object] = {}
+
+    def tell(self, functions: Sequence[OnBus], bus: Bus) -> None:
+        """Call functions with a line; a defect of one keeps nothing else from being done."""
+        for each in functions:
+            with isolated(f"a hook on {bus.name}"):
+                each(bus)
+
+    def keep(self, part: object) -> None:
+        """Keep an object for as long as the session lives; `part` finds it by its class."""
+        self._parts[type(part)] = part
+
+    def part(self, kind: type[P]) -> P:
+        """What a feature keeps. Raises LookupError where it keeps none."""
+        found = self._parts[kind]
+        assert isinstance(found, kind)
+        return found
