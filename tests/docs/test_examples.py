@@ -1,5 +1,6 @@
 """Each machine of `examples` has a cell, a script, a macro, a Python program, and a page that runs all of them.
 
+`plugin` is none: `tests/packaging/test_plugin.py` installs and runs it.
 `test_commands` runs the commands of the pages, which are short.
 """
 
@@ -8,7 +9,7 @@ import pytest
 from tests.support.pages import EXAMPLES, blocks
 from tests.support.paths import ROOT
 
-MACHINES = sorted(path.name for path in EXAMPLES.iterdir())
+MACHINES = sorted(path.name for path in EXAMPLES.iterdir() if path.name != "plugin")
 LINES = 10
 """The largest number of lines of prose on a page."""
 
