@@ -50,9 +50,8 @@ class Mileage:
     async def show(self, only: Any = None) -> None:
         for drive in await self.again(only):
             for axis, steps in self.moved[drive.link.name, drive.address].items():
-                way = distance(self.session, drive, axis, steps).lstrip("-")
-                name = self.session.display_name(drive) + (axis and f".{axis}")
-                self.session.output(f"{name}: {steps} steps" + (way and f" ({way})"))
+                name, way = self.session.display_name(drive), distance(self.session, drive, axis, steps).lstrip("-")
+                self.session.output(f"{name}{axis and f'.{axis}'}: {steps} steps{way and f' ({way})'}")
 
     async def play(self, lines: list[str]) -> None:
         for line in lines:
