@@ -15,7 +15,7 @@ import importlib
 import importlib.util
 import os
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from functools import cache
 from pathlib import Path
@@ -67,6 +67,7 @@ IN_WHEEL: dict[str, tuple[str, ...]] = {
     "sweeps": ("program sweep",),
     "twin_fit": ("twin", "twin fit"),
     "twins": ("/twin",),
+    "usb": ("usb:", "usbip:"),
 }
 """The features of the wheel, and the words that each answers to: `/twin`, `program sweep`, `usb:`."""
 _failed: dict[str, Failed] = {}
@@ -238,6 +239,15 @@ def features() -> Iterator[Feature]:
     """The features that are there: all of the wheel, and those by others that are loaded."""
     yield from wheels()
     yield from by_others()
+
+
+def place(after: Mapping[str, str], names: list[str]) -> None:
+    """Put each name behind the one that it comes after, which may be one of them; last, where that is not there."""
+    left = dict(after)
+    while left:
+        name = next((each for each, before in left.items() if before in names), next(iter(left)))
+        before = left.pop(name)
+        names.insert(names.index(before) + 1 if before in names else len(names), name)
 
 
 def added(kind: type[T]) -> Iterator[T]:

@@ -82,15 +82,6 @@ _KEY = re.compile(r'"([^"]*)"|([\w-]+)')
 _ELSEWHERE = re.compile(r"@([\w.]+:\w+)")
 
 
-def place(after: Mapping[str, str], names: list[str]) -> None:
-    """Put each name behind the one that it comes after, which may be one of them; last, where that is not there."""
-    left = dict(after)
-    while left:
-        name = next((each for each, before in left.items() if before in names), next(iter(left)))
-        before = left.pop(name)
-        names.insert(names.index(before) + 1 if before in names else len(names), name)
-
-
 class Declared(Mapping[str, Operation]):
     """Operations by name: those of the sections, then those of features, each after the one that it names.
 
@@ -112,7 +103,7 @@ class Declared(Mapping[str, Operation]):
 
     def __iter__(self) -> Iterator[str]:
         names = [*self._sections]
-        place(
+        registry.place(
             {name: each.after for feature in registry.features() for name, each in self._added(feature).items()}, names
         )
         return iter(names)
@@ -226,7 +217,7 @@ def groups() -> dict[str, list[str]]:
         operation = VERBS[name]
         added.setdefault(operation.group or BY_OTHERS, {})[name] = operation.after
     for title, after in added.items():
-        place(dict(sorted(after.items())), found.setdefault(title, []))
+        registry.place(dict(sorted(after.items())), found.setdefault(title, []))
     return found
 
 

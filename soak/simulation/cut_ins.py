@@ -24,7 +24,7 @@ from soak.simulation.clock import SimulatedLoop
 
 SHARED = {
     "multidrop.transports.pipe": ("Pipe", "DescriptorPipe"),
-    "multidrop.transports.usb": ("UsbPipe",),
+    "multidrop.features.usb.pipe": ("UsbPipe",),
     "multidrop.drives.stop_ahead": ("StopAhead",),
     "multidrop.drives.stopping": ("Stopping", "_read"),
     "multidrop.drives.link": ("Link",),
