@@ -112,7 +112,7 @@ def with_word(word: str) -> Feature | None:
         if word in words:
             found = wheel(name)
             if found is None:
-                raise Diagnostic(f"the feature {name} is not there", word, "install multidrop again, whole")
+                raise Diagnostic(f"the feature {name} is not there", word.rstrip(":"), "install multidrop again, whole")
             return found
     return None
 

@@ -222,16 +222,22 @@ def groups() -> dict[str, list[str]]:
 
 
 def load_others(own: bool = True) -> list[str]:
-    """Load the features by others; return a warning for each that cannot be, or whose verb or command is taken."""
+    """Load the features by others; return a warning for each that cannot be, or whose words are taken."""
+    from multidrop.shell.connect.scheme import Scheme
+    from multidrop.shell.connect.schemes import CORE
+
     known = {feature.name for feature in registry.by_others()}
     warnings = registry.load_others(own)
-    taken = {*VERBS._sections, *COMMANDS._sections, *registry.words()}
+    taken = {*VERBS._sections, *COMMANDS._sections, *registry.words(), *(f"{name}:" for name in CORE)}
     for feature in registry.by_others():
         adds = [each for each in feature.adds if isinstance(each, Operation)]
+        schemes = [f"{each.name}:" for each in feature.adds if isinstance(each, Scheme)]
         words = [word for each in adds for word in (each.name, each.command) if word]
+        odd = [word for word in words if not _WORD.fullmatch(word)]
+        words += schemes
         if feature.name in known:
             taken.update(words)
-        elif wrong := next((word for word in words if word in taken or not _WORD.fullmatch(word)), ""):
+        elif wrong := next((word for word in words if word in taken or word in odd), ""):
             why = f"{wrong} is taken" if wrong in taken else f"{wrong} is no name of a verb or a command"
             warnings.append(registry.refuse(feature.name, why))
         else:
