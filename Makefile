@@ -9,7 +9,7 @@ WORKERS := $(shell $(PYTHON) -c 'import os; print((os.cpu_count() or 1) + 2)')
 PYTEST = $(BIN)/python -m pytest --dist worksteal -n $(WORKERS)
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
 
-.PHONY: demo test quick nightly check format lint types types-here types-darwin types-win32 contracts measured unmeasured map mutants coverage bench readme shipped pictures docs package release fuzz soak simulate snapshots windows clean
+.PHONY: demo test quick nightly check format lint types types-here types-darwin types-win32 contracts measured unmeasured map mutants seams coverage bench readme shipped pictures docs package release fuzz soak simulate snapshots windows clean
 
 demo: $(VENV)/.run
 	$(BIN)/multidrop demo
@@ -24,6 +24,7 @@ quick: $(VENV)/.dev
 
 nightly: $(VENV)/.dev
 	MULTIDROP_KILLS=12 $(PYTEST) --nightly --hypothesis-profile=search
+	$(MAKE) seams
 	$(MAKE) windows
 
 # The tests for Windows, under Wine, with a CPython for Windows in .venv/windows; TESTS="-x tests/macros": some of them.
@@ -33,6 +34,7 @@ windows: $(VENV)/.dev
 # Cheap checks first, side by side: what is wrong is said early. The tests are last, so their summary ends the output.
 check: $(VENV)/.dev
 	$(MAKE) -j lint contracts types
+	$(MAKE) seams ONLY=all
 	$(MAKE) measured
 
 lint: $(VENV)/.dev
@@ -68,6 +70,10 @@ map: $(VENV)/.dev
 	-COVERAGE_FILE=$(VENV)/map $(PYTEST) --measure-cases --cov --cov-report= --cov-context=test --durations=0 $(TESTS) > $(VENV)/durations.txt
 	$(BIN)/python -m pytest --collect-only -q -m "$(QUICK)" $(TESTS) > $(VENV)/quick.txt
 	$(BIN)/python -m soak.drawn --measured $(VENV)/map $(VENV)/durations.txt $(VENV)/quick.txt $(if $(TESTS),--some)
+
+# Delete every feature, one at a time and all at once, in copies of the tree, and see that the rest works; ONLY="twins all": some.
+seams: $(VENV)/.dev
+	$(BIN)/python -m soak.seams $(ONLY)
 
 # Draw mutants of the product by a seed, and say which of them the tests and the seeds see: ROOM=drives N=100 SEED=7.
 mutants: $(VENV)/.dev

@@ -62,15 +62,17 @@ IN_WHEEL: dict[str, tuple[str, ...]] = {
     "convert": ("program convert",),
     "log_analysis": ("log at", "log bisect", "log judge", "log replay"),
     "lsp": ("lsp",),
-    "publishing": ("publish", "plant"),
+    "publishing": ("publish", "plant", "[mqtt]"),
     "sharing": ("share",),
-    "sweeps": ("program sweep",),
+    "sweeps": ("program sweep", "[sweep]"),
     "twin_fit": ("twin", "twin fit"),
     "twins": ("/twin",),
     "usb": ("usb:", "usbip:"),
 }
 """The features of the wheel, and the words that each answers to: `/twin`, `program sweep`, `usb:`."""
 _failed: dict[str, Failed] = {}
+_untold: list[str] = []
+"""The warnings that nobody was told yet."""
 _others: dict[str, tuple[Entry, Feature]] = {}
 """The features by others that are loaded, by their places."""
 
@@ -169,9 +171,8 @@ def _own() -> Iterator[Entry]:
             yield Entry(path.stem, str(path), "", str(path))
 
 
-def load_others(own: bool = True) -> list[str]:
-    """Load the features by others that are not loaded yet; return a warning for each that cannot be."""
-    warnings: list[str] = []
+def load_others(own: bool = True) -> None:
+    """Load the features by others that are not loaded yet; `warnings` tells which of them cannot be."""
     for entry in entries(own):
         if entry.place not in _others and entry.place not in _failed:
             why: list[str] = []
@@ -179,16 +180,22 @@ def load_others(own: bool = True) -> list[str]:
                 _others[entry.place] = entry, _loaded(entry)
             if why:
                 _failed[entry.place] = failed = Failed(entry, why[0])
-                warnings.append(str(failed))
-    return warnings
+                _untold.append(str(failed))
 
 
-def refuse(name: str, why: str) -> str:
-    """Take a feature by others out again, for what a room finds wrong in what it adds; return the warning."""
+def warnings() -> list[str]:
+    """A warning for each feature that cannot be loaded, once."""
+    told = [*_untold]
+    _untold.clear()
+    return told
+
+
+def refuse(name: str, why: str) -> None:
+    """Take a feature by others out again, for what a room finds wrong in what it adds."""
     entry = next(entry for entry, feature in _others.values() if feature.name == name)
     del _others[entry.place]
     _failed[entry.place] = failed = Failed(entry, why)
-    return str(failed)
+    _untold.append(str(failed))
 
 
 def _loaded(entry: Entry) -> Feature:

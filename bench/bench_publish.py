@@ -33,8 +33,8 @@ from sim_process import ROOT, all_served, busy
 from terminal import Terminal, multidrop
 
 from multidrop.features.publishing.broker import WINDOW, Connection, Message, parse_target
+from multidrop.features.publishing.login import MqttSettings
 from multidrop.features.publishing.publisher import Backlog, Publisher
-from multidrop.shell.configuration import MqttSettings
 
 MOSQUITTO = shutil.which("mosquitto", path=f"{os.environ.get('PATH', '')}:/usr/sbin") or ""
 NAMES = "abc"

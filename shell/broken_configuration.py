@@ -12,11 +12,10 @@ from typing import Any, TypeVar
 
 from multidrop.base.errors import Diagnostic
 from multidrop.base.files import split_lines, toml_keys, toml_names, toml_of, utf8_of
+from multidrop.shell.sections import valid
 
 WAY = "--no-config goes on without the file"
 _HEADER = re.compile(r"\s*\[\[?([^\]]*)\]")
-
-TABLES = ("connections", "guards", "keys", "log", "mqtt", "own_units", "screen", "simulator", "sweep")
 
 Path = tuple[str, ...]
 Problems = tuple[Diagnostic, ...]
@@ -106,7 +105,7 @@ def _doubts(lost: list[tuple[Path, Diagnostic]]) -> Iterator[tuple[str, str]]:
         table, *inner = path or ("guards",)
         if table == "connections" and inner:
             yield inner[0], str(problem)
-        elif (table in ("guards", "connections") and inner != ["off"]) or table not in TABLES:
+        elif (table in ("guards", "connections") and inner != ["off"]) or table not in valid():
             yield "", str(problem)  # an unknown table may be that of the guards, spelled wrong
 
 

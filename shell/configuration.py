@@ -23,13 +23,6 @@ times = "last"              # of the lines in a transcript: off, clock, start, l
 palette = "^G"
 panel-plot = "F9"
 
-[mqtt]                              # for `multidrop publish`
-username = "shop-7"
-password_file = "broker.password"   # or password = "..."
-ca = "plant-ca.pem"                 # the authority of the broker's certificate, for mqtts://
-cert = "shop-7.pem"                 # our certificate, where the broker requires one
-key = "shop-7.key"
-
 `own_units = ["pallet"]`, above all tables, names further units. An axis of a controller is `"00.x"` in `units`.
 A relative path begins at the folder of the configuration file. `MULTIDROP_CONFIG_DIR` moves the configuration and the
 macros; `MULTIDROP_STATE_DIR` moves the history, `MULTIDROP_DATA_DIR` the backups.
@@ -39,20 +32,22 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from contextvars import ContextVar
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from multidrop.base import registry
 from multidrop.base.atomic import write_atomically
 from multidrop.base.errors import Diagnostic
 from multidrop.base.file_owners import other_writer, places
-from multidrop.base.files import opened, text_of, toml_of, utf8_of, why
+from multidrop.base.files import toml_of, utf8_of, why
 from multidrop.base.places import config_file, config_folder, data_folder, state_folder
 from multidrop.base.text import NOT_FIRST, acts_first, visible
-from multidrop.shell.broken_configuration import TABLES, WrongConfiguration, salvage
+from multidrop.shell.broken_configuration import WrongConfiguration, salvage
 from multidrop.shell.roles import TIMES
+from multidrop.shell.sections import sections, text_list, valid
 
 if TYPE_CHECKING:
     from multidrop.dialects import DriveState, Family
@@ -61,7 +56,6 @@ if TYPE_CHECKING:
 MEGABYTE = 1_000_000
 CHOICES = {"signs": ("auto", "full", "boxes", "ascii"), "times": tuple(TIMES)}
 """The settings that have one of a few words."""
-MQTT_FILES = ("password_file", "ca", "cert", "key")
 TRAVEL = "TRAVEL"
 """The guard on moves that leave the travel of their axis, which no family knows."""
 IGNORED: ContextVar[bool] = ContextVar("ignored", default=False)
@@ -124,34 +118,6 @@ DEFAULT_LOOK = Look()
 
 
 @dataclass(frozen=True)
-class MqttSettings:
-    """A login, and paths of files; an empty one is not given."""
-
-    username: str = ""
-    password: str = field(default="", repr=False)
-    password_file: str = ""
-    ca: str = ""
-    cert: str = ""
-    key: str = ""
-
-    def secret(self) -> str:
-        """The password. Raises Diagnostic where its file cannot be read."""
-        return text_of(self.password_file).rstrip("\r\n") if self.password_file else self.password
-
-    def unreadable(self) -> Iterator[str]:
-        """Yield the keys whose files cannot be opened, with the reason."""
-        for name in MQTT_FILES:
-            path = getattr(self, name)
-            try:
-                if path:
-                    opened(path).close()
-            except OSError as problem:
-                yield f"mqtt.{name}: {path} cannot be read: {problem.strerror}"
-            except Diagnostic as problem:
-                yield f"mqtt.{name}: {problem}"
-
-
-@dataclass(frozen=True)
 class Settings:
     """The contents of the configuration file, and the places of the user's files."""
 
@@ -161,11 +127,10 @@ class Settings:
     guards: Guarding = Guarding()
     log: LogSettings = LogSettings()
     look: Look = DEFAULT_LOOK
-    mqtt: MqttSettings = MqttSettings()
     allowed: tuple[Path, ...] = ()
     """Further folders to which paths of cell files may lead, in `simulator.allow`."""
-    clusters: tuple[str, ...] = ()
-    """The addresses of the schedulers that may run code here, in `sweep.clusters`."""
+    sections: Mapping[str, Any] = field(default_factory=dict)
+    """What features read of the tables that they have there, by the names of these."""
     own_units: tuple[str, ...] = ()
     """Units beside those that every session knows."""
     problems: tuple[Diagnostic, ...] = ()
@@ -174,6 +139,12 @@ class Settings:
     """The errors that take names, units or guards from a saved connection; an empty name: from every line."""
     data: Path = field(default_factory=lambda: data_folder())
     """The folder of what belongs to the user and is never deleted here: backups."""
+
+    def section(self, name: str) -> Any:
+        """What the feature with this table read of it, also where the file has no such table."""
+        if name not in self.sections:
+            return sections()[name].read({}, "")
+        return self.sections[name]
 
     @property
     def macros(self) -> Path:
@@ -231,7 +202,9 @@ def parse(text: str, where: str, lenient: bool = False) -> Settings:
 
 def _read(document: Mapping[str, Any], where: str) -> Settings:
     """Check a parsed file. Raises Diagnostic, whose message begins with the key."""
-    _table(document, "", TABLES, where, "")
+    if not document.keys() <= {*valid()}:  # a table of a feature by others
+        registry.load_others(own=not IGNORED.get())
+    _table(document, "", valid(), where, "")
     tables = document.get("connections", {})
     if not isinstance(tables, dict):
         raise Diagnostic("connections is not a table", where, "write [connections.NAME]")
@@ -239,22 +212,20 @@ def _read(document: Mapping[str, Any], where: str) -> Settings:
     connections = {name: _connection(name, table, where, own) for name, table in tables.items()}
     guards, log = _guards(document.get("guards", {}), where), _log(document.get("log", {}), where)
     look = _look(document.get("screen", {}), document.get("keys", {}), where)
-    mqtt = _mqtt(document.get("mqtt", {}), where)
-    lists: dict[str, list[str]] = {}
-    for name, key in (("simulator", "allow"), ("sweep", "clusters")):
-        table = _table(document.get(name, {}), name, (key,), where, f"write [{name}] with {key} = [...]")
-        lists[key] = found = table.get(key, [])
-        if not isinstance(found, list) or not all(isinstance(each, str) and each for each in found):
-            raise Diagnostic(f"{name}.{key} is not a list of texts", where, f'as in {key} = ["..."]')
-    allowed = tuple(Path(where).parent / os.path.expanduser(each) for each in lists["allow"])
+    hint = "write [simulator] with allow = [...]"
+    simulator = _table(document.get("simulator", {}), "simulator", ("allow",), where, hint)
+    allowed = text_list(simulator, "simulator", "allow", where)
+    read = {
+        name: each.read(_table(document.get(name, {}), name, each.keys, where, f"write {each.example}"), where)
+        for name, each in sections().items()
+    }
     return Settings(
         connections,
         guards=guards,
         log=log,
         look=look,
-        mqtt=mqtt,
-        allowed=allowed,
-        clusters=tuple(lists["clusters"]),
+        allowed=tuple(Path(where).parent / os.path.expanduser(each) for each in allowed),
+        sections=read,
         own_units=own,
     )
 
@@ -369,30 +340,6 @@ def _look(screen: Any, keys: Any, where: str) -> Look:
         if not isinstance(key, str):
             raise Diagnostic(f"keys.{name} is not text", where, 'write a key as in "^T" or "F9"')
     return Look(**table, keys=keys, where=where)
-
-
-def _mqtt(found: Any, where: str) -> MqttSettings:
-    """Check the table. Raises Diagnostic without a value, which may be a secret."""
-    keys = ("username", "password", *MQTT_FILES)
-    table = _table(found, "mqtt", keys, where, "write [mqtt]")
-    texts: dict[str, str] = {}
-    for key in keys:
-        text = table.get(key, "")
-        if not isinstance(text, str) or "\0" in text:
-            raise Diagnostic(f"mqtt.{key} is not text", where, f'as in {key} = "..."')
-        texts[key] = text
-    if texts["password"] and texts["password_file"]:
-        raise Diagnostic("mqtt.password_file: password is given, too", where, "keep one of them")
-    if texts["key"] and not texts["cert"]:
-        raise Diagnostic("mqtt.key: cert is missing", where, "name the certificate of this key")
-    for key in MQTT_FILES:
-        if text := texts[key]:
-            try:
-                path = Path(text).expanduser()
-            except RuntimeError:  # a ~ and no home
-                path = Path(text)
-            texts[key] = str(Path(where).parent / path)
-    return MqttSettings(**texts)
 
 
 # Changes

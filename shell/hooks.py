@@ -86,6 +86,12 @@ def with_options(command: str, arguments: Mapping[str, Any]) -> dict[str, Any]:
     return found
 
 
+def asked_for(chosen: argparse.Namespace) -> bool:
+    """Whether any option of a feature was given."""
+    notations = (notation for each in options(chosen.command) for notation in each.arguments)
+    return any(getattr(chosen, each.partition(" ")[0].strip("-").replace("-", "_")) for each in notations)
+
+
 def prepare(session: Session, chosen: argparse.Namespace) -> None:
     """Do what the options of features ask for before a URL is opened."""
     for each in options(chosen.command):

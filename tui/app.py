@@ -32,6 +32,7 @@ from multidrop.shell.broken_configuration import placed, placed_in_file
 from multidrop.shell.configuration import DEFAULT_LOOK, Look, Settings, parse
 from multidrop.shell.connect.urls import wrong_urls
 from multidrop.shell.events import Failed, OnBus, Printed, SessionEvent, StateChanged
+from multidrop.shell.sections import sections
 from multidrop.shell.session import Session
 from multidrop.tui.actions import Actions, Parts
 from multidrop.tui.assist import Assist
@@ -459,7 +460,9 @@ def bindings() -> list[BindingType]:
 def look_troubles(found: Settings, text: str, where: str) -> list[Diagnostic]:
     """What is wrong in a configuration beyond its form: keys, themes, the URLs of connections, files that it names."""
     look = found.look
-    troubles = [*keymap(bindings(), look.keys).troubles, *wrong_theme(look.theme), *found.mqtt.unreadable()]
+    troubles = [*keymap(bindings(), look.keys).troubles, *wrong_theme(look.theme)]
+    for name, each in sections().items():
+        troubles += each.unreadable(found.section(name))
     troubles += wrong_urls(found.connections.values())
     return [placed(trouble, text, where) for trouble in troubles]
 

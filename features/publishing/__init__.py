@@ -6,6 +6,7 @@ import argparse
 import sys
 
 from multidrop.base.feature import Feature
+from multidrop.features.publishing.login import SECTION
 from multidrop.shell.operations.operation import Operation
 
 
@@ -90,6 +91,7 @@ FEATURE = Feature(
             },
             after="publish",
         ),
+        SECTION,
     ),
     extras={"mqtt": "paho", "opcua": "asyncua", "prometheus": "prometheus_client"},
 )

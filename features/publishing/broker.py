@@ -25,7 +25,7 @@ from multidrop.base.errors import Diagnostic
 from multidrop.base.files import why
 from multidrop.base.on_demand import importing
 from multidrop.base.text import visible
-from multidrop.shell.configuration import MqttSettings
+from multidrop.features.publishing.login import MqttSettings
 from multidrop.shell.threads import in_thread
 from multidrop.transports import Unreachable
 

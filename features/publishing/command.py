@@ -67,7 +67,7 @@ def _outlet(registry: Registry, target: Target | Listening, home_assistant: bool
     session = registry.session
     if isinstance(target, Listening):
         return SERVERS[target.scheme](registry, target)
-    topics, settings, name = Topics(target.prefix), session.settings.mqtt, broker.fresh_name()
+    topics, settings, name = Topics(target.prefix), session.settings.section("mqtt"), broker.fresh_name()
     if not target.encrypted and (settings.password or settings.password_file) and exposed(target.host):
         registry.warn(f"the password goes to {target.host} unencrypted; mqtts:// encrypts it")
     publisher = Publisher(

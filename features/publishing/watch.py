@@ -42,7 +42,7 @@ class Watch:
         self.left = ""
         """Why the broker was left for good; empty: it was not."""
         self._notify = notify
-        self._make = lambda: Connection(target, settings.mqtt, None, fresh_name(), self._take)
+        self._make = lambda: Connection(target, settings.section("mqtt"), None, fresh_name(), self._take)
         self._waiting: deque[tuple[str, bytes, bool, float]] = deque(maxlen=INBOX)
         self._dropped = 0
         self._task: asyncio.Task[None] | None = None

@@ -7,6 +7,7 @@ import argparse
 from multidrop.base.feature import Feature
 from multidrop.shell.operations import arguments
 from multidrop.shell.operations.operation import Operation
+from multidrop.shell.sections import Section, text_list
 
 
 def _sweep(chosen: argparse.Namespace) -> int:
@@ -101,6 +102,13 @@ FEATURE = Feature(
                 },
             },
             after="program test",
+        ),
+        Section(
+            "sweep",
+            ("clusters",),
+            "[sweep] with clusters = [...]",
+            lambda table, where: text_list(table, "sweep", "clusters", where),
+            lambda clusters: {"clusters": list(clusters)},
         ),
     ),
     extras={"cluster": "distributed"},

@@ -79,7 +79,7 @@ def run(chosen: argparse.Namespace) -> int:
 
 def _agree(address: str, yes: bool, what: str, interruption: Interruption) -> None:
     """Return once a person has agreed to a cluster: by `--yes`, now, or before. Raises Diagnostic."""
-    known = configuration.load().clusters
+    known = configuration.load().section("sweep")
     if yes or address in known:
         return
     import asyncio
@@ -117,8 +117,8 @@ class Report:
         self._results = dict(table.known)
         self._awaited: deque[int] = deque()
         """The cases of the round that are not reported yet."""
-        self._cut = False
-        """The sweep ended early."""
+        self._cut: bool
+        """The sweep ended early; `finish` knows."""
         self._said: set[str] = set()
         self._reported: list[int] = []
         self._failed: dict[int, Result] = {}

@@ -78,9 +78,9 @@ class AsyncSession(Fixed):
         self,
         urls: Sequence[str],
         *,
-        yes: bool = False,
-        beyond: bool = False,
-        reconnect: bool = False,
+        yes: bool,
+        beyond: bool,
+        reconnect: bool,
         notice: Notice,
     ) -> None:
         self._urls = urls

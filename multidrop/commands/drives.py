@@ -116,7 +116,7 @@ def _checked(file: str) -> str:
 def _with_drive(
     chosen: argparse.Namespace,
     body: Callable[[Session, Drive], Awaitable[None]],
-    unsolicited: bool = True,
+    unsolicited: bool,
 ) -> int:
     async def work(session: Session) -> None:
         await each(session, targets(session, chosen.drive, "programs"), lambda drive: body(session, drive))

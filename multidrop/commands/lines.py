@@ -117,7 +117,7 @@ def tui(chosen: argparse.Namespace) -> int:
     if chosen.join is None:
         prepare = partial(hooks.prepare, chosen=chosen)
         return _screen(chosen.urls, not chosen.no_reconnect, chosen.raw, prepare, chosen.share)
-    if chosen.urls or chosen.share or chosen.raw:
+    if chosen.urls or chosen.share or chosen.raw or hooks.asked_for(chosen):
         raise Diagnostic("a watcher opens nothing itself", "tui --join", "give --join alone, or with ssh://HOST")
     from multidrop.tui.launch import join
 

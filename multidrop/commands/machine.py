@@ -8,7 +8,6 @@ import platform
 import shutil
 import sys
 from collections.abc import Callable, Collection, Iterator, Mapping
-from dataclasses import asdict
 from datetime import date, datetime
 from importlib.metadata import PackageNotFoundError, requires, version
 from pathlib import Path
@@ -22,7 +21,8 @@ from multidrop.base.text import visible
 from multidrop.macros import MacroStore
 from multidrop.shell import configuration
 from multidrop.shell.configuration import Settings
-from multidrop.shell.secrets import HIDDEN, holds_password, toml_without_secrets, url_without_secrets, without_secrets
+from multidrop.shell.secrets import holds_password, toml_without_secrets, url_without_secrets, without_secrets
+from multidrop.shell.sections import sections
 from multidrop.shell.streams.stdout import write
 
 REFUSED = "   # default; the file's does not count"
@@ -88,10 +88,10 @@ def shown(found: Settings, keys: dict[str, str], text: str) -> list[str]:
     lines += rows("screen", {"theme": theme, "signs": look.signs, "times": look.times}, wrong)
     lines += rows("keys", keys, {name for name, text in look.keys.items() if keys.get(name) != text})
     lines += rows("log", {"always": log.always, "megabytes": log.size / 1e6, "files": log.files})
-    login = {key: HIDDEN if key == "password" and value else value for key, value in asdict(found.mqtt).items()}
-    lines += rows("mqtt", login)
-    lines += rows("simulator", {"allow": list(map(str, found.allowed))})
-    lines += rows("sweep", {"clusters": list(found.clusters)})
+    tables = {name: each.shown(found.section(name)) for name, each in sections().items()}
+    tables["simulator"] = {"allow": list(map(str, found.allowed))}
+    for name, values in sorted(tables.items()):
+        lines += rows(name, values)
     return lines + rows("guards", {"off": sorted(guards.off), "also": sorted(guards.also)})
 
 

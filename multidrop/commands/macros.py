@@ -101,9 +101,9 @@ def _run(command: list[str], otherwise: str) -> None:
         with subprocess.Popen(command) as process:
             signal.signal(signal.SIGINT, signal.SIG_IGN)
             code = process.wait()
-    except OSError:
-        if shutil.which(command[0]) is None:  # a folder of the PATH that may not be read gives another reason
-            error = FileNotFoundError(errno.ENOENT, "")
+    except OSError as problem:
+        # A folder of the PATH that may not be read gives another reason than that there is no such program.
+        error = problem if shutil.which(command[0]) else FileNotFoundError(errno.ENOENT, "")
         raise Diagnostic(f"cannot run ({why(error)})", command[0], f"set VISUAL or EDITOR; {otherwise}") from None
     finally:
         signal.signal(signal.SIGINT, before)

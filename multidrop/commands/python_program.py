@@ -29,6 +29,7 @@ from multidrop.api.sessions import Notice
 from multidrop.base.errors import Diagnostic, Stopped
 from multidrop.base.files import bytes_of
 from multidrop.shell.batch.report import Report
+from multidrop.shell.channel import Front
 from multidrop.shell.events import FAILURES, Entered, Output, Printed, SessionEvent
 from multidrop.shell.exit_codes import INTERRUPTED, exit_code
 from multidrop.shell.prompt.keyboard import on_stop_key, terminal
@@ -59,6 +60,7 @@ class ReportedSession(Session):
         self._failed: tuple[BaseException, Result] | None = None
         """The last call, if it failed, and its result: the program may end with it, or go on."""
         super().__init__(yes=yes, beyond=beyond, notice=notice)
+        self._awaited._shell.front = Front()  # a person agrees by the options of the command
         self._awaited._shell.subscribe(self._take, Entered, Printed, Output)
 
     def person_stopped(self) -> None:

@@ -226,8 +226,7 @@ def load_others(own: bool = True) -> list[str]:
     from multidrop.shell.connect.scheme import Scheme
     from multidrop.shell.connect.schemes import CORE
 
-    known = {feature.name for feature in registry.by_others()}
-    warnings = registry.load_others(own)
+    registry.load_others(own)
     taken = {*VERBS._sections, *COMMANDS._sections, *registry.words(), *(f"{name}:" for name in CORE)}
     for feature in registry.by_others():
         adds = [each for each in feature.adds if isinstance(each, Operation)]
@@ -235,14 +234,12 @@ def load_others(own: bool = True) -> list[str]:
         words = [word for each in adds for word in (each.name, each.command) if word]
         odd = [word for word in words if not _WORD.fullmatch(word)]
         words += schemes
-        if feature.name in known:
-            taken.update(words)
-        elif wrong := next((word for word in words if word in taken or word in odd), ""):
+        if wrong := next((word for word in words if word in taken or word in odd), ""):
             why = f"{wrong} is taken" if wrong in taken else f"{wrong} is no name of a verb or a command"
-            warnings.append(registry.refuse(feature.name, why))
+            registry.refuse(feature.name, why)
         else:
             taken.update(words)
-    return warnings
+    return registry.warnings()
 
 
 def find(name: str) -> Operation:

@@ -273,5 +273,7 @@ def functions(source: bytes) -> Iterator[tuple[str, int, int]]:
                 if not isinstance(node, ast.ClassDef):
                     yield ".".join(here), node.lineno, node.end_lineno or node.lineno
                 yield from inner(node.body, here)
+            elif isinstance(node, ast.If):  # such as `if not TYPE_CHECKING`
+                yield from inner([*node.body, *node.orelse], names)
 
     yield from inner(ast.parse(source).body, ())

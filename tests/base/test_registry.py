@@ -25,6 +25,7 @@ def own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     monkeypatch.setenv("MULTIDROP_STATE_DIR", str(tmp_path / "state"))
     monkeypatch.setattr(registry, "_others", {})
     monkeypatch.setattr(registry, "_failed", {})
+    monkeypatch.setattr(registry, "_untold", [])
     monkeypatch.setattr(importlib.metadata, "entry_points", lambda group: [])
     folder = tmp_path / "features"
     folder.mkdir()
@@ -45,15 +46,16 @@ def state(name: str) -> tuple[str, str]:
 
 def test_a_file_in_the_folder_is_a_feature(own: Path) -> None:
     path = write(own, "clamp")
-    assert registry.load_others() == []
+    registry.load_others()
+    assert registry.warnings() == []
     assert [each.name for each in registry.by_others()] == ["clamp"]
     assert state("clamp") == (str(path), "ready")
-    assert registry.load_others() == [], "it is loaded once"
 
 
 def test_without_the_configuration_a_persons_own_files_are_not_loaded(own: Path) -> None:
     write(own, "clamp")
-    assert registry.load_others(own=False) == [] and registry.by_others() == []
+    registry.load_others(own=False)
+    assert registry.warnings() == [] and registry.by_others() == []
 
 
 @pytest.mark.parametrize(
@@ -72,24 +74,28 @@ def test_without_the_configuration_a_persons_own_files_are_not_loaded(own: Path)
 def test_one_that_cannot_be_loaded_is_one_warning_and_the_others_are_there(own: Path, text: str, why: str) -> None:
     path = write(own, "bad", text)
     write(own, "fine")
-    [warning] = registry.load_others()
+    registry.load_others()
+    [warning] = registry.warnings()
     assert warning.startswith(f"the feature bad ({path}) cannot be loaded: {why}")
     assert [each.name for each in registry.by_others()] == ["fine"]
-    assert registry.load_others() == [], "it is said once"
+    registry.load_others()
+    assert registry.warnings() == [], "it is said once"
     assert state("bad")[1].startswith(f"cannot be loaded: {why}")
 
 
-@pytest.mark.skipif(os.name != "posix", reason="folders of others are a matter of POSIX")
+@pytest.mark.fork
 def test_a_file_that_others_can_change_is_not_used(own: Path) -> None:
     write(own, "clamp").chmod(0o666)
-    [warning] = registry.load_others()
+    registry.load_others()
+    [warning] = registry.warnings()
     assert "can be changed by every account" in warning and registry.by_others() == []
 
 
 def test_a_name_of_the_wheel_is_taken(own: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(registry, "IN_WHEEL", {"clamp": ()})
     write(own, "clamp")
-    assert registry.load_others()[0].endswith("cannot be loaded: another feature has this name")
+    registry.load_others()
+    assert registry.warnings()[0].endswith("cannot be loaded: another feature has this name")
 
 
 def test_a_feature_tells_which_extras_are_missing() -> None:
@@ -130,7 +136,8 @@ def test_a_package_is_loaded_by_its_entry_point(tmp_path: Path, monkeypatch: pyt
     (tmp_path / "package_clamp.py").write_text(GOOD.replace("{name}", "clamp"))
     monkeypatch.syspath_prepend(str(tmp_path))
     monkeypatch.setattr(importlib.metadata, "entry_points", lambda group: [package("clamp", "package_clamp:FEATURE")])
-    assert registry.load_others() == []
+    registry.load_others()
+    assert registry.warnings() == []
     assert state("clamp") == ("multidrop-clamp", "ready")
     [(entry, meaning, _)] = [each for each in registry.states("1.2") if each[0].name == "clamp"]
     assert (entry.version, meaning) == ("2.0", "does something")

@@ -44,7 +44,7 @@ def test_every_name_exists(name):
 
 
 def test_the_page_stays_short():
-    assert len((ROOT / "docs" / "architecture.md").read_text(encoding="utf-8").splitlines()) <= 165
+    assert len((ROOT / "docs" / "architecture.md").read_text(encoding="utf-8").splitlines()) <= 170
 
 
 def test_the_index_leads_to_every_page():

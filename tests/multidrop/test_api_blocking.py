@@ -220,3 +220,44 @@ def test_a_blocking_call_in_its_own_thread_is_refused(session: Session) -> None:
 
     soon(session, 0.0, call)
     assert session.drive("a").position == 0 and len(failures) == 1
+
+
+def test_a_stop_whose_report_is_interrupted_is_a_stop_all_the_same(
+    session: Session, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    class Interrupted:
+        """The end of a call for which a person does not wait."""
+
+        def done(self) -> bool:
+            return False
+
+        def result(self) -> None:
+            raise KeyboardInterrupt
+
+    begin = session._thread.begin
+
+    def first(work: Any) -> Interrupted:
+        monkeypatch.setattr(session._thread, "begin", begin)
+        work.close()
+        return Interrupted()
+
+    session.drive("a").run_at(1000)
+    monkeypatch.setattr(session._thread, "begin", first)
+    with pytest.raises(KeyboardInterrupt):
+        session.stop()
+    with pytest.raises(Stopped):
+        session.drive("b").move(5)
+    assert moving(floor(session)) == set()
+    session.resume()
+    session.drive("b").move(5)
+
+
+def test_a_session_agrees_to_nothing_unless_it_is_told(url: str, tmp_path: Path) -> None:
+    (tmp_path / "kept.toml").write_text("[parameters]\nRC = 33\n")
+    for opened, agreed in ((Session(url), False), (connect(url), False), (Session(url, yes=True), True)):
+        with opened:
+            if agreed:
+                assert opened.drive("a").parameters.restore(str(tmp_path / "kept.toml")) == ["a: RC=33 (was 25)"]
+                continue
+            with pytest.raises(Diagnostic, match="nothing was sent"):
+                opened.drive("a").parameters.restore(str(tmp_path / "kept.toml"))

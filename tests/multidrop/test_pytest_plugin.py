@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import socket
 import sys
 import tomllib
@@ -9,9 +10,11 @@ from pathlib import Path
 
 import pytest
 
-from multidrop import Diagnostic, connect, simulate
+from multidrop import Diagnostic, Drive, Session, SimulatedCell, connect, simulate
+from multidrop.shell import configuration
 from tests.support.paths import ROOT
 from tests.support.processes import environment
+from tests.support.until import PATIENCE
 
 pytest_plugins = ["pytester"]
 
@@ -100,6 +103,42 @@ def test_folders_of_a_persons_own_and_a_fault_of_a_cell(
     fault = '[[bus]] "y": [[bus.drive]] 1: unknown key "nme"; did you mean "name"?'
     done.stdout.fnmatch_lines([f"cell:5: {fault}".replace("[", "[[]"), f"*.toml:5: {fault}".replace("[", "[[]")])
     assert "Traceback" not in done.stdout.str() and "cells.py" not in done.stdout.str()
+
+
+def test_a_fault_of_a_cell_is_an_error_of_the_test_in_one_line(
+    pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pytester.makepyfile(test_broken=BROKEN)
+    monkeypatch.setenv("PYTEST_DISABLE_PLUGIN_AUTOLOAD", "1")
+    done = pytester.runpytest_inprocess("-p", "multidrop.pytest_plugin", "-p", "no:cacheprovider")
+    done.assert_outcomes(errors=2)
+    fault = '[[bus]] "y": [[bus.drive]] 1: unknown key "nme"; did you mean "name"?'.replace("[", "[[]")
+    done.stdout.fnmatch_lines([f"cell:5: {fault}", f"*multidrop-cell.toml:5: {fault}"])
+    assert "Traceback" not in done.stdout.str() and "pytest_plugin.py" not in done.stdout.str()
+
+
+def test_a_drive_of_a_session_in_memory_has_folders_of_its_own(
+    multidrop_drive: Drive, multidrop_session: Session, multidrop_folders: Path, multidrop_cell_text: str
+) -> None:
+    assert multidrop_drive.name == "a" and repr(multidrop_session) == "<multidrop: line: a, b>"
+    assert multidrop_drive.product == "LMDCM" and multidrop_drive.read("PY") == 1
+    assert (multidrop_folders / "multidrop-cell.toml").read_text(encoding="utf-8") == multidrop_cell_text
+    for name in ("config", "state", "data"):
+        assert os.environ[f"MULTIDROP_{name.upper()}_DIR"] == str(multidrop_folders / f"multidrop-{name}")
+    assert configuration.config_folder() == multidrop_folders / "multidrop-config"
+    seen = [multidrop_session.send(f"/sim input a 1 {level}") or multidrop_drive.inputs[1] for level in (0, 1)]
+    assert sorted(seen) == [False, True], "the world of its cell moves"
+
+
+def test_a_served_cell_speaks_to_any_client(multidrop_cell: SimulatedCell) -> None:
+    assert multidrop_cell.buses == ["line"]
+    host, _, port = multidrop_cell.url().removeprefix("tcp://").rpartition(":")
+    with socket.create_connection((host, int(port)), PATIENCE) as wire:
+        wire.sendall(b"\nbPR DN\n")
+        seen = b""
+        while b'"b"' not in seen:
+            assert (data := wire.recv(100)), seen
+            seen += data
 
 
 def test_pytest_loads_the_plugin_where_multidrop_is_installed() -> None:

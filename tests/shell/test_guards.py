@@ -212,3 +212,16 @@ async def test_neither_a_macro_nor_a_script_can_agree_to_it(tmp_path):
         with pytest.raises(Diagnostic, match="a macro cannot ask, nothing was sent"):
             await shop.session.run("@a VM=5000", By.MACRO)
         assert silent(shop)
+
+
+async def test_text_for_a_raw_line_that_lacks_its_guards_needs_a_yes_too(tmp_path):
+    async with opened(tmp_path) as shop:
+        await shop.session.run("/use press:a")
+        await shop.session.run("/raw on")
+        shop.session.of(shop.session.buses["press"]).doubt = "multidrop.toml:9: no word NOPE"
+        with pytest.raises(Diagnostic, match="read only.*multidrop.toml:9.*nothing was sent"):
+            await shop.session.run("aMR 5")
+        assert b"MR 5" not in shop.written("press")
+        Person(shop, True)
+        await shop.session.run("aMR 5")
+        assert b"aMR 5" in shop.written("press")

@@ -18,8 +18,6 @@ from multidrop.simulator.serving.endpoints import serve_bus
 from multidrop.simulator.serving.running import RunningFloor
 from tests.support.until import PATIENCE
 
-pytestmark = pytest.mark.slow
-
 CELL = """
 [[bus]]
 name = "eth"
@@ -132,6 +130,7 @@ SAME = [
 ]
 
 
+@pytest.mark.slow
 async def test_the_same_line_has_the_same_answer(session):
     differing = []
     for line in SAME:
@@ -141,6 +140,7 @@ async def test_the_same_line_has_the_same_answer(session):
     assert differing == []
 
 
+@pytest.mark.slow
 async def test_a_move_over_one_is_seen_over_the_other(session):
     await session.run("/use modbus")
     await session.run("MR 51200")
@@ -245,6 +245,7 @@ async def test_on_another_language_the_verbs_say_where_they_belong(session, line
         await session.run(line)
 
 
+@pytest.mark.slow
 async def test_a_stop_ends_program_and_motion_and_is_seen_to_work(session):
     await session.run("@modbus: EX A3")
     await session.run("@modbus: SL 500000")
@@ -264,6 +265,7 @@ async def test_a_stop_ends_program_and_motion_and_is_seen_to_work(session):
     assert await answers(session, "PR V,BY", "modbus") == ["00"]
 
 
+@pytest.mark.slow
 async def test_telemetry_samples_position_and_velocity(session):
     await session.run("@modbus: SL 100000")
     samples = []
@@ -326,6 +328,7 @@ async def test_a_raw_write_of_a_guarded_register_needs_a_yes(session):
 REFUSED = ["RC=200", "/register 0x67 =70000", "/register 0x67 =200", "STATUS", "VM=0", "PR MR", "/register 0x02 =1"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("line", REFUSED)
 async def test_a_refused_line_ends_no_program_and_no_motion(session, line):
     for each in ("SL 20000", "/sleep 0.5", "EX A3"):
@@ -339,6 +342,7 @@ async def test_a_refused_line_ends_no_program_and_no_motion(session, line):
     assert await answers(session, "PR V", "mcode") == ["20000"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("line", ["SL 20000", "/register 0x78 =20000", "MA 900000", "/register 0x43 =0,10"])
 async def test_an_accepted_write_that_moves_counts_and_the_program_is_named(session, line):
     await session.run("@mcode: EX A3")

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import asyncio
-import json
 from pathlib import Path
 from typing import Any
 
 import pytest
-from tests.shell.publishing.test_publish_feed import published
 
 from multidrop.api.telemetry import AsyncTelemetry
 from multidrop.base.errors import DriveError
@@ -119,22 +117,6 @@ async def test_where_a_drive_stands_has_its_place_in_units(tmp_path: Path) -> No
         assert (one.text, other.text) == ("a is at rest at 102400 (10 mm)", "b is at rest at 0")
         assert one.fact == {"position": 102400, "velocity": 0, "quantity": 10.0, "unit": "mm"}
         assert other.fact == {"position": 0, "velocity": 0}
-
-
-async def test_published_values_have_the_unit_as_a_further_field(tmp_path: Path) -> None:
-    async with CellSession(tmp_path, PRESS) as shop:
-        await shop.session.run("@a MR {10 mm}")
-        await shop.session.run("/wait stopped")
-        async with published(shop) as broker:
-            await asyncio.sleep(6)
-        last: dict[str, Any] = json.loads(broker.texts("p/press/a/position")[-1])
-        assert {key: last[key] for key in ("value", "quantity", "unit")} == {
-            "value": 102400,
-            "quantity": 10.0,
-            "unit": "mm",
-        }
-        assert json.loads(broker.texts("p/press/a/velocity")[-1])["unit"] == "mm/s"
-        assert set(json.loads(broker.texts("p/press/b/position")[-1])) == {"time", "value"}
 
 
 class Kept:

@@ -16,7 +16,7 @@ from multidrop.shell.session import Session
 from multidrop.simulator import cells
 from tests.support.cell_session import CellSession, bus, pmx
 
-pytestmark = [pytest.mark.virtual, pytest.mark.slow]
+pytestmark = pytest.mark.virtual
 
 PROGRAM = """program_text = \"\"\"
 PG 1
@@ -136,6 +136,7 @@ async def prompted(url: str, folder: Path, *lines: str) -> list[str]:
         await session.close()
 
 
+@pytest.mark.slow
 async def test_the_simulator_replies_like_the_machine(tmp_path):
     async with CellSession(tmp_path, *MACHINES["LMDCM"]) as cell:
         await snapshots.save(cell.session, str(tmp_path / "one.toml"))
@@ -155,6 +156,7 @@ async def test_the_remarks_of_a_downloaded_file_are_kept(tmp_path):
     assert (await taken(tmp_path, f"sim:{tmp_path / 'one.toml'}", "two.toml"))[0] == first
 
 
+@pytest.mark.slow
 async def test_a_locked_program_and_a_drive_that_moves_say_so(tmp_path):
     locked = 'personality = "LMDCM"\nname = "a"\nparty = true\nset = { EM = 1, LK = 1 }\nvariables = { Q1 = 1 }\n'
     locked += PROGRAM

@@ -68,6 +68,13 @@ async def test_automation_is_refused_also_beside_a_person(session: Session, plc:
     assert not plc.received
 
 
+async def test_what_is_refused_names_the_device_the_line_and_why(session: Session) -> None:
+    for line, what in (("MA 100", "'MA 100' writes"), ("/coil 7 1", "'/coil 7 1' writes")):
+        with pytest.raises(Diagnostic) as caught:
+            await session.run(line, By.SCRIPT)
+        assert str(caught.value).startswith(f"plc: {what}, and ")
+
+
 async def test_bytes_of_automation_on_a_raw_line_are_refused(session: Session, plc: Device) -> None:
     await session.run("/raw on")
     with pytest.raises(Diagnostic, match="did not identify itself"):

@@ -43,7 +43,7 @@ async def test_each_line_says_this_and_nothing_else(tmp_path, monkeypatch, name)
     file = SAID / f"{name}.txt"
     expected = file.read_text(encoding="utf-8").splitlines()
     lines = [each.removeprefix("> ") for each in expected if each.startswith("> ")]
-    units = SCALES if name == "units" else {}
+    units = SCALES if name in ("units", "travel") else {}
     async with CellSession(tmp_path, *(PLAIN if name == "steps" else PLANT), units=units) as shop:
         shop.session.questions.agreed = name not in NO
         found = await transcript(shop, lines, tmp_path)

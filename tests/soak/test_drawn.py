@@ -96,6 +96,10 @@ def test_each_mutant_is_another_program_and_names_its_function() -> None:
         assert each.function == ("" if each.line < 11 else "Line.take")
         assert SOURCE[each.start : each.end].decode() == each.before and f"line.py:{each.line}" in each.words
     assert list(functions(SOURCE)) == [("Line.take", 14, 24)]
+    hidden = (
+        b"class A:\n    if not CHECKED:\n        def f(self):\n            pass\n    else:\n        def g(self): ...\n"
+    )
+    assert list(functions(hidden)) == [("A.f", 3, 4), ("A.g", 6, 6)]
 
 
 @pytest.mark.parametrize("room", rooms.ROOMS)

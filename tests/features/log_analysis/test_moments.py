@@ -145,7 +145,9 @@ def test_times(folder: Path) -> None:
         assert moment(text, first, last) == (expected if zoned else expected.replace(tzinfo=None)), text
     after = moment("12:01", last, last)  # after the end of a short log
     assert after == last.replace(minute=1, second=0, tzinfo=None)
-    for text in ("noon", "0001-01-01T00:00+00:00"):
+    for text in ("0002-01-01", "9998-12-31"):  # the first and the last year that every zone has
+        assert moment(text, first, last) == datetime.fromisoformat(text)
+    for text in ("noon", "0001-01-01T00:00+00:00", "9999-12-31T00:00+00:00", "9999-01-01"):
         with pytest.raises(Diagnostic, match=rf"^log at: '{re.escape(text)}' is not a time; as in 11:37:05.2"):
             moment(text, first, last)
 

@@ -22,8 +22,8 @@ from multidrop.features.publishing import broker as broker_module
 from multidrop.features.publishing import publisher as publisher_module
 from multidrop.features.publishing.broker import Connection, Message, parse_target
 from multidrop.features.publishing.feed import Topics
+from multidrop.features.publishing.login import MqttSettings
 from multidrop.features.publishing.publisher import Publisher
-from multidrop.shell.configuration import MqttSettings
 from multidrop.transports import Unreachable
 from tests.support.mosquitto import PASSWORD, USER, Mosquitto, Subscriber, free_port, retained
 from tests.support.processes import Running

@@ -18,7 +18,7 @@ from multidrop.features.publishing.opcua import LONGEST, UaServer
 from multidrop.features.publishing.registry import Key, Registry, Value
 from tests.support.until import until
 
-pytestmark = [pytest.mark.asyncio(loop_scope="module"), pytest.mark.slow]  # one server, which takes seconds to begin
+pytestmark = pytest.mark.asyncio(loop_scope="module")  # one server, which takes a second to begin
 TIME = datetime(2026, 11, 22, 14, 3, 7, 123000, UTC)
 
 
@@ -126,6 +126,7 @@ async def test_a_client_is_told_of_changes(registry: Values) -> None:
         await client.disconnect()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("user", ["", "admin"])
 async def test_no_client_writes_calls_or_adds_anything(user: str, registry: Values) -> None:
     registry.put(Key("press", "a", "position"), value=5)

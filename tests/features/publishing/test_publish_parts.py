@@ -20,6 +20,7 @@ from multidrop.drives.events import Conditioned, Sample
 from multidrop.features.publishing import feed
 from multidrop.features.publishing.broker import Message, Target, parse_target
 from multidrop.features.publishing.feed import BURST, LINES, UNCHANGED, Curve, LineLimit, Topics, escape
+from multidrop.features.publishing.login import MqttSettings
 from multidrop.features.publishing.publisher import Backlog
 from multidrop.features.publishing.registry import (
     AT_REST,
@@ -33,7 +34,6 @@ from multidrop.features.publishing.registry import (
     parse_rate,
 )
 from multidrop.shell import configuration
-from multidrop.shell.configuration import MqttSettings
 from multidrop.shell.log.files import Entry
 
 # Topics
@@ -264,7 +264,9 @@ def test_a_line_is_an_entry_of_the_log_without_secrets_and_of_bounded_length() -
 def test_the_login_is_read_and_paths_begin_at_the_configuration(tmp_path: Path) -> None:
     (tmp_path / "secret").write_text("hunter2\n")
     where = str(tmp_path / "multidrop.toml")
-    found = configuration.parse('[mqtt]\nusername = "u"\npassword_file = "secret"\nca = "/etc/ca.pem"\n', where).mqtt
+    found = configuration.parse(
+        '[mqtt]\nusername = "u"\npassword_file = "secret"\nca = "/etc/ca.pem"\n', where
+    ).section("mqtt")
     assert found == MqttSettings("u", password_file=str(tmp_path / "secret"), ca="/etc/ca.pem")
     assert found.secret() == "hunter2"
     assert [*found.unreadable()] == ["mqtt.ca: /etc/ca.pem cannot be read: No such file or directory"]
@@ -333,3 +335,12 @@ def test_each_axis_has_a_state_and_an_error_beside_those_of_its_drive() -> None:
     assert states == []
     drive.take(Sample(4.0, "00", 5, 0, axis="x"))
     assert said[-3:] == [("state", "", AT_REST), ("state", "x", AT_REST), ("state", "y", AT_REST)]
+
+
+@given(st.text(alphabet="abz/@:?#&=%\\ '\"[]{},", max_size=12), st.text(alphabet="abz/@:?#&=% ", max_size=12))
+def test_no_refusal_of_a_broker_quotes_its_password(before: str, after: str) -> None:
+    for scheme in ("mqtt", "mqtts", "tcp"):
+        url = f"{scheme}://me:{before}xyzzy{after}@10.0.0.5:503/proxy"
+        with pytest.raises(Diagnostic) as refused:
+            parse_target(url)
+        assert "xyzzy" not in str(refused.value), url

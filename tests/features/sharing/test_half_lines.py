@@ -12,7 +12,8 @@ from hypothesis import strategies as st
 
 from multidrop.dialects.tmcl.host import codec
 from multidrop.dialects.tmcl.manual import commands
-from multidrop.features.sharing.writer_turns import SILENT
+from multidrop.features.sharing.stop_bytes import stop_bytes
+from multidrop.features.sharing.writer_turns import SILENT, Exchange, Say, Write
 from multidrop.simulator.lexium.ports.mcode import MCodePort
 from multidrop.simulator.lexium.ports.replies import checksum
 from multidrop.simulator.pmx.device import PmxPort
@@ -189,3 +190,18 @@ def test_a_tmcl_module_executes_no_frame_of_two_writers(
     text = b"".join(codec.frame_of(1, commands.parse(each)) for each in first)
     following = b"".join(codec.frame_of(1, commands.parse(each)) for each in second)
     shared(tmcl, Port("tmcl"), [text[:cut]], [following], leaves, text[cut:])
+
+
+def test_bytes_that_the_port_dropped_leave_a_doubt_only_where_nothing_follows_that_makes_a_line_harmless() -> None:
+    stops = stop_bytes("")
+    for purged in (False, True):
+        exchange = Exchange(stops, 9600)
+        for count, words in (
+            (1, "1 byte that had not left was dropped"),
+            (3, "3 bytes that had not left were dropped"),
+        ):
+            assert exchange.dropped(count, *([True, 1.0] if purged else [])) == [Say("", "unsent", words)]
+        assert exchange.dropped(0) == []
+        assert [each.data for each in exchange.over() if isinstance(each, Write)] == (
+            [stops.harmless(True)] if purged else []
+        )

@@ -385,3 +385,12 @@ async def test_four_clients_that_flood_it_with_requests_do_not_come_before_anoth
     await shared.line.got(b"\x1b")
     assert at_stop[0] - before <= 4 * 2 * TURN * 3 < 4 * 900 - before  # three looks at the sockets, at most
     await until(lambda: len(worked) == 4 * 900)
+
+
+async def test_sharing_ends_at_once_while_the_port_is_lost_and_tried_again(shared: Shared) -> None:
+    shared.line.link.unlink()
+    os.close(shared.line.far)
+    shared.line.far = os.open(os.devnull, os.O_RDWR)
+    await until(lambda: "lost" in shared.events())
+    await asyncio.wait_for(shared.port.close(), 5)
+    assert asyncio.all_tasks() == {asyncio.current_task()}

@@ -6,8 +6,12 @@ import json
 import time
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
+from types import SimpleNamespace
 
+from multidrop.cli import parse
+from multidrop.shell import hooks
 from multidrop.shell.log.files import BEGIN, Entry, line_of
+from tests.support.cases import for_each
 from tests.support.cell_session import bus, party
 from tests.support.front_door import Command
 from tests.support.front_door import multidrop as multidrop
@@ -54,3 +58,10 @@ def test_equal_positions_are_exit_0(tmp_path: Path, multidrop: Command) -> None:
 def test_raw_bytes_have_no_twin(multidrop: Command) -> None:
     done = multidrop("shell", "sim:", "--raw", "--twin")
     assert done.returncode == 2 and len(done.stderr.splitlines()) == 1
+
+
+@for_each("words, wanted", [(["shell", "a", "--twin"], True), (["tui", "a", "--twin"], True), (["tui", "a"], False)])
+def test_the_option_wants_twins_of_the_session_that_is_opened(words: list[str], wanted: bool) -> None:
+    chosen, twins = parse(words), SimpleNamespace(wanted=False)
+    hooks.prepare(SimpleNamespace(part=lambda kind: twins), chosen)
+    assert twins.wanted is wanted

@@ -21,7 +21,7 @@ from tests.support.cell_session import CellSession, bus, pmx
 from tests.support.until import until
 from tests.support.usb_stand_in import UsbFaults
 
-pytestmark = [pytest.mark.virtual, pytest.mark.slow]
+pytestmark = pytest.mark.virtual
 
 FAST = "[bus.drive.world.x]\nlimit_plus = 100000"
 CELL = bus("first", pmx("00", FAST)), bus("second", pmx("07"))
@@ -123,6 +123,7 @@ async def test_samples_of_both_axes_arrive(shop: CellSession) -> None:
     assert {each.axis for each in seen} == {"x", "y"} and any(each.velocity > 0 for each in seen if each.axis == "x")
 
 
+@pytest.mark.slow
 async def test_settings_go_into_a_file_and_back(shop: CellSession) -> None:
     await say(shop, "/params backup kept.toml first:", "@first: HSPD=9000", "@first: V40=6")
     assert len(await say(shop, "/params diff kept.toml first:")) == 2
@@ -201,3 +202,9 @@ async def lost_by(shop: CellSession, name: str, plug: str) -> None:
 def test_ports_have_one_name() -> None:
     assert parse("usbip://PC3/1-1").port_name == parse("usbip://pc3:3240/1-1?timeout=2").port_name == "pc3:3240/1-1"
     assert parse("usb:2ED01@1-1.4?timeout=2").port_name == "usb:2ED01@1-1.4"
+
+
+def test_a_port_is_shown_without_its_keys() -> None:
+    for url in ("usb:2ED42", "usbip://[fe80::1]:3240/1-1"):
+        connection = parse(f"{url}?timeout=2")
+        assert connection.scheme.shown(connection) == url

@@ -18,7 +18,7 @@ from tests.support.cell_session import ETHERNET, CellSession, bus, party, pmx
 from tests.support.mcode_drives import Witness
 from tests.support.until import until
 
-pytestmark = [pytest.mark.virtual, pytest.mark.slow]
+pytestmark = pytest.mark.virtual
 
 LINE = bus("line", party("a"), party("b"))
 PROGRAM = "".join(f"R1=R1+{number}\n" for number in range(40))
@@ -46,6 +46,7 @@ async def back(shop: CellSession, name: str = "line") -> float:
     return await until(lambda: not shop.session.buses[name].lost and not shop.session.reconnections.trying)
 
 
+@pytest.mark.slow
 async def test_a_bus_comes_back_as_it_was(shop: CellSession) -> None:
     line, drives = shop.session.buses["line"], dict(shop.session.buses["line"].drives)
     shop.session.select("b")
@@ -67,6 +68,7 @@ async def test_a_bus_comes_back_as_it_was(shop: CellSession) -> None:
     assert said[3:] == ["line: a is at rest at 0", "line: b is at rest at 0"]
 
 
+@pytest.mark.slow
 async def test_a_port_that_is_back_is_noticed_within_a_second_however_long_it_was_away(tmp_path: Path) -> None:
     async with opened(tmp_path, bus("line", ETHERNET)) as shop:
         for away in (0.01, 0.3, 5.0, 3000.0):
@@ -105,6 +107,7 @@ async def test_a_question_that_was_in_flight_leaves_nothing_open(shop: CellSessi
     assert "not known" not in str(failed.value) and b"\x1b" not in shop.written("line")
 
 
+@pytest.mark.slow
 async def test_a_download_ends_and_the_drive_is_put_right(tmp_path: Path, shop: CellSession) -> None:
     (tmp_path / "long.mxt").write_text(PROGRAM.join(("PG 1\n", "E\nPG\n")))
     device = shop.device("line:a")
@@ -314,6 +317,7 @@ async def test_another_drive_on_the_same_port_is_said_in_one_line(shop: CellSess
     assert "product LMDOM before, LMDCM now" in said
 
 
+@pytest.mark.slow
 async def test_a_silent_line_is_said_once_and_asked_until_a_drive_replies(shop: CellSession) -> None:
     await lost(shop)
     for name in "ab":
@@ -328,6 +332,7 @@ async def test_a_silent_line_is_said_once_and_asked_until_a_drive_replies(shop: 
     await shop.session.run("@a PR P")
 
 
+@pytest.mark.slow
 async def test_a_bus_that_never_comes_back_is_given_up_by_close(shop: CellSession) -> None:
     before = len(asyncio.all_tasks())
     await lost(shop)
@@ -340,6 +345,7 @@ async def test_a_bus_that_never_comes_back_is_given_up_by_close(shop: CellSessio
     assert not shop.told() and len(asyncio.all_tasks()) <= before
 
 
+@pytest.mark.slow
 async def test_plugged_out_and_in_ten_times_nothing_is_left_behind(shop: CellSession) -> None:
     line = shop.session.buses["line"]
     subscription = line.telemetry.subscribe(["a"], 0.1)
@@ -358,6 +364,7 @@ async def test_plugged_out_and_in_ten_times_nothing_is_left_behind(shop: CellSes
     assert len(shop.session.cells["line"]._listeners["line"]) == listeners
 
 
+@pytest.mark.slow
 async def test_several_buses_come_back_side_by_side(tmp_path: Path) -> None:
     module = 'personality = "TMCM"\nname = "1"'
     cell = [LINE, bus("eth", ETHERNET, baud=0), bus("pmx", pmx("00")), bus("tmcl", module)]
@@ -383,6 +390,7 @@ async def test_an_ethernet_drive_that_was_switched_off_comes_back_once_it_has_bo
         assert not shop.moving()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("polled", [False, True], ids=["quiet", "polled"])
 @pytest.mark.parametrize(
     ("saved", "changed"),
@@ -445,3 +453,15 @@ async def test_a_bus_that_is_lost_while_it_is_opened_is_not_tried_again(tmp_path
     with pytest.raises(Diagnostic):
         await shop.session.run("/close line")
     await shop.session.close()
+
+
+async def test_only_a_line_that_is_lost_and_tried_again_is_said_to_get_the_stop_later(tmp_path: Path) -> None:
+    async with opened(tmp_path, bus("line", party("a")), bus("other", party("b"))) as cell:
+        await lost(cell)
+        cell.session.stop()
+        later = [text for text in cell.warned() if "the first to be sent when" in text]
+        assert later == ["line: the stop is the first to be sent when the line is back"]
+    async with opened(tmp_path, bus("line", party("a")), reconnect=False) as cell:
+        await lost(cell)
+        cell.session.stop()
+        assert not any("the first to be sent when" in text for text in cell.warned())

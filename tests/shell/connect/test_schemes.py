@@ -42,6 +42,7 @@ def add(monkeypatch: pytest.MonkeyPatch, *adds: object) -> None:
     entry = registry.Entry("gateway", "elsewhere", "1", "elsewhere:FEATURE")
     monkeypatch.setattr(registry, "_others", {entry.place: (entry, Feature("gateway", "a gateway", adds))})
     monkeypatch.setattr(registry, "_failed", {})
+    monkeypatch.setattr(registry, "_untold", [])
 
 
 @pytest.fixture
@@ -77,14 +78,7 @@ def test_a_scheme_that_is_there_is_taken(monkeypatch: pytest.MonkeyPatch) -> Non
         name = "tcp"
 
     add(monkeypatch, Tcp())
-    loaded = dict(registry._others)
-    monkeypatch.setattr(registry, "_others", {})
-
-    def load(own: bool) -> list[str]:
-        registry._others.update(loaded)
-        return []
-
-    monkeypatch.setattr(registry, "load_others", load)
+    monkeypatch.setattr(registry, "load_others", lambda own: None)
     [warning] = load_others()
     assert warning == "the feature gateway (elsewhere) cannot be loaded: tcp: is taken"
     assert schemes()["tcp"] is CORE["tcp"]

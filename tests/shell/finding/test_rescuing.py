@@ -12,7 +12,7 @@ from multidrop.shell.finding.scanning import NothingFound, Scanning
 from tests.support.cell_session import bus, pmx
 from tests.support.tuned_ports import Port
 
-pytestmark = [pytest.mark.virtual, pytest.mark.slow]
+pytestmark = pytest.mark.virtual
 
 BAUDS = (4800, 9600, 19200, 38400, 115200)
 QUICK = [(0, 0, 0, "!", 9600), (2, 1, 1, "P", 115200), (3, 1, 2, "9", 4800), (1, 0, 1, "a", 19200)]
@@ -69,6 +69,7 @@ async def test_nothing_that_may_do_harm_is_sent_before_a_yes(tmp_path):
     assert any(text.startswith("step 2: clear the line") for text in port.told())
 
 
+@pytest.mark.slow
 async def test_nothing_is_erased_without_a_word_for_it(tmp_path):
     port = Port(tmp_path, bus("b", drive(more='program_text = "PG 1\\nLB G1\\nE\\nPG"')))
     port.devices[0].power(False, 0.0)
@@ -145,6 +146,7 @@ async def test_a_stop_ends_a_rescue(tmp_path):
     assert port.session.buses == {} and not any(text.endswith("factory defaults") for text in port.told())
 
 
+@pytest.mark.slow
 async def test_a_stop_while_it_listens_reaches_every_rate_that_was_agreed_to(tmp_path):
     port = Port(tmp_path, bus("b", drive("a", em=0, py=0)))
     device = port.devices[0]

@@ -17,7 +17,7 @@ from tests.support.cell_session import CellSession, bus, drive, party, pmx
 from tests.support.talker import Talker
 from tests.support.tuned_ports import Port
 
-pytestmark = [pytest.mark.virtual, pytest.mark.slow]
+pytestmark = pytest.mark.virtual
 
 MOVES = 'program_text = """PG 1\nLB Q1\nMR 5000\nRT\nE\nPG\nOE Q1\n"""'
 
@@ -48,6 +48,7 @@ async def test_before_another_baud_rate_a_person_is_asked_and_told_why(tmp_path)
     assert port.opened == [("mcode", 9600)] and found == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "baud", [115200, *(pytest.param(baud, marks=pytest.mark.nightly) for baud in (4800, 19200, 38400))]
 )
@@ -60,6 +61,7 @@ async def test_a_drive_at_any_baud_rate_is_found_after_a_yes(tmp_path, baud):
     assert port.opened[0] == ("mcode", 9600) and port.opened[-1] == ("mcode", baud)
 
 
+@pytest.mark.slow
 async def test_a_controller_of_the_other_family_is_found_last(tmp_path):
     port = Port(tmp_path, bus("b", pmx("07"), baud=19200))
     port.session.questions.agreed = True
@@ -95,6 +97,7 @@ async def test_a_no_to_the_rest_keeps_what_was_found(tmp_path):
     assert len(found) == 1 and port.opened == [("mcode", 9600)]
 
 
+@pytest.mark.slow
 async def test_all_goes_on_and_takes_no_longer_than_its_bound(tmp_path):
     port = Port(tmp_path, bus("b"))
     port.session.questions.agreed = True
@@ -244,6 +247,7 @@ async def stopped_at(port, search, opened):
     return port.opened[opened:]
 
 
+@pytest.mark.slow
 async def test_a_stop_is_sent_first_where_drives_may_be_then_as_far_as_was_agreed_then_again_where_they_may_be(
     tmp_path,
 ):
@@ -276,6 +280,7 @@ async def test_a_stop_before_any_agreement_reaches_the_remembered_rate_and_no_ot
     assert not device.moving(port.floor.now())
 
 
+@pytest.mark.slow
 async def test_a_stop_at_the_question_reaches_what_was_searched(tmp_path):
     port = Port(tmp_path, bus("b", party("a")))
     asked = asyncio.Event()
@@ -298,6 +303,7 @@ async def test_a_stop_at_the_question_reaches_what_was_searched(tmp_path):
     assert not device.moving(port.floor.now())
 
 
+@pytest.mark.slow
 async def test_a_second_stop_key_does_not_end_the_first_stop(tmp_path):
     port = Port(tmp_path, bus("b", party("a")))
     _, search = scanning(port)
@@ -313,6 +319,7 @@ async def test_a_second_stop_key_does_not_end_the_first_stop(tmp_path):
     assert port.opened[3:] == [ALL[0], ALL[1], *ALL[3:], *ALL[:3]]
 
 
+@pytest.mark.slow
 async def test_a_rate_at_which_the_port_cannot_be_opened_is_named_and_the_others_get_the_stop(tmp_path):
     port = Port(tmp_path, bus("b", party("a")))
     opener = port.opener
@@ -331,6 +338,7 @@ TALKATIVE = bus("b", drive("TMCM", "1", "any_address = true"))
 TMCL = "frames came as TMCL drives send them: dialect=tmcl opens such a line"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("family", "title"), [("mcode", "MCode"), ("pmx", "PMX")])
 async def test_frames_of_nine_bytes_that_a_search_hears_are_named(family, title, tmp_path):
     port = Port(tmp_path, TALKATIVE)
@@ -341,6 +349,7 @@ async def test_frames_of_nine_bytes_that_a_search_hears_are_named(family, title,
     assert len(port.told()) < 10
 
 
+@pytest.mark.slow
 async def test_a_search_that_hears_frames_of_nine_bytes_goes_on_to_no_other_rate_or_language(tmp_path):
     port = Port(tmp_path, TALKATIVE)
     port.session.questions.agreed = True
@@ -369,6 +378,7 @@ async def test_a_silent_line_is_not_taken_for_tmcl(tmp_path):
     await port.session.forget(opened.bus)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("family", ["pmx", "mcode", "tmcl"])
 @pytest.mark.parametrize(("says", "every"), [(b"12345\r\n", 0.02), (b"\xf3\x80", 0.004), (b"OK\r", 0.05)])
 async def test_a_search_among_endless_bytes_ends_and_says_what_came(tmp_path, monkeypatch, family, says, every):

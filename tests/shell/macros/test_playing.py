@@ -285,3 +285,14 @@ async def test_a_drive_that_a_macro_moves_is_moved_by_no_other(
     assert await first
     await shop.play(shop.session.macros.load("two"))
     assert b"7000" in shop.written("press")
+
+
+async def test_after_a_macro_that_another_one_calls_the_step_of_the_caller_is_shown_again(shop: Shop) -> None:
+    shop.save("inner", "/sleep 5")
+    await shop.play(shop.save("outer", "/call inner", "/sleep 5"))
+    shown = [(event.text.partition(",")[0], event.over) for event in shop.events if isinstance(event, Progressed)]
+    assert [name for name, over in shown if over] == ["inner", "outer"]
+    after = shown.index(("inner", True)) + 1
+    assert shown[after] == ("outer", False)
+    texts = [event.text for event in shop.events if isinstance(event, Progressed)]
+    assert texts[after].startswith("outer, step 1 of 2: /call inner")

@@ -16,7 +16,7 @@ from multidrop.shell.params.work import Options
 from multidrop.simulator import cells
 from tests.support.cell_session import CellSession, bus
 
-pytestmark = [pytest.mark.virtual, pytest.mark.slow]
+pytestmark = pytest.mark.virtual
 
 MACHINE = """[[bus]]
 name = "press"
@@ -245,6 +245,7 @@ async def becomes(folder: Path, machine: str, present: str, name: str, **named: 
     return cell
 
 
+@pytest.mark.slow
 async def test_a_pmx_becomes_the_one_of_the_file(tmp_path):
     machine = (
         'personality = "PMX"\nname = "05"\nset = { HSPD = 5000, LSPD = 2000, SLRX = 2.5, DOBOOT = 3 }\n'
@@ -264,6 +265,7 @@ async def test_a_pmx_becomes_the_one_of_the_file(tmp_path):
         await cell.session.close()
 
 
+@pytest.mark.slow
 async def test_a_tmcl_module_becomes_the_one_of_the_file(tmp_path):
     machine = 'personality = "TMCM"\nname = "9"\nset = { 4 = 40000, 6 = 99, G75 = 2, G65 = 3 }'
     cell = await becomes(tmp_path, machine, 'personality = "TMCM"', "9")

@@ -249,3 +249,13 @@ async def test_a_difference_from_no_twin_is_refused(tmp_path: Path) -> None:
         series = [Series("press", "a", DIFFERENCE)]
         assert list(parse_series(cell.session, ["press:a.DIFFERENCE"])) == series
         await read_first(cell.session, series)
+
+
+def test_charts_have_most_of_the_height_and_states_more_than_the_log(rerun: Any) -> None:
+    for own, shares in (
+        ({"/press/a/position", "/press/a/state/program", "/press/log"}, [4.0, 1.5, 1.0]),
+        ({"/press/a/position", "/press/log"}, [4.0, 1.0]),
+        ({"/press/a/state/program", "/press/log"}, [4.0, 1.0]),
+        ({"/press/log"}, [1.0]),
+    ):
+        assert list(layout(own, {}).root_container.row_shares) == shares

@@ -11,7 +11,7 @@ from multidrop.base.errors import Diagnostic, Inexpressible, Refused, Stopped
 from tests.support.cell_session import CellSession
 from tests.support.debugged import ROUND, cell, ethernet, keys, run, serial, shown
 
-pytestmark = [pytest.mark.virtual, pytest.mark.slow]
+pytestmark = pytest.mark.virtual
 
 
 @pytest.mark.parametrize("em", range(4))

@@ -17,7 +17,7 @@ from multidrop.simulator.cell.spec import Faults
 from tests.support.cell_session import CellSession, bus
 from tests.support.debugged import cell, ethernet, keys, out, run, serial
 
-pytestmark = [pytest.mark.virtual, pytest.mark.slow]
+pytestmark = pytest.mark.virtual
 
 
 class Taken:
@@ -59,6 +59,7 @@ async def test_nothing_but_step_and_continue_presses_a_key(tmp_path: Path) -> No
         assert taken.keys == [] and it.device("line:!").thread.stepping and taken.executed == 0
 
 
+@pytest.mark.slow
 @pytest.mark.wide
 @pytest.mark.parametrize("seed", range(2))
 @pytest.mark.parametrize("em", [0, 1, 2, 3])
@@ -176,6 +177,7 @@ async def test_a_drive_that_went_into_party_mode_is_sent_no_key(tmp_path: Path) 
         assert taken.keys == []
 
 
+@pytest.mark.slow
 async def test_a_bus_that_is_closed_ends_its_trace(tmp_path: Path) -> None:
     async with CellSession(tmp_path, bus("line", ethernet(), baud=0)) as it:
         trace = asyncio.ensure_future(it.session.run("/trace K3"))

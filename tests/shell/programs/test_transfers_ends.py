@@ -14,7 +14,7 @@ from tests.support.cell_session import CellSession, bus, pmx
 from tests.support.transfers import FILE, LONG, RUNNING, SLOW, kept, load, shop_with
 from tests.support.until import until
 
-pytestmark = [pytest.mark.virtual, pytest.mark.slow]
+pytestmark = pytest.mark.virtual
 
 
 @pytest.mark.parametrize("why", [errno.ENOSPC, errno.EACCES])
@@ -96,6 +96,7 @@ async def test_settings_alone_end_no_program(tmp_path: Path) -> None:
         assert shop.device("line:a").running and kept(tmp_path)[-1].exists()
 
 
+@pytest.mark.slow
 async def test_a_second_download_to_a_drive_waits_for_nothing_and_is_refused(tmp_path: Path) -> None:
     async with shop_with(tmp_path, LONG, SLOW) as shop:
         first = asyncio.create_task(shop.session.run(f"/download {tmp_path / 'p.mxt'} a"))

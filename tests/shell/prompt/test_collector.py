@@ -9,7 +9,7 @@ import pytest
 from multidrop.shell.prompt import collector
 from multidrop.shell.prompt.collector import collected_at_rest
 
-pytestmark = [pytest.mark.virtual, pytest.mark.slow]
+pytestmark = pytest.mark.virtual
 
 
 class Kept:
@@ -35,6 +35,7 @@ async def test_what_survives_is_frozen_each_second_and_visited_no_more():
     assert gc.get_freeze_count() == 0
 
 
+@pytest.mark.slow
 async def test_everything_is_collected_while_all_is_at_rest():
     resting = False
     with collected_at_rest(lambda: resting):

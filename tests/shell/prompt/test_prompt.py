@@ -383,3 +383,20 @@ def test_a_terminal_is_asked_line_by_line(typed, answers, monkeypatch, capsys):
     monkeypatch.setattr("sys.stdin", io.StringIO(typed))
     assert at_terminal("macro m", FIELDS) == answers
     assert TURNS in capsys.readouterr().err
+
+
+async def test_a_paste_is_entered_line_by_line_with_enter_and_a_hidden_line_in_it_is_named(typist):
+    typist.send("\x1b[200~/sleep 0\r/drives\x1b[201~")
+    await until(lambda: "/drives" in typist.screen)
+    assert typist.entered == []
+    typist.send("\r")
+    await until(lambda: typist.entered == ["/sleep 0", "/drives"])
+    typist.send("\x1b[200~/sleep 1\u2028/sleep 2\x1b[201~")
+    await until(lambda: any(text.endswith("; nothing was pasted") for text in typist.notices))
+    assert "line separator (U+2028)" in typist.notices[-1]
+    assert "/sleep 1" not in typist.screen
+
+
+async def test_the_keys_of_flow_control_do_nothing(typist):
+    typist.send("/drives\x13\x11\r")
+    await until(lambda: typist.entered == ["/drives"])

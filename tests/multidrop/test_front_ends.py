@@ -1,0 +1,452 @@
+"""What each command of the front door hands on: URLs and options to the screen, the prompt, plots, servers, ports."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import io
+import json
+import os
+import signal
+import sys
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+from unittest import mock
+
+import pytest
+
+from multidrop.__main__ import main
+from multidrop.cli import parse
+from multidrop.shell.batch.virtual_loop import VirtualLoop
+from multidrop.transports.serial_ports import PortInfo
+from tests.support.cases import for_each
+from tests.support.cell_session import bus, party
+from tests.support.front_door import Command, Done
+
+CELL = bus("press", party("a", CK=0), party("b", CK=0), baud=0)
+
+
+class Terminal(io.StringIO):
+    """A stream that is a terminal, or none."""
+
+    terminal = True
+
+    def isatty(self) -> bool:
+        return self.terminal
+
+
+class Called:
+    """A function that keeps what it is called with, and returns a code."""
+
+    def __init__(self, code: int = 0) -> None:
+        self.code, self.calls = code, list[tuple[Any, ...]]()
+
+    def __call__(self, *given: Any, **named: Any) -> int:
+        self.calls.append((*given, named) if named else given)
+        return self.code
+
+
+Person = Callable[..., Done]
+
+
+@pytest.fixture
+def person(tmp_path: Path) -> Person:
+    """Run a command at a terminal; those of the standard streams that are `closed` are none."""
+
+    def run(*words: str, closed: Sequence[str] = ()) -> Done:
+        streams = {name: Terminal() for name in ("stdin", "stdout", "stderr")}
+        for name in closed:
+            streams[name].terminal = False
+        with contextlib.ExitStack() as around:
+            around.enter_context(contextlib.chdir(tmp_path))
+            around.enter_context(mock.patch.dict(os.environ, MULTIDROP_CONFIG_DIR=str(tmp_path / "conf")))
+            for name, stream in streams.items():
+                around.enter_context(mock.patch.object(sys, name, stream))
+            code = main(words)
+        return Done(code, streams["stdout"].getvalue(), streams["stderr"].getvalue())
+
+    return run
+
+
+# The screen and the prompt
+
+
+@for_each("words, given", [
+    ([], ([], True, False, False)),
+    (["demo"], (["sim:"], True, False, False)),
+    (["tui"], ([], True, False, False)),
+    (["tui", "a", "b"], (["a", "b"], True, False, False)),
+    (["tui", "a", "--no-reconnect"], (["a"], False, False, False)),
+    (["tui", "a", "--raw"], (["a"], True, True, False)),
+    (["tui", "a", "--share"], (["a"], True, False, True)),
+])  # fmt: skip
+def test_the_screen_gets_urls_and_options(person: Person, words: list[str], given: tuple[Any, ...]) -> None:
+    with pytest.MonkeyPatch.context() as patched:
+        screen = Called(7)
+        patched.setattr("multidrop.tui.launch.run", screen)
+        assert person(*words) == Done(7, "", "")
+    [(*urls_and_more, prepare, share)] = screen.calls
+    assert (*urls_and_more, share) == given and callable(prepare)
+
+
+@for_each("closed", ["stdin", "stdout"])
+def test_the_screen_needs_a_terminal_on_both_sides(person: Person, closed: str) -> None:
+    with pytest.MonkeyPatch.context() as patched:
+        screen = Called()
+        patched.setattr("multidrop.tui.launch.run", screen)
+        said = "the screen needs a terminal; multidrop shell reads lines from anywhere\n"
+        assert person("demo", closed=[closed]) == Done(2, "", said) and screen.calls == []
+
+
+def test_a_watcher_joins_one_screen_and_opens_nothing(person: Person, monkeypatch: pytest.MonkeyPatch) -> None:
+    join = Called(5)
+    monkeypatch.setattr("multidrop.tui.launch.join", join)
+    assert person("tui", "--join").returncode == 5 == person("tui", "--join", "ssh://pc").returncode
+    assert join.calls == [("",), ("ssh://pc",)]
+    said = "tui --join: a watcher opens nothing itself; give --join alone, or with ssh://HOST\n"
+    for more in ("sim:", "--share", "--raw", "--twin"):
+        assert person("tui", more, "--join") == Done(2, "", said)
+    assert len(join.calls) == 2
+
+
+@for_each("words, given", [
+    ([], {}),
+    (["--no-reconnect"], {"reconnect": False}),
+    (["--yes"], {"agreed": True}),
+    (["--beyond"], {"beyond": True}),
+    (["--raw"], {"raw": True}),
+])  # fmt: skip
+def test_the_prompt_gets_urls_and_options(person: Person, words: list[str], given: dict[str, bool]) -> None:
+    with pytest.MonkeyPatch.context() as patched:
+        prompt = Called(6)
+        patched.setattr("multidrop.shell.prompt.prompt.run", prompt)
+        assert person("shell", "a", "b", *words).returncode == 6
+    usual = {"reconnect": True, "agreed": False, "beyond": False, "raw": False}
+    [(urls, named)] = prompt.calls
+    assert callable(named.pop("prepare")) and (urls, named) == (["a", "b"], usual | given)
+
+
+@pytest.fixture
+def piped(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> Callable[..., Done]:
+    """Run `multidrop shell` on lines from a file."""
+    monkeypatch.chdir(tmp_path)
+    for name in ("CONFIG", "STATE", "DATA"):
+        monkeypatch.setenv(f"MULTIDROP_{name}_DIR", str(tmp_path / name))
+    (tmp_path / "cell.toml").write_text(CELL)
+
+    def run(lines: str, *options: str) -> Done:
+        (tmp_path / "lines").write_text(lines)
+        with (tmp_path / "lines").open() as stdin, pytest.MonkeyPatch.context() as patched:
+            patched.setattr(sys, "stdin", stdin)
+            code = main(["shell", "sim:cell.toml", *options])
+        return Done(code, *capfd.readouterr())
+
+    return run
+
+
+def test_lines_from_a_file_are_run_one_after_the_other(piped: Callable[..., Done]) -> None:
+    assert piped("@a PR P\n@b PR DN\n") == Done(0, '0\n"b"\n', "")
+    refused = piped("@a VM=5\n@a PR P\n")
+    assert refused.returncode == 1 and refused.stdout in ("", "0\n") and "a refused 'VM=5'" in refused.stderr
+    assert piped("") == Done(0, "", "")
+
+
+def test_options_of_the_prompt_count_for_lines_from_a_file(piped: Callable[..., Done]) -> None:
+    refused = piped("@a IP\n")
+    assert refused.returncode == 2 and "nothing was sent; --yes agrees to it" in refused.stderr
+    assert piped("@a IP\n", "--yes").returncode == 0
+    raw, usual = piped("/drives\n", "--raw"), piped("/drives\n")
+    assert "LMDCM" in usual.stdout and "LMDCM" not in raw.stdout + raw.stderr
+    beside, alone = piped("/twin\n", "--twin"), piped("/twin\n")
+    assert beside[1:] != alone[1:] and beside.returncode == 0
+
+
+# Plots and servers
+
+
+@for_each("words, place, given", [
+    (["plot", "a", "--to", "x.rrd"], "plots.command.run",
+     ("a", [], {"to": "x.rrd", "serve": None, "rate": "50", "reconnect": True})),
+    (["plot", "a", "--to", "x.rrd", "--drive", "all", "--no-reconnect"], "plots.command.run",
+     ("a", [], {"to": "x.rrd", "serve": None, "rate": "50", "reconnect": False})),
+    (["plot", "a", "--to", "x.csv", "--drive", "b", "--drive", "c", "--rate", "2"], "plots.command.run",
+     ("a", ["b", "c"], {"to": "x.csv", "serve": None, "rate": "2", "reconnect": True})),
+    (["plot", "a", "--to", "x.csv", "--drive", "b", "--drive", "all"], "plots.command.run",
+     ("a", [], {"to": "x.csv", "serve": None, "rate": "50", "reconnect": True})),
+])  # fmt: skip
+def test_what_serves_gets_its_arguments(
+    multidrop: Command, words: list[str], place: str, given: tuple[Any, ...]
+) -> None:
+    with pytest.MonkeyPatch.context() as patched:
+        served = Called(9)
+        patched.setattr(f"multidrop.shell.{place}", served)
+        assert multidrop(*words).returncode == 9
+    [call] = served.calls
+    assert repr(call) == repr(given)
+
+
+@for_each("words, given", [
+    (["P", "--every", "1"], (["P"], "all", 1.0, 0, False, True)),
+    (["P", "b.VM", "--every", "0.5", "--drive", "a", "--rows", "3"], (["P", "b.VM"], "a", 0.5, 3, False, True)),
+    (["P", "--every", "1", "--drive", "a", "--drive", "b", "--json", "--no-reconnect"],
+     (["P"], "a,b", 1.0, 0, True, False)),
+])  # fmt: skip
+def test_a_poll_gets_its_arguments(multidrop: Command, words: list[str], given: tuple[Any, ...]) -> None:
+    with pytest.MonkeyPatch.context() as patched:
+        poll = Called(9)
+        patched.setattr("multidrop.shell.plots.command.poll", poll)
+        assert multidrop("poll", "sim:", *words).returncode == 9
+    [(url, asked, named)] = poll.calls
+    assert url == "sim:" and (*asked, named["reconnect"]) == (given[0], given[1], given[2], asked[3], *given[4:])
+    assert (asked[3] or 0) == given[3]
+
+
+@for_each("words, closed, screen", [
+    ([], None, True), (["--json"], None, False), ([], "stdin", False), ([], "stdout", False), ([], "stderr", False),
+])  # fmt: skip
+def test_a_plant_is_a_screen_at_a_terminal_and_lines_elsewhere(
+    person: Person, words: list[str], closed: str | None, screen: bool
+) -> None:
+    with pytest.MonkeyPatch.context() as patched:
+        shown, watched = Called(3), Called(4)
+        patched.setattr("multidrop.features.publishing.screen.run", shown)
+        patched.setattr("multidrop.features.publishing.watch.run", watched)
+        done = person("plant", "mqtt://h/plant", *words, closed=[closed] if closed else [])
+    assert done.returncode == (3 if screen else 4)
+    assert shown.calls == ([("mqtt://h/plant",)] if screen else [])
+    assert watched.calls == ([] if screen else [("mqtt://h/plant", {"as_json": bool(words)})])
+
+
+# A cell that is served
+
+
+def test_a_cell_is_served_as_its_options_say(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    calls: list[Any] = []
+
+    async def serve(cell: str, **named: Any) -> None:
+        calls.append((cell, {name: named[name] for name in ("json", "speed", "allow")}))
+
+    monkeypatch.setattr("multidrop.simulator.serving.command.serve", serve)
+    monkeypatch.setenv("MULTIDROP_CONFIG_DIR", str(tmp_path))
+    (tmp_path / "multidrop.toml").write_text('[simulator]\nallow = ["own.mxt"]\n')
+    assert main(["sim"]) == main(["sim", "a.toml", "--json", "--speed", "3"]) == main(["sim", "--allow", "x"]) == 0
+    own = (tmp_path / "own.mxt",)
+    given = [Path(each).resolve() for each in (Path.cwd() / "x",)]
+    assert calls[:2] == [
+        (parse(["sim"]).cell, {"json": False, "speed": 1.0, "allow": ()}),
+        ("a.toml", {"json": True, "speed": 3.0, "allow": own}),
+    ]
+    assert [Path(each).resolve() for each in calls[2][1]["allow"]] == given, "the demo cell needs no configuration"
+    assert capsys.readouterr().err == ""
+
+
+# A port that is lent
+
+
+@pytest.mark.fork
+def test_a_relay_lends_the_port_that_is_named_until_a_signal(monkeypatch: pytest.MonkeyPatch) -> None:
+    made, before = Called(), {number: signal.getsignal(number) for number in (signal.SIGTERM, signal.SIGHUP)}
+    codes: list[object] = []
+
+    def serve(port: object) -> None:
+        for number in before:
+            with pytest.raises(SystemExit) as ended:
+                signal.raise_signal(number)
+            codes.append(ended.value.code)
+
+    monkeypatch.setattr("multidrop.transports.serial_port.opened", made)
+    monkeypatch.setattr("multidrop.transports.relay.serve", serve)
+    monkeypatch.setattr(sys, "stdin", io.StringIO())
+    try:
+        assert main(["relay", "/dev/ttyUSB7", "--baud", "19200"]) == 0
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+    assert [call[1:] for call in made.calls] == [("/dev/ttyUSB7", 19200)]
+    assert codes == [128 + signal.SIGTERM, 128 + signal.SIGHUP]
+
+
+@pytest.mark.fork
+def test_a_relay_takes_no_url_no_person_and_no_port_of_windows(multidrop: Command, person: Person) -> None:
+    said = "tcp://***@h:1: is no serial port of this machine; as in /dev/ttyUSB0\n"
+    assert multidrop("relay", "tcp://me:pw@h:1") == Done(2, "", said)
+    for name in ("COM3", "/com12", "com1"):
+        done = multidrop("relay", name)
+        said = f"{name.strip('/')} is a port of Windows, and this is none; see `multidrop ports`\n"
+        assert done == Done(3, "", said)
+    assert multidrop("relay", "COM").stderr.startswith("no port COM")
+    assert person("relay", "/dev/ttyUSB7") == Done(
+        2,
+        "",
+        "multidrop relay: another multidrop starts this, through ssh, and speaks frames to it; "
+        "open ssh://THIS-HOST/dev/ttyUSB7 on the other machine\n",
+    )
+
+
+@pytest.mark.fork
+def test_a_relay_of_a_screen_joins_it_by_its_name(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    joined, spliced = Called(17), Called()
+    monkeypatch.setattr("multidrop.shell.watching.join.connect", joined)
+    monkeypatch.setattr("multidrop.shell.watching.join.splice", spliced)
+    monkeypatch.setattr(sys, "stdin", io.StringIO())
+    monkeypatch.setenv("MULTIDROP_STATE_DIR", str(tmp_path))
+    assert main(["relay", "screen:press"]) == main(["relay", "screen:"]) == 0
+    assert (
+        joined.calls == [("press", tmp_path / "screens"), ("", tmp_path / "screens")] and spliced.calls == [(17,)] * 2
+    )
+
+
+# Ports, completion, the language server
+
+
+PORTS = [PortInfo("/dev/ttyUSB0", "/dev/serial/by-id/x", "FT232"), PortInfo("/dev/ttyS0", "", "")]
+
+
+def test_ports_are_listed_for_a_person_and_for_a_program(multidrop: Command, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("multidrop.transports.controllers.all_ports", lambda: PORTS)
+    assert multidrop("ports") == Done(0, "/dev/ttyUSB0  /dev/serial/by-id/x  FT232\n/dev/ttyS0\n", "")
+    facts = [json.loads(line) for line in multidrop("ports", "--json").stdout.splitlines()]
+    assert facts == [
+        {"port": "/dev/ttyUSB0", "stable": "/dev/serial/by-id/x", "description": "FT232"},
+        {"port": "/dev/ttyS0", "stable": "", "description": ""},
+    ]
+    monkeypatch.setattr("multidrop.transports.controllers.all_ports", list)
+    assert multidrop("ports") == Done(0, "", "no serial port was found; multidrop demo needs none\n")
+    assert multidrop("ports", "--json") == Done(0, "", "")
+
+
+@for_each("shell, sign", [("bash", "complete -o"), ("zsh", "#compdef multidrop"), ("fish", "complete -c multidrop"),
+                          ("powershell", "Register-ArgumentCompleter")])  # fmt: skip
+def test_a_completion_is_that_of_its_shell(multidrop: Command, shell: str, sign: str) -> None:
+    done = multidrop("completion", shell)
+    assert (done.returncode, done.stderr) == (0, "") and sign in done.stdout
+
+
+@for_each("words, closed, given, said", [
+    ([], ["stdin"], ("LMDCM", None), ""),
+    (["--personality", "MDI"], ["stdin"], ("MDI", None), ""),
+    ([], [], ("LMDCM", None), "multidrop lsp speaks to an editor, which starts it; see docs/editors.md\n"),
+    (["--tcp", "0"], [], ("LMDCM", ("127.0.0.1", 0)), ""),
+])  # fmt: skip
+def test_the_language_server_gets_its_arguments_and_a_person_is_told(
+    person: Person, words: list[str], closed: list[str], given: tuple[Any, ...], said: str
+) -> None:
+    with pytest.MonkeyPatch.context() as patched:
+        served = Called(1)
+        patched.setattr("multidrop.features.lsp.serving.serve", served)
+        assert person("lsp", *words, closed=closed) == Done(1, "", said) and served.calls == [given]
+
+
+class Without:
+    """An installation whose language server lacks a module."""
+
+    def __init__(self, missing: str) -> None:
+        self._missing = missing
+
+    def find_spec(self, name: str, *_: object) -> None:
+        if name == "multidrop.features.lsp.serving":
+            raise ModuleNotFoundError(f"No module named {self._missing!r}", name=self._missing)
+
+
+@for_each("missing, hint", [("pygls", True), ("pygls.server", True), ("lsprotocol", True), ("attrs", False)])
+def test_a_language_server_without_its_library_names_the_extra(person: Person, missing: str, hint: bool) -> None:
+    with pytest.MonkeyPatch.context() as patched:
+        patched.delitem(sys.modules, "multidrop.features.lsp.serving", raising=False)
+        patched.setattr(sys, "meta_path", [Without(missing), *sys.meta_path])
+        if not hint:
+            with pytest.raises(ModuleNotFoundError, match="attrs"):
+                person("lsp")
+            return
+        said = "the language server needs pygls, which is not installed; pipx install 'multidrop[lsp]'\n"
+        assert person("lsp") == Done(2, "", said)
+
+
+# Help on a word
+
+
+@for_each("words, code, first", [
+    (["86"], 0, "error 86: stall"),
+    (["5", "--dialect", "tmcl"], 0, "status 5: the EEPROM is locked"),
+    (["5", "--dialect", "pmx"], 2, 'no error 5 on a PMX-2ED; it replies in words: /help "?Moving" explains one'),
+    (["86", "--dialect", "mcode"], 0, "error 86: stall"),
+    (["EX", "--dialect", "mcode"], 0, "EX: Execute"),
+    (["123456789012"], 2, "no error 123456789; they are 0 to 111, with gaps"),
+    (["²"], 2, "/help: no verb or command ²; /help lists the verbs"),
+])  # fmt: skip
+def test_help_explains_words_and_numbers_of_a_language(
+    multidrop: Command, words: list[str], code: int, first: str
+) -> None:
+    done = multidrop("help", *words)
+    lines = (done.stderr if code else done.stdout).splitlines()
+    assert done.returncode == code and lines[0].startswith(first)
+
+
+def test_help_names_the_other_languages_that_say_something_else_on_a_word(multidrop: Command) -> None:
+    said = {word: multidrop("help", word).stdout.splitlines() for word in ("VM", "JA", "EX", "A")}
+    also = {word: [line for line in lines if line.startswith("also: multidrop")] for word, lines in said.items()}
+    assert also["VM"] == ["also: multidrop help VM --dialect modbus"] and also["JA"] == []
+    assert also["EX"] == [f"also: multidrop help EX --dialect {each}" for each in ("modbus", "pmx")]
+    for word, lines in also.items():
+        for line in lines:
+            other = multidrop(*line.split()[2:]).stdout
+            assert other and other.splitlines() != said[word][: -len(lines)], "the other one says something else"
+
+
+# Lines that are sent
+
+
+@pytest.fixture
+def cell(multidrop: Command, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Command:
+    """Run commands beside a cell file; time does not wait."""
+    runner = asyncio.Runner
+    monkeypatch.setattr(asyncio, "Runner", lambda **more: runner(**more | {"loop_factory": VirtualLoop}))
+    (tmp_path / "cell.toml").write_text(CELL)
+    return multidrop
+
+
+def test_sent_lines_are_reported_as_json_with_a_summary(cell: Command) -> None:
+    done = cell("send", "sim:cell.toml", "@a PR P", "@b PR VM", "--json")
+    *lines, last = map(json.loads, done.stdout.splitlines())
+    assert (done.returncode, done.stderr) == (0, "")
+    assert [(each["line"], each["sent"], each["printed"], each["ok"]) for each in lines] == [
+        (1, "@a PR P", ["0"], True),
+        (2, "@b PR VM", ["768000"], True),
+    ]
+    assert last["summary"] | {"seconds": 0} == {"lines": 2, "failed": 0, "seconds": 0}
+    said = "a refused 'PR ZZ': error 35: this cannot be printed\n"
+    assert cell("send", "sim:cell.toml", "@a PR ZZ", "@a PR P") == Done(1, "", said)
+    done = cell("send", "sim:cell.toml", "@a PR ZZ", "@a PR P", "--json")
+    first, last = map(json.loads, done.stdout.splitlines())
+    assert (done.returncode, done.stderr, first["ok"], last["summary"]["failed"]) == (1, said, False, 1)
+
+
+def test_a_script_needs_something_to_open_and_prints_objects_only_with_json(cell: Command, tmp_path: Path) -> None:
+    (tmp_path / "s.txt").write_text("@a PR P\n/assert @a P == {place}\n")
+    words = ("run", "s.txt", "--set", "place=0")
+    for where in (("--on", "sim:cell.toml"), ("--role", "press=sim:cell.toml")):
+        done = cell(*words, *where)
+        assert (done.returncode, done.stdout) == (0, "0\n") and "2 lines, 1 check, 0 failed" in done.stderr
+    done = cell(*words, "--on", "sim:cell.toml", "--json")
+    assert [json.loads(line).get("sent") for line in done.stdout.splitlines()] == ["@a PR P", "/assert @a P == 0", None]
+    said = "multidrop run: nothing to open; --on URL, or --role NAME=URL\n"
+    assert cell(*words) == cell("run", "gone.py") == Done(2, "", said)
+    assert cell("run", "s.txt", "--set", "place=5", "--on", "sim:cell.toml").returncode == 1
+
+
+def test_questions_of_sent_lines_and_scripts_are_answered_by_yes(cell: Command, tmp_path: Path) -> None:
+    (tmp_path / "s.txt").write_text("@a IP\n")
+    sent = ("send", "sim:cell.toml", "@a IP")
+    for words in (sent, (*sent, "--json"), ("run", "s.txt", "--on", "sim:cell.toml")):
+        refused = cell(*words)
+        assert refused.returncode == 2 and "nothing was sent; --yes agrees" in refused.stderr
+        assert cell(*words, "--yes").returncode == 0
+
+
+def test_a_line_for_one_drive_is_sent_although_others_do_not_reply(cell: Command) -> None:
+    url = "sim:cell.toml?drives=a,z"
+    for more in ((), ("--json",)):
+        assert cell("send", url, "@a PR P", *more).returncode == 0
+        assert cell("send", url, "@z PR P", *more).returncode == 1
