@@ -14,7 +14,7 @@ from __future__ import annotations
 import importlib
 import os
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from functools import cache
 from types import TracebackType
@@ -63,6 +63,7 @@ IN_WHEEL: dict[str, tuple[str, ...]] = {
     "sweeps": ("program sweep", "[sweep]"),
     "twin_fit": ("twin", "twin fit"),
     "twins": ("/twin",),
+    "usb": ("usb:", "usbip:"),
 }
 """The features of the wheel, and the words that each answers to: `/twin`, `program sweep`, `usb:`."""
 _failed: dict[str, Failed] = {}
@@ -116,7 +117,7 @@ def with_word(word: str) -> Feature | None:
         if word in words:
             found = wheel(name)
             if found is None:
-                raise Diagnostic(f"the feature {name} is not there", word, "install multidrop again, whole")
+                raise Diagnostic(f"the feature {name} is not there", word.rstrip(":"), "install multidrop again, whole")
             return found
     return None
 
@@ -255,6 +256,15 @@ def features() -> Iterator[Feature]:
     """The features that are there: all of the wheel, and those by others that are loaded."""
     yield from wheels()
     yield from by_others()
+
+
+def place(after: Mapping[str, str], names: list[str]) -> None:
+    """Put each name behind the one that it comes after, which may be one of them; last, where that is not there."""
+    left = dict(after)
+    while left:
+        name = next((each for each, before in left.items() if before in names), next(iter(left)))
+        before = left.pop(name)
+        names.insert(names.index(before) + 1 if before in names else len(names), name)
 
 
 def added(kind: type[T]) -> Iterator[T]:

@@ -22,10 +22,11 @@ from report import Row, compared, main
 
 from multidrop.dialects.pmx.host.codec import Pmx
 from multidrop.drives.bus import Bus
+from multidrop.features.usb.device import sides
+from multidrop.features.usb.pipe import open_usb
 from multidrop.simulator.cells import read
 from multidrop.simulator.floor import Floor
 from multidrop.simulator.serving.running import RunningFloor
-from multidrop.transports.usb import open_usb
 from tests.support.usb_stand_in import Plugged, Sockets
 
 ROUNDS = 7
@@ -53,7 +54,7 @@ def rows(full: bool) -> Iterator[Row]:
 def plugged(reply_time: float) -> tuple[RunningFloor, Sockets]:
     """A controller in a socket of this machine."""
     floor = RunningFloor(Floor(read(CELL, "cell")))
-    return floor, Sockets(Plugged(floor, "w", floor.floor.usb("w")[0], "1-1", Random(0), reply_time=reply_time))
+    return floor, Sockets(Plugged(floor, "w", sides(floor.floor, "w")[0], "1-1", Random(0), reply_time=reply_time))
 
 
 async def timed(once: Callable[[], Awaitable[str]], trips: int) -> tuple[float, float]:

@@ -25,8 +25,6 @@ class Row(NamedTuple):
     record: str
     scheme: str = ""
     """The URL scheme that implies this family; empty: the user chooses it by `dialect=`."""
-    direct: tuple[str, ...] = ()
-    """The URL schemes of a connection to one drive of this family, which takes no address there."""
     files: ProgramFiles | None = None
     """None: there are no program files."""
 
@@ -47,7 +45,6 @@ TABLE: Mapping[str, Row] = {
     "modbus": Row("multidrop.dialects.modbus.family:MODBUS", scheme="modbus"),
     "pmx": Row(
         "multidrop.dialects.pmx.family:PMX",
-        direct=("usb", "usbip"),
         files=ProgramFiles(
             "A-SCRIPT",
             (".prg", ".asc"),

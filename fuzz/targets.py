@@ -28,8 +28,6 @@ from multidrop.shell import configuration, line_syntax
 from multidrop.shell.connect import urls
 from multidrop.simulator import cells
 from multidrop.simulator.floor import Floor
-from multidrop.transports.performax import PACKET
-from multidrop.transports.usbip import RET_SUBMIT, SUBMIT, Malformed, Transfer, Transfers
 
 Target = Callable[[bytes], object]
 REPLY_LIMIT = 1 << 20
@@ -152,13 +150,17 @@ def modbus_port(data: bytes) -> None:
 
 def usb(data: bytes) -> None:
     """The messages of USB/IP, of both sides; then requests and packets to the USB side of a simulated controller."""
+    from multidrop.features.usb.device import sides
+    from multidrop.features.usb.performax import PACKET
+    from multidrop.features.usb.usbip import Malformed, Transfers
+
     for answers in (False, True):
         messages = Transfers(answers)
         messages.wanted = {1, 2}
         with contextlib.suppress(Malformed):
             for each in messages.feed(data):
                 assert each.pack()
-    (side,) = Floor(cells.read(CELL.format("PMX"))).usb("one")
+    (side,) = sides(Floor(cells.read(CELL.format("PMX"))), "one")
     for number, at in enumerate(range(0, len(data), 8)):
         piece = data[at : at + 8]
         status, reply = side.request(piece.ljust(8, b"\0"))
@@ -263,8 +265,8 @@ SEEDS: Mapping[str, tuple[bytes, ...]] = {
     "port": (b"\0PR P\rMR 100\r\x1b", b"\4@00PX\r", b"\5\x01\x04\0\0\0\0\0\0\x05", b"\1PG 100\rLB Ga\rE\rPG\rEX Ga\r"),
     "modbus_port": (bytes.fromhex("00010000000601030057 0002".replace(" ", "")),),
     "usb": (
-        Transfer(SUBMIT, 1, 2, length=3, data=b"PX\0").pack(),
-        Transfer(RET_SUBMIT, 1, length=3, data=b"12\0").pack(),
+        bytes.fromhex("00000001 00000001 00000000 00000000 00000002 00000000 00000003") + bytes(20) + b"PX\0",
+        bytes.fromhex("00000003 00000001 00000000 00000000 00000000 00000000 00000003") + bytes(20) + b"12\0",
         bytes.fromhex("8006000100001200 4002010000000000") + b"V1=1234\0",
     ),
     "url": (

@@ -30,7 +30,7 @@ EPILOG = (
     "Without a command: the screen, with saved connections, serial ports and the demo cell. "
     "multidrop COMMAND --help shows its arguments."
 )
-EXTRAS = {"notebook": "ipykernel", "pytest": "pytest", "rerun": "rerun", "usb": "usb1"}
+EXTRAS = {"notebook": "ipykernel", "pytest": "pytest", "rerun": "rerun"}
 """The modules of the extras in pyproject.toml that are no feature's, by extra."""
 
 
@@ -217,7 +217,7 @@ def build(given: Sequence[str] = ()) -> Parser:
 
 def urls() -> str:
     """Explain URLs."""
-    from multidrop.shell.connect.url_forms import sentence
+    from multidrop.shell.connect.schemes import sentence
 
     return URLS.format(sentence())
 

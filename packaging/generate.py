@@ -24,7 +24,7 @@ from argparse_manpage.manpage import Manpage
 import multidrop
 from multidrop.cli import build, urls
 from multidrop.commands.serving import FILES
-from multidrop.shell.connect.url_forms import URL_FORMS
+from multidrop.shell.connect.schemes import schemes
 
 SHIPPED = ROOT / "multidrop" / "shipped"
 PATH = re.compile(r"(FILE|SCRIPT|CELL|PATH)\b")
@@ -46,7 +46,7 @@ VALUES = {
 # Connections, ports and simulated buses; drives of saved connections; macros: listed without a start of Python.
 BEGINNINGS = " ".join(
     ["sim:", *(f"'sim:#{bus}'" for bus in ("press", "eth", "pmx"))]
-    + [form.prefix for scheme, form in URL_FORMS.items() if scheme not in ("sim", "serial")]
+    + [form.prefix for scheme, form in schemes().items() if scheme not in ("sim", "serial")]
 )
 """The beginnings of URLs: of a serial port the path is enough."""
 CONFIG = '"${MULTIDROP_CONFIG_DIR:-${XDG_CONFIG_HOME:-$HOME/.config}/multidrop}'
@@ -210,7 +210,7 @@ FLAG_DONE = """$currentActionIsPositional = $false
 """After a flag of PowerShell's line the next word is a place: shtab takes it for the flag's value."""
 SECTIONS = {
     "URLS": [
-        *((form.example, form.meaning) for form in URL_FORMS.values()),
+        *((form.example, form.meaning) for form in schemes().values()),
         ("?KEY=VALUE&...", urls().partition("?: ")[2]),
     ],
     "EXIT STATUS": [

@@ -17,9 +17,10 @@ from multidrop.drives.bus import Bus
 from multidrop.drives.drive import Drive
 from multidrop.drives.echoes import LocalEcho
 from multidrop.drives.stopping import Halt
-from multidrop.shell.connect.opening import BAUDED, Naming, Opened, Opener, first, open_buses, port_name
+from multidrop.shell.connect.opening import Naming, Opened, Opener, first, open_buses
 from multidrop.shell.connect.reconnect import Newcomer
-from multidrop.shell.connect.urls import Connection, parse, with_echo
+from multidrop.shell.connect.scheme import Connection
+from multidrop.shell.connect.urls import parse, with_echo
 from multidrop.shell.line_syntax import EVERYONE, split_target
 from multidrop.shell.raw import RawLine
 from multidrop.shell.secrets import url_without_secrets
@@ -44,7 +45,6 @@ def described(bus: Bus) -> str:
 
 Failed = Callable[[int, BaseException], None]
 """Takes the number of a URL, from 0, and the failure to open it."""
-SIMULATED = "sim"
 REOPENED = 2.0
 """The time in which a line is open again after a search of its port, s: later it is lost."""
 CUT = (
@@ -93,7 +93,7 @@ class Openings:
                 failed(number, problem)
         numbers, prepared, shorts = list(parsed), [], Counter(each.short for each in parsed.values())
         for connection in parsed.values():
-            sole = connection.short if connection.scheme != SIMULATED else ""
+            sole = connection.short if not connection.scheme.simulated else ""
             if shorts[sole] > 1:
                 sole = connection.by_port or sole
             opening = _Opening(self._workspace, self._reserved, next(self._places), None, sole, connection.by_port)
@@ -122,12 +122,7 @@ class Openings:
         """The URL of an open bus, without the name of a saved connection, and with the stable name of its port."""
         connection = self._workspace.of(bus).connection
         assert connection is not None, bus.name  # only a search has none, and keeps its bus for itself
-        if connection.scheme == SIMULATED:
-            text = connection.anchored  # a saved connection is opened from any folder
-            return text if connection.bus else f"{text.partition('?')[0]}#{self._workspace.of(bus).in_cell}"
-        if connection.scheme == "serial":
-            return connection.text.replace(connection.target, port_name(connection), 1)
-        return connection.text
+        return connection.scheme.lasting(connection, self._workspace.of(bus).in_cell)
 
     async def raw_on(self, bus: Bus) -> None:
         """Put an open bus into raw mode. Raises TransportLost where it is lost."""
@@ -167,7 +162,7 @@ class Openings:
     def searches(self, bus: Bus) -> bool:
         """Whether `search` is for this line: no drive has replied there, and its port can be opened again."""
         record = self._workspace.of(bus)
-        simulated = record.connection is None or record.connection.scheme == SIMULATED  # it ends as it is left
+        simulated = record.connection is None or record.connection.scheme.simulated  # it ends as it is left
         return bool(bus.silent) and self._workspace.reconnections.wanted and record.raw is None and not simulated
 
     async def search(self, bus: Bus) -> None:
@@ -212,20 +207,20 @@ class Openings:
 
     async def _run(self, opening: _Opening, connection: Connection, raw: bool = False, keep: bool = False) -> list[Bus]:
         """Open one URL. `keep`: a port that cannot be opened keeps a bus, which is tried again."""
-        if waiting := self._workspace.reconnections.waiting_for(port_name(connection)):
+        if waiting := self._workspace.reconnections.waiting_for(connection.port_name):
             hint = f"it comes back by itself; /close {waiting} gives it up"
             raise Diagnostic(
                 f"its port belongs to {waiting}, which is lost and being tried again", connection.text, hint
             )
         try:
-            in_turn = self._cells if connection.scheme == SIMULATED else contextlib.nullcontext()
+            in_turn = self._cells if connection.scheme.simulated else contextlib.nullcontext()
             shown = connection.name or url_without_secrets(connection.text)
             with opening.listed(connection.name or connection.text), self._workspace.under_way(f"opening {shown}"):
                 async with in_turn:
                     try:
                         found = await self._opener(connection, opening.named)
                     except TransportLost as failure:
-                        if not keep or connection.scheme == SIMULATED:
+                        if not keep or connection.scheme.simulated:
                             raise
                         found = await open_buses(connection, opening.named, self._workspace.settings.state, failure)
             addresses = {label: address for address, label in connection.labels.items()}
@@ -315,7 +310,7 @@ class _Opening:
                 if each.absent:
                     newcomers.add(each, connection)
                 record = workspace.adopt(replace(each, warnings=()) if raw else each, self.place, connection, in_cell)
-                if connection.scheme != SIMULATED:
+                if not connection.scheme.simulated:
                     doubts = workspace.settings.in_doubt
                     record.doubt = doubts.get(connection.name, "") or doubts.get("", "")
                 if each.limits:
@@ -328,7 +323,7 @@ class _Opening:
                 text = f"{bus.name}: the stop that came while it was being opened was sent first"
                 workspace.notify(text, bus=bus.name)
             for each in found:
-                port = workspace.of(each.bus).port = port_name(connection)
+                port = workspace.of(each.bus).port = connection.port_name
                 if each.absent:
                     continue
                 try:
@@ -372,7 +367,7 @@ class _Newcomers:
     def add(self, opened: Opened, connection: Connection) -> None:
         """Try a bus again whenever it is lost, and find its drives then for the first time."""
         newcomer = Newcomer(partial(self.found, opened, connection), partial(self.silent, opened, connection))
-        port = port_name(connection)
+        port = connection.port_name
         self._workspace.reconnections.add(opened.bus, opened.hints, opened.reopen, port, newcomer)
 
     async def found(self, opened: Opened, connection: Connection) -> None:
@@ -396,7 +391,7 @@ class _Newcomers:
         each question may be an error.
         """
         workspace, bus, hints = self._workspace, opened.bus, opened.hints
-        known = bool(connection.scheme not in BAUDED or hints.drives or hints.remembered)
+        known = bool(not connection.scheme.bauded or hints.drives or hints.remembered)
         again = known and workspace.reconnections.tries(bus.name)
         said, reason = bus.silent, str(failure)
         bus.unanswered(reason)

@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from multidrop.drives.drive import Drive
     from multidrop.drives.stopping import Halt
     from multidrop.shell.connect.opening import Opened
-    from multidrop.shell.connect.urls import Connection
+    from multidrop.shell.connect.scheme import Connection
     from multidrop.shell.raw import RawLine, Watched
     from multidrop.shell.roles import Observer, OpenLog, RunningPlot, Series
     from multidrop.simulator.serving.running import RunningFloor

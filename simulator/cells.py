@@ -17,6 +17,7 @@ from multidrop.base.files import toml_of, utf8_of
 from multidrop.base.text import NOT_FIRST, acts_first
 from multidrop.dialects.units import check_own
 from multidrop.simulator.cell.drive_keys import check_inside
+from multidrop.simulator.cell.endpoint_kinds import kind_of, kinds
 from multidrop.simulator.cell.spec import BusSpec, Cell, DriveSpec, Endpoint, Faults, MotorSpec
 from multidrop.simulator.cell.table import Folder, Source, Table, quoted
 from multidrop.simulator.families import BY_PERSONALITY
@@ -25,7 +26,8 @@ from multidrop.simulator.motor_files import with_motor
 if TYPE_CHECKING:
     from multidrop.simulator.family import Family
 
-SCHEMES = ("pty", "tcp", "udp", "modbus", "usbip")
+SCHEMES = ("pty", "tcp", "udp", "modbus")
+"""Of endpoints; features add others (`EndpointKind`)."""
 LONGEST_GATHER = 0.02
 """The highest `gather`, s: USB chips hold bytes for up to 16 ms."""
 DRIVE_KEYS = (
@@ -101,7 +103,7 @@ class Reader:
             gather=table.number("gather", 0.0, 0.0, LONGEST_GATHER) if "gather" in table.values else None,
         )
         self._check_bus(bus, table)
-        self._check_usb(bus, where, text)
+        self._check_kinds(bus, where, text)
         return bus
 
     def _drive(self, table: Table, folder: Folder) -> DriveSpec:
@@ -137,14 +139,19 @@ class Reader:
         if bus.gather is not None and on_ethernet:
             raise table.wrong("gather", "is for serial drives", "leave it out: an Ethernet drive sends whole replies")
 
-    def _check_usb(self, bus: BusSpec, where: str, text: str) -> None:
-        """Refuse usbip:// for other drives than controllers with USB, with the line that has it."""
-        others = [each.personality for each in bus.drives if not self._families[each.personality].usb]
-        if any(each.scheme == "usbip" for each in bus.serve) and (others or not bus.drives):
-            found = f"{others[0]} has no USB" if others else "the bus has no drive"
-            line = text.count("\n", 0, text.find("usbip:", text.find(f'"{bus.name}"'))) + 1
-            what = f"serve of [[bus]] {quoted(bus.name)} has usbip://, and {found}"
-            raise Diagnostic(what, f"{where}:{line}", "valid: a bus of PMX only")
+    def _check_kinds(self, bus: BusSpec, where: str, text: str) -> None:
+        """Refuse an endpoint that features serve for other drives than it is for, with the line that has it."""
+        for scheme in dict.fromkeys(each.scheme for each in bus.serve):
+            kind = kind_of(scheme) if scheme not in SCHEMES else None
+            if kind is None or not kind.families:
+                continue
+            fits = [name for name, each in self._families.items() if each.name in kind.families]
+            others = [each.personality for each in bus.drives if each.personality not in fits]
+            if others or not bus.drives:
+                found = f"{others[0]} {kind.lack}" if others else "the bus has no drive"
+                line = text.count("\n", 0, text.find(f"{scheme}:", text.find(f'"{bus.name}"'))) + 1
+                what = f"serve of [[bus]] {quoted(bus.name)} has {scheme}://, and {found}"
+                raise Diagnostic(what, f"{where}:{line}", f"valid: a bus of {' or '.join(fits)} only")
 
     @property
     def _ethernet(self) -> str:
@@ -157,10 +164,10 @@ class Reader:
 
 def _endpoint(text: str, table: Table, folder: Folder) -> Endpoint:
     scheme, colon, rest = text.partition(":")
-    if not colon or scheme not in SCHEMES:
-        raise table.wrong(
-            "serve", f"cannot be {quoted(text)}", "valid: pty:, tcp://, udp://, modbus:// or usbip:// at the beginning"
-        )
+    if not colon or (scheme not in SCHEMES and kind_of(scheme) is None):
+        *forms, last = (f"{each}://" for each in (*SCHEMES[1:], *(each.scheme for each in kinds())))
+        what = f"valid: pty:, {', '.join(forms)} or {last} at the beginning"
+        raise table.wrong("serve", f"cannot be {quoted(text)}", what)
     if scheme == "pty":
         if not rest.isprintable():
             raise table.wrong("serve", f"cannot be {quoted(text)}")

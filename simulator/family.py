@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from types import MappingProxyType
@@ -37,20 +36,6 @@ class Connection(Protocol):
 
     def receive(self, data: bytes, now: float) -> bytes:
         """Take bytes; give the replies to the messages that they complete."""
-
-
-class UsbSide(Connection, Protocol):
-    """A drive as a USB device: what is received are packets."""
-
-    replies: deque[bytes]
-    """Packets that the host has not read."""
-
-    @property
-    def present(self) -> bool:
-        """Whether the bus sees it: it has power."""
-
-    def request(self, setup: bytes) -> tuple[int, bytes]:
-        """Carry out a request on endpoint 0; give its status and the data for the host."""
 
 
 @dataclass(frozen=True)
@@ -97,8 +82,6 @@ class Unit:
     connect: Callable[[], Connection] | None = None
     shadow: Shadow | None = None
     """None: it cannot run beside a real drive."""
-    usb: UsbSide | None = None
-    """Its USB side; None: it has none."""
 
 
 @dataclass(frozen=True)
@@ -138,8 +121,6 @@ class Family:
     build: Callable[[DriveSpec, Place], Unit]
     ethernet: frozenset[str] = frozenset()
     addressed: bool = False
-    usb: bool = False
-    """Its drives have USB."""
     snapshots: Snapshots | None = None
     """None: a unit cannot become a drive in a cell file."""
     keys: tuple[str, ...] = ()

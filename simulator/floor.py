@@ -16,7 +16,7 @@ from multidrop.base.text import whole
 from multidrop.simulator import USAGES
 from multidrop.simulator.cell.spec import BusSpec, Cell, DriveSpec
 from multidrop.simulator.families import BY_PERSONALITY, family_of
-from multidrop.simulator.family import Connection, Device, Place, Unit, UsbSide
+from multidrop.simulator.family import Connection, Device, Place, Unit
 from multidrop.simulator.wire import Wire
 from multidrop.simulator.world import World
 
@@ -154,10 +154,6 @@ class Floor:
                 return unit.connect()
         names = " and ".join(name for name, each in BY_PERSONALITY.items() if name in each.ethernet)
         raise Diagnostic("no drive that serves Modbus", f'bus "{bus}"', f"valid: {names}")
-
-    def usb(self, bus: str) -> list[UsbSide]:
-        """The USB sides of the drives of a bus, in their order."""
-        return [each.unit.usb for each in self.drives if each.bus == bus and each.unit.usb is not None]
 
     def connectable(self, bus: str) -> bool:
         """Whether a client can connect: not while the Ethernet drive of the bus has no power, or boots."""

@@ -127,12 +127,12 @@ class Assist:
 
 
 def _ports(state: Path) -> list[StartEntry]:
+    from multidrop.shell.connect.schemes import local_ports
     from multidrop.shell.state.port_state import memory_of
-    from multidrop.transports.controllers import all_ports
     from multidrop.transports.port_users import holder
 
     entries = []
-    for port in all_ports():
+    for port in local_ports():
         memory, at = memory_of(state, port.stable_name or port.device)
         names = " ".join(filter(None, (each.address for each in memory.drives))) or "a drive"
         answered = f"{names} answered {ago(time.time() - at)}" if memory.drives else ""

@@ -376,7 +376,7 @@ async def _share(url: str, address: str, as_json: bool, over: asyncio.Event) -> 
     """Lend the port until a signal (`over`). Raises the loss of a port that cannot be found again."""
     host, port = listening(address)
     connection = parse(url, configuration.load().connections)
-    if connection.scheme == "udp":
+    if connection.scheme.datagrams:
         raise Diagnostic("datagrams cannot be shared", url, "an Ethernet drive takes several clients itself")
     if connection.hints.family:
         stop_bytes(connection.hints.family)

@@ -250,9 +250,9 @@ def _macros() -> Iterator[str]:
 
 
 def _ports() -> Iterator[str]:
-    from multidrop.transports.controllers import all_ports
+    from multidrop.shell.connect.schemes import local_ports
 
-    found = all_ports()
+    found = [*local_ports()]
     for port in found:
         yield "  ".join(part for part in (port.device, port.stable_name, port.description) if part)
     if not found:

@@ -25,7 +25,8 @@ def run(chosen: argparse.Namespace) -> int:
 
 
 async def _scan(chosen: argparse.Namespace, session: Session) -> None:
-    searches = [_made(chosen, session, url) for url in _places(chosen.url)]
+    urls = parse(chosen.url, session.settings.connections).scheme.searched(chosen.url)
+    searches = [_made(chosen, session, url) for url in urls]
     failed: TransportLost | None = None
     for scanning in searches:
         try:
@@ -38,15 +39,6 @@ async def _scan(chosen: argparse.Namespace, session: Session) -> None:
     if failed is not None and not found:
         raise failed
     _conclude(chosen.json, session, found, chosen.save)
-
-
-def _places(url: str) -> list[str]:
-    """The URLs to search: each controller on USB for `usb:`."""
-    if url != "usb:":
-        return [url]
-    from multidrop.transports.controllers import list_controllers
-
-    return [each.url for each in list_controllers()] or [url]
 
 
 def _made(chosen: argparse.Namespace, session: Session, url: str) -> Scanning:

@@ -104,9 +104,9 @@ def relay(chosen: argparse.Namespace) -> int:
 
 
 def ports(chosen: argparse.Namespace) -> int:
-    from multidrop.transports.controllers import all_ports
+    from multidrop.shell.connect.schemes import local_ports
 
-    found = all_ports()
+    found = [*local_ports()]
     for port in found:
         if chosen.json:
             import json

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import sys
 import time
 from collections.abc import Awaitable, Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -18,11 +17,10 @@ from multidrop.dialects.families import DEFAULT, FAMILIES
 from multidrop.drives.bus import Bus
 from multidrop.drives.line import DEFAULT_TIMEOUT
 from multidrop.shell import configuration
-from multidrop.shell.connect.reconnect import Absent, LoginAgain, Reopen, SerialAgain, host_again, simulated, usb_again
-from multidrop.shell.connect.urls import Connection
+from multidrop.shell.connect.reconnect import Absent, Reopen, simulated
+from multidrop.shell.connect.scheme import Connection
 from multidrop.shell.state.port_state import PortState
-from multidrop.transports import NotOpen, Unreachable
-from multidrop.transports.ssh import FarPort
+from multidrop.transports import NotOpen
 
 if TYPE_CHECKING:
     from multidrop.dialects.units import Scale
@@ -54,8 +52,6 @@ class Opened:
     """The scales that a simulated cell states for its drives, by address, or `ADDRESS.AXIS`."""
 
 
-BAUDED = ("serial", "rfc2217", "ssh")
-"""The schemes of ports with a baud rate."""
 Opener = Callable[[Connection, Naming], Awaitable[list[Opened]]]
 
 
@@ -68,7 +64,7 @@ async def open_buses(
     port could not be opened; its bus is lost from the beginning, and is tried again.
     """
     family = _family(connection)
-    if connection.scheme == "sim":
+    if connection.scheme.simulated:
         return await _simulated(connection, naming)
     if family.prepare is not None:
         await asyncio.to_thread(family.prepare)  # a stop of another bus must not wait for it
@@ -87,7 +83,7 @@ async def open_buses(
                 absent=failure is not None,
             )
         ]
-    kept = PortState(state, port_name(connection), _baud(connection))
+    kept = PortState(state, connection.port_name, _baud(connection))
     bus = _bus(name, transport, connection, hints.family, kept)
     kept.notify = partial(bus.notify, warning=True)
     bus.link.leftovers.recovering = bool(kept.owed) and not family.codec.framed
@@ -123,7 +119,7 @@ class OpenedPort:
 async def open_port(connection: Connection) -> OpenedPort:
     """Open the byte pipe of a connection. Raises Unreachable, Diagnostic for a URL of several pipes or of none."""
     family, baud = connection.hints.family, connection.baud or _family(connection).baud
-    if connection.scheme == "sim":
+    if connection.scheme.simulated:
         found = await _cell(connection)
         first, *others = found
         if others:
@@ -133,25 +129,6 @@ async def open_port(connection: Connection) -> OpenedPort:
         return OpenedPort(first.name, first.transport, family or first.dialect, first.baud or baud, simulated(first))
     transport, reopen = await _connected(connection)
     return OpenedPort(connection.short, transport, family, baud, reopen)
-
-
-def port_name(connection: Connection) -> str:
-    """One name for a port, whichever of its names is given; empty for a simulated bus."""
-    if connection.scheme == "sim":
-        return ""
-    if connection.scheme == "ssh":
-        return replace(far_port(connection), user="", host=connection.host.lower()).name
-    if connection.scheme == "usb":
-        return f"usb:{connection.target}"
-    if connection.scheme != "serial":
-        return f"{connection.host.lower()}:{connection.port}" + (f"/{connection.target}" if connection.target else "")
-    from multidrop.transports.serial_ports import stable_name
-
-    return stable_name(connection.target)
-
-
-def far_port(connection: Connection) -> FarPort:
-    return FarPort(connection.host, connection.target, connection.user, connection.port)
 
 
 def _family(connection: Connection) -> Family[Any]:
@@ -164,7 +141,7 @@ def _family(connection: Connection) -> Family[Any]:
 
 def _baud(connection: Connection) -> int:
     """The baud rate of a connection; 0 for a port that has none."""
-    return connection.baud or (_family(connection).baud if connection.scheme in BAUDED else 0)
+    return connection.baud or (_family(connection).baud if connection.scheme.bauded else 0)
 
 
 def _bus(name: str, transport: Transport, connection: Connection, family: str, keeper: Keeper | None = None) -> Bus:
@@ -173,44 +150,9 @@ def _bus(name: str, transport: Transport, connection: Connection, family: str, k
     return Bus(name, transport, baud=baud, local_echo=echo, timeout=timeout, family=family, keeper=keeper)
 
 
-async def _transport(
-    connection: Connection, port: str = "", within: float | None = None, baud: int | None = None
-) -> Transport:
-    """Open a transport; a serial port by another name than it was given, a host within a time, s."""
-    baud = baud or connection.baud or _family(connection).baud
-    if connection.scheme == "serial":
-        from multidrop.transports.serial_port import open_serial
-
-        return await open_serial(port or connection.target, baud)
-    if connection.scheme == "rfc2217":
-        from multidrop.transports.rfc2217 import open_rfc2217
-
-        return await open_rfc2217(connection.host, connection.port, baud, within)
-    if connection.scheme == "ssh":
-        far = far_port(connection)
-        if sys.platform == "win32":
-            raise Unreachable(f"{far.name}: ssh:// needs multidrop on Linux or macOS here")
-        else:
-            from multidrop.transports.ssh_session import open_ssh
-
-            return await open_ssh(far, baud, within, connection.relay)
-    if connection.scheme == "usb":
-        from multidrop.transports.libusb import open_libusb
-
-        return await open_libusb(port or connection.target)
-    if connection.scheme == "usbip":
-        from multidrop.transports.usb import open_usb
-        from multidrop.transports.usbip import imported
-
-        carrier = await imported(connection.host, connection.port, connection.target, within)
-        opened = await open_usb(carrier)
-        opened.identity = await carrier.number()
-        return opened
-    from multidrop.transports.sockets import open_tcp, open_udp
-
-    if connection.scheme == "udp":
-        return await open_udp(connection.host, connection.port)
-    return await open_tcp(connection.host, connection.port, connection.scheme, within)
+async def _transport(connection: Connection, *, within: float | None = None, baud: int | None = None) -> Transport:
+    """Open a transport, at another baud rate than its URL has, or a host within a time, s."""
+    return await connection.scheme.open(connection, baud or connection.baud or _family(connection).baud, within)
 
 
 async def _connected(connection: Connection) -> tuple[Transport, Reopen | None]:
@@ -223,19 +165,12 @@ async def _connected(connection: Connection) -> tuple[Transport, Reopen | None]:
 
 def _again(connection: Connection, took: float) -> Reopen | None:
     """The way to open a port again, whose first opening `took` so long, s; None: there is none."""
-    if connection.scheme == "ssh":
-        return LoginAgain(lambda within, baud: _transport(connection, within=within, baud=baud), took)
-    if connection.scheme == "usb":
-        return usb_again(partial(_transport, connection))
-    if connection.scheme != "serial":
-        return host_again(lambda within: _transport(connection, within=within), took)
-    again = SerialAgain(connection.target, partial(_transport, connection))
-    return again if again.possible else None
+    return connection.scheme.again(connection, _transport, took)
 
 
 def first(connection: Connection) -> Reopen:
     """The way to open a port that was never open in this session, or is set in another way; then to open it again."""
-    again: Reopen | None = _again(connection, 0.0) if connection.scheme == "ssh" else None
+    again: Reopen | None = _again(connection, 0.0) if connection.scheme.logs_in else None
     opened = False
 
     async def open_(old: Transport) -> Transport:

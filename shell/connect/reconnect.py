@@ -104,16 +104,6 @@ def host_again(open_: Callable[[float], Awaitable[Transport]], took: float) -> R
     return again
 
 
-def usb_again(open_: Callable[[str], Awaitable[Transport]]) -> Reopen:
-    """Open the controller of the same number at the same socket again: another one there is not taken for it."""
-
-    async def again(old: Transport) -> Transport:
-        await old.close()
-        return await open_(old.name.removeprefix("usb:"))
-
-    return again
-
-
 class LoginAgain:
     """A port that is reached by a login, opened at its last baud rate. `took` is how long the first login took, s.
 

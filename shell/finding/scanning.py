@@ -23,16 +23,15 @@ from multidrop.drives.silence import explained
 from multidrop.drives.stopping import Halt
 from multidrop.shell import stop_report
 from multidrop.shell.channel import Job, running
-from multidrop.shell.connect.opening import BAUDED, Opened, Opener, far_port, port_name
-from multidrop.shell.connect.urls import DIRECT, Connection, with_echo
+from multidrop.shell.connect.opening import Opened, Opener
+from multidrop.shell.connect.scheme import Connection
+from multidrop.shell.connect.urls import with_echo
 from multidrop.shell.finding.limits import searched
 from multidrop.shell.state.port_state import memory_of
 from multidrop.shell.workspace import Workspace
 
 SLOWEST = 0.2
 """The longest time for which a network's reply is waited, s; `timeout=` in the URL replaces it."""
-TURNS = {"tcp": 1.0, "ssh": 0.25}
-"""The part of the time of an opening that a question and its reply take, at most, over a network."""
 SPREAD, JITTER = 2.0, 0.02
 """Over a network, a reply may take this many times as long as the measured one, and this time, s, more."""
 PLACE = 0
@@ -98,7 +97,7 @@ def url_of(found: Sequence[FoundDrive]) -> str:
     """The URL that opens the first drive, with those of its language, baud rate and mode on its port."""
     found = [each for each in found if each.form == found[0].form]
     connection, codec = found[0].connection, found[0].state.codec
-    if connection.scheme in DIRECT:
+    if connection.scheme.direct:
         return found[0].port
     keys = []
     if connection.baud:
@@ -106,7 +105,7 @@ def url_of(found: Sequence[FoundDrive]) -> str:
     if codec.family != DEFAULT:
         keys.append(f"dialect={codec.family}")
     party = getattr(codec, "party", None)
-    if party is not None and connection.scheme != "udp":
+    if party is not None and not connection.scheme.alone:
         keys.append(f"party={int(party)}")
     if names := [each.state.address for each in found if each.state.address]:
         keys.append(f"drives={','.join(names)}")
@@ -116,24 +115,9 @@ def url_of(found: Sequence[FoundDrive]) -> str:
         keys.append(f"relay={connection.relay}")
     if connection.local_echo:
         keys.append("echo=local")
-    base = f"serial:{port_name(connection)}" if connection.scheme == "serial" else found[0].port
+    base = connection.scheme.found(connection, found[0].port)
     head, _, bus = base.partition("#")
     return head + (f"?{'&'.join(keys)}" if keys else "") + (f"#{bus}" if bus else "")
-
-
-def port_of(connection: Connection, bus: str) -> str:
-    """The port for a person and a program, without keys."""
-    if connection.scheme == "serial":
-        return connection.target
-    if connection.scheme == "sim":
-        return f"sim:{connection.target}" + (f"#{connection.bus or bus}" if connection.bus or bus else "")
-    if connection.scheme == "ssh":
-        return far_port(connection).name
-    if connection.scheme == "usb":
-        return f"usb:{connection.target}"
-    host = f"[{connection.host}]" if ":" in connection.host else connection.host
-    device = f"/{connection.target}" if connection.scheme == "usbip" else ""
-    return f"{connection.scheme}://{host}:{connection.port}{device}"
 
 
 class NothingFound(TransportLost):
@@ -171,7 +155,7 @@ class Scanning:
             searched = f"{', '.join(titles[:-1])} and {titles[-1]}"
             raise Diagnostic(f"scan searches for {searched} drives", connection.text, "open it instead")
         self.found: list[FoundDrive] = []
-        self.port = port_of(connection, "")
+        self.port = connection.scheme.shown(connection)
         """The port for a person."""
         self._workspace = workspace
         self._opener = opener
@@ -239,7 +223,7 @@ class Scanning:
         given = self._connection
         searched = [name for name, family in FAMILIES.items() if (scan := family.scan) is not None and not scan.hazard]
         stages = [Stage(family, None) for family in ([given.hints.family] if given.hints.family else searched)]
-        if given.scheme not in BAUDED:
+        if not given.scheme.bauded:
             if bauds:
                 raise Diagnostic("the port has no baud rate", given.text, "drop --baud")
             return stages
@@ -286,7 +270,7 @@ class Scanning:
         replied is read in the end, because that takes as long as a drive slows down.
         """
         replied = [_stage_of(each.connection) for each in self.found]
-        memory, _ = memory_of(self._workspace.settings.state, port_name(self._connection))
+        memory, _ = memory_of(self._workspace.settings.state, self._connection.port_name)
         named = self._connection.hints.family in ("", DEFAULT)
         remembered = [Stage(DEFAULT, memory.baud)] if named and memory.drives and memory.baud else []
         likely = list(dict.fromkeys([*replied, *remembered, *self._tried]))
@@ -396,7 +380,7 @@ class Scanning:
         scheme, window = self._connection.scheme, self._connection.timeout or WINDOW
         if self._connection.timeout is None:
             window += distance
-        return Reach(window=window, alone=scheme == "udp" or scheme in DIRECT, hasty=hasty, everything=self._everything)
+        return Reach(window=window, alone=scheme.alone, hasty=hasty, everything=self._everything)
 
     # One stage
 
@@ -411,7 +395,7 @@ class Scanning:
 
         connection, began = self.connection(stage), self._workspace.now()
         buses = await self._opener(connection, str)
-        distance = min((self._workspace.now() - began) * TURNS.get(connection.scheme, 0.0), SLOWEST)
+        distance = min((self._workspace.now() - began) * connection.scheme.turns, SLOWEST)
         if (trip := buses[0].bus.link.transport.round_trip) is not None:
             distance = SPREAD * trip + JITTER
         async with AsyncExitStack() as open_:
@@ -426,12 +410,12 @@ class Scanning:
         if not self._connection.local_echo:
             self._connection = with_echo(self._connection)
             text = "the adapter repeats what it sends; the URLs that are found have echo=local"
-            self._warn(port_of(self._connection, ""), [text])
+            self._warn(self._connection.scheme.shown(self._connection), [text])
 
     async def _searched(self, opened: Opened, stage: Stage, reach: Reach, step: Callable[[], None]) -> None:
         """Search one bus."""
         bus, hints = opened.bus, opened.hints
-        port = port_of(self._connection, bus.name)
+        port = self._connection.scheme.shown(self._connection, bus.name)
         bus.link.on_echo = self._repeats
 
         def found(state: DriveState) -> None:

@@ -82,15 +82,6 @@ _KEY = re.compile(r'"([^"]*)"|([\w-]+)')
 _ELSEWHERE = re.compile(r"@([\w.]+:\w+)")
 
 
-def place(after: Mapping[str, str], names: list[str]) -> None:
-    """Put each name behind the one that it comes after, which may be one of them; last, where that is not there."""
-    left = dict(after)
-    while left:
-        name = next((each for each, before in left.items() if before in names), next(iter(left)))
-        before = left.pop(name)
-        names.insert(names.index(before) + 1 if before in names else len(names), name)
-
-
 class Declared(Mapping[str, Operation]):
     """Operations by name: those of the sections, then those of features, each after the one that it names.
 
@@ -112,7 +103,7 @@ class Declared(Mapping[str, Operation]):
 
     def __iter__(self) -> Iterator[str]:
         names = [*self._sections]
-        place(
+        registry.place(
             {name: each.after for feature in registry.features() for name, each in self._added(feature).items()}, names
         )
         return iter(names)
@@ -226,18 +217,24 @@ def groups() -> dict[str, list[str]]:
         operation = VERBS[name]
         added.setdefault(operation.group or BY_OTHERS, {})[name] = operation.after
     for title, after in added.items():
-        place(dict(sorted(after.items())), found.setdefault(title, []))
+        registry.place(dict(sorted(after.items())), found.setdefault(title, []))
     return found
 
 
 def load_others(own: bool = True) -> list[str]:
-    """Load the features by others; return a warning for each that cannot be, or whose verb or command is taken."""
+    """Load the features by others; return a warning for each that cannot be, or whose words are taken."""
+    from multidrop.shell.connect.scheme import Scheme
+    from multidrop.shell.connect.schemes import CORE
+
     registry.load_others(own)
-    taken = {*VERBS._sections, *COMMANDS._sections, *registry.words()}
+    taken = {*VERBS._sections, *COMMANDS._sections, *registry.words(), *(f"{name}:" for name in CORE)}
     for feature in registry.by_others():
         adds = [each for each in feature.adds if isinstance(each, Operation)]
+        schemes = [f"{each.name}:" for each in feature.adds if isinstance(each, Scheme)]
         words = [word for each in adds for word in (each.name, each.command) if word]
-        if wrong := next((word for word in words if word in taken or not _WORD.fullmatch(word)), ""):
+        odd = [word for word in words if not _WORD.fullmatch(word)]
+        words += schemes
+        if wrong := next((word for word in words if word in taken or word in odd), ""):
             why = f"{wrong} is taken" if wrong in taken else f"{wrong} is no name of a verb or a command"
             registry.refuse(feature.name, why)
         else:

@@ -16,7 +16,7 @@ from multidrop.base.errors import Diagnostic
 from multidrop.dialects.families import DEFAULT, FAMILIES
 from multidrop.drives.drive import Drive
 from multidrop.macros import KEYS
-from multidrop.shell.connect.url_forms import URL_FORMS
+from multidrop.shell.connect.schemes import schemes
 from multidrop.shell.line_syntax import EVERYONE, DriveLine, VerbLine, join_target, parse
 from multidrop.shell.operations.conditions import simulated_cell
 from multidrop.shell.operations.table import VERBS
@@ -176,7 +176,7 @@ def offered(workspace: Workspace, placeholder: str, word: str) -> Found:
             yield from ((name, family) for family in PROGRAMS for name in TABLE[family].personalities)
         case "URL":
             yield from ((name, each.url) for name, each in workspace.settings.connections.items())
-            yield from ((form.prefix, form.meaning) for form in URL_FORMS.values())
+            yield from ((form.prefix, form.meaning) for form in schemes().values())
             if word.startswith("sim:"):
                 cells = (f"sim:{name}" for name, _ in _files(word[4:]))
                 yield from ((name, "a cell") for name in cells if name.endswith((".toml", "/")))

@@ -1,19 +1,12 @@
 """The family of the Arcus PMX-2ED-SA controllers: their `[[bus.drive]]` table, read, built, written.
 
 A controller as it was read from a unit becomes such a table, and a table the settings to write to a unit.
-
-Its USB side has the descriptors, requests and packets of a Performax module. Source: manual 6.1 (64 characters each
-way; a reply that was not read comes first, 6.1.3) and 7 (DN is the identity). Class, speed and strings are assumed. It
-hears its own traffic, never the wire. Bytes come in, bytes go out; no clock.
 """
 
 from __future__ import annotations
 
-import struct
-from collections import deque
 from collections.abc import Mapping
 from contextlib import suppress
-from dataclasses import dataclass, field
 from fractions import Fraction
 
 from multidrop.base.files import split_lines
@@ -47,7 +40,6 @@ from multidrop.simulator.pmx.controller import BAUDS
 from multidrop.simulator.pmx.device import PROGRAMS, PmxDevice, PmxPort
 from multidrop.simulator.pmx.pulses import TURN
 from multidrop.simulator.pmx.settings import AXES, VARIABLES
-from multidrop.transports.performax import IN, OUT, PACKET, PRODUCT, REQUEST, REQUEST_TYPE, STALLED, VENDOR, Control
 
 NAMES_OF_AXES = ("x", "y")
 INPUTS, COUNTS = range(1, 9), 5000
@@ -151,80 +143,6 @@ def _worlds(snapshot: Snapshot) -> dict[str, dict[str, object]]:
     return {axis: keys for axis, keys in worlds.items() if keys}
 
 
-HELD = 16
-"""Replies that the controller holds; older ones are lost."""
-DEVICE, CONFIGURATION, STRING = 1, 2, 3
-"""Types of descriptors."""
-LANGUAGE = 0x0409
-_DEVICE = struct.pack("<BBHBBBBHHHBBBB", 18, DEVICE, 0x0110, 0, 0, 0, PACKET, VENDOR, PRODUCT, 0x0100, 1, 2, 3, 1)
-_INTERFACE = bytes([9, 4, 0, 0, 2, 0xFF, 0, 0, 0])
-_ENDPOINTS = b"".join(struct.pack("<BBBBHB", 7, 5, number, 2, PACKET, 0) for number in (OUT, IN))
-_BODY = _INTERFACE + _ENDPOINTS
-_CONFIGURATION = struct.pack("<BBHBBBBB", 9, CONFIGURATION, 9 + len(_BODY), 1, 1, 0, 0xC0, 0) + _BODY
-
-
-@dataclass
-class UsbController:
-    """One controller as a USB device."""
-
-    device: PmxDevice
-    replies: deque[bytes] = field(default_factory=lambda: deque(maxlen=HELD))
-    """Replies that the host has not read."""
-    _configured: int = 1
-
-    @property
-    def present(self) -> bool:
-        return self.device.powered
-
-    @property
-    def closed(self) -> bool:
-        """Never: what makes no sense is stalled."""
-        return False
-
-    def receive(self, data: bytes, now: float) -> bytes:
-        """Take a packet: one command up to its NUL. The reply waits to be read."""
-        text, _, _ = data.partition(b"\0")
-        if text:
-            reply = self.device.execute(text.decode("latin-1"), now).encode("latin-1")
-            self.replies.append((reply[: PACKET - 1] + b"\0").ljust(PACKET, b"\0"))
-        return b""
-
-    def request(self, setup: bytes) -> tuple[int, bytes]:
-        kind, request, value, index, length = struct.unpack("<BBHHH", setup)
-        if (kind, request) == (REQUEST_TYPE, REQUEST):
-            if value == Control.FLUSH:
-                self.replies.clear()
-            return (0, b"") if value in tuple(Control) else (STALLED, b"")
-        match kind, request:
-            case 0x80, 6:
-                found = self._descriptor(value >> 8, value & 0xFF)
-                return (0, found[:length]) if found else (STALLED, b"")
-            case 0x80, 8:
-                return 0, bytes([self._configured])
-            case 0x00, 9 if value in (0, 1):
-                self._configured = value
-                return 0, b""
-            case ((0x80 | 0x81 | 0x82), 0):
-                return 0, bytes(2)
-            case (0x01, 11) | (0x02, 1) | (0x00, 5):  # interface 0; a halt that ends; an address
-                return 0, b""
-            case 0x81, 10:
-                return 0, b"\0"
-        return STALLED, b""
-
-    def _descriptor(self, kind: int, index: int) -> bytes:
-        number = f"2ED{self.device.controller.settings.number}"
-        texts = {1: "Arcus", 2: "Performax USB", 3: number}
-        if kind == DEVICE:
-            return _DEVICE
-        if kind == CONFIGURATION and index == 0:
-            return _CONFIGURATION
-        if kind != STRING or (index and index not in texts):
-            return b""
-        body = texts[index].encode("utf-16-le") if index else struct.pack("<H", LANGUAGE)
-        return bytes([2 + len(body), STRING]) + body
-
-
 def build(spec: DriveSpec, place: Place) -> Unit:
     """Build a controller that is powered up. Raises Diagnostic for settings that it refuses, and for a program."""
     device = PmxDevice(spec, place.baud)
@@ -233,7 +151,6 @@ def build(spec: DriveSpec, place: Place) -> Unit:
         port=PmxPort(device, alone=place.alone, any_baud=place.baud not in BAUDS.values()),
         worlds=dict(zip(NAMES_OF_AXES, device.worlds, strict=True)),
         shadow=_shadow(device),
-        usb=UsbController(device),
         inputs=INPUTS,
         counts=COUNTS,
     )
@@ -280,5 +197,4 @@ PMX = Family(
     build=build,
     snapshots=Snapshots(describe, wanted, program),
     addressed=True,
-    usb=True,
 )

@@ -19,11 +19,11 @@ from multidrop.base.errors import Diagnostic
 from multidrop.base.files import bounded, check_line
 from multidrop.base.text import visible
 from multidrop.simulator import cells
+from multidrop.simulator.cell.endpoint_kinds import kind_of
 from multidrop.simulator.floor import Floor
 from multidrop.simulator.serving.endpoints import Served, serve_bus
 from multidrop.simulator.serving.running import RunningFloor
 from multidrop.transports.sockets import exposed
-from multidrop.transports.usbip import PORT
 
 INPUT = "standard input"
 LONGEST = 64 * 1024
@@ -53,8 +53,9 @@ async def serve(
         for bus in cell.buses:
             for served in await serve_bus(floor, bus, stack):
                 _print_endpoint(served, json, stdout)
-                if served.endpoint.startswith("usbip:"):
-                    _narrate(attaching(served.endpoint))
+                kind = kind_of(served.endpoint.partition(":")[0])
+                if kind is not None and kind.remark is not None:
+                    _narrate(kind.remark(served.endpoint))
                 open_to_all += [f"{served.bus} {served.endpoint}"] if reachable(served.endpoint) else []
         if open_to_all:
             _warn(f"{', '.join(open_to_all)}: open to the network, not only to this computer; serve 127.0.0.1 for that")
@@ -62,14 +63,6 @@ async def serve(
         if stdin is not None:
             stack.callback(read_lines(loop, stdin, lambda line: _carry_out(floor, line)))
         await over.wait()
-
-
-def attaching(endpoint: str) -> str:
-    """The command that plugs in an endpoint of USB/IP."""
-    place = urlsplit(endpoint)
-    port = f"--tcp-port {place.port} " if place.port != PORT else ""
-    command = f"usbip {port}attach -r {place.hostname} -b {place.path[1:]}"
-    return f"{command}   (as root, on Linux; on Windows with usbip-win2) plugs it in"
 
 
 def reachable(endpoint: str) -> bool:

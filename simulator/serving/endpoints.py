@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from typing import cast
 
 from multidrop.base.errors import Diagnostic
+from multidrop.simulator.cell.endpoint_kinds import kind_of
 from multidrop.simulator.cell.spec import BusSpec, Endpoint
 from multidrop.simulator.serving.running import PIECE, Client, InputQueue, Listener, RunningFloor
 
@@ -77,13 +78,8 @@ async def _open(floor: RunningFloor, bus: str, endpoint: Endpoint, stack: AsyncE
             stack.callback(transport.close)
             stack.callback(datagrams.close)
             return [f"{place}:{transport.get_extra_info('sockname')[1]}"]
-        case "usbip":
-            from multidrop.simulator.serving.usbip import UsbipServer
-
-            exports = UsbipServer(floor, bus)
-            stack.push_async_callback(exports.close)
-            port = await exports.open(endpoint.host, endpoint.port)
-            return [f"{place}:{port}/{bus_id}" for bus_id in exports.devices]
+    if (kind := kind_of(endpoint.scheme)) is not None:
+        return await kind.open(floor, bus, endpoint, stack)
     server = TcpServer(floor, bus, endpoint)
     stack.push_async_callback(server.close)
     await server.open()

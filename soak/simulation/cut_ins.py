@@ -24,7 +24,7 @@ from soak.simulation.clock import SimulatedLoop
 
 SHARED = {
     "multidrop.transports.pipe": ("Pipe", "DescriptorPipe"),
-    "multidrop.transports.usb": ("UsbPipe",),
+    "multidrop.features.usb.pipe": ("UsbPipe",),
     "multidrop.drives.stop_ahead": ("StopAhead",),
     "multidrop.drives.stopping": ("Stopping", "_read"),
     "multidrop.drives.link": ("Link",),
@@ -42,6 +42,8 @@ OWN = {
     *("StopAhead._next", "StopAhead._take_back", "StopAhead._due_piece", "StopAhead._of_the_loop", "Keyboard._run"),
 }
 """What the keyboard's thread runs alone."""
+CALLED = {"multidrop.features.usb.pipe": "usb"}
+"""The names of modules in those of points, where the last word of the module is another one's."""
 LOCKS = {"_guard"}
 QUEUES = {"_pending", "_queue", "_waiting", "_repeats", "_typed", "_background"}
 STATES = {"_begun", "_preempted", "_partial_until", "lost", "transport", "buses"}
@@ -109,7 +111,10 @@ def points() -> dict[str, tuple[str, int]]:
         lines = dict.fromkeys(_found(tree, "", only))
         for name, line in lines:
             again = sum(each == name and other < line for each, other in lines)
-            found[f"{module.rpartition('.')[2]} {name}{f' ({again + 1})' * bool(again)}"] = file, line
+            found[f"{CALLED.get(module) or module.rpartition('.')[2]} {name}{f' ({again + 1})' * bool(again)}"] = (
+                file,
+                line,
+            )
     return found
 
 

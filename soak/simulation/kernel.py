@@ -19,10 +19,11 @@ from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any
 
 from multidrop.drives import pacing
+from multidrop.features.usb import libusb
 from multidrop.shell.connect import reconnect
 from multidrop.simulator.lexium import power
 from multidrop.simulator.serving.running import Listener, RunningFloor
-from multidrop.transports import libusb, relay, serial_pipe, serial_port, serial_ports, sockets, ssh_session
+from multidrop.transports import relay, serial_pipe, serial_port, serial_ports, sockets, ssh_session
 from soak.simulation.far import SshProgram
 from soak.simulation.network import Network, Socket
 from soak.simulation.pacer import Pacer

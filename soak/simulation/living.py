@@ -20,8 +20,9 @@ from multidrop.base import registry
 from multidrop.base.isolation import LOG
 from multidrop.dialects.state import DriveState
 from multidrop.drives.conversations import Conversations
+from multidrop.features.usb import pipe as usb
 from multidrop.simulator import wire
-from multidrop.transports import pipe, usb
+from multidrop.transports import pipe
 from soak.simulation.acts.seams import SEAMS
 from soak.simulation.climate import Climate
 from soak.simulation.clock import Deadlock, SimulatedLoop

@@ -1,7 +1,8 @@
 """The USB of the simulated machine: controllers in sockets, and what goes wrong there.
 
-The product's pipe works above (`transports.usb`), and its choice of a controller. In place of libusb are the carriers
-of `tests.support.usb_stand_in`: transfers that the controller takes late or refuses, replies that come late or never.
+The product's pipe works above (`features.usb.pipe`), and its choice of a controller. In place of libusb are the
+carriers of `tests.support.usb_stand_in`: transfers that the controller takes late or refuses, replies that come late
+or never.
 """
 
 from __future__ import annotations
@@ -9,8 +10,9 @@ from __future__ import annotations
 from random import Random
 from typing import TYPE_CHECKING, Any
 
+from multidrop.features.usb.device import sides
+from multidrop.features.usb.pipe import Broken, Done
 from multidrop.transports import Unreachable
-from multidrop.transports.usb import Broken, Done
 from soak.simulation.process import operate, outside
 from tests.support.usb_stand_in import Plugged, Sockets, StandIn, UsbFaults
 
@@ -80,7 +82,7 @@ class UsbSockets(Sockets):
     def add(self, floor: RunningFloor, line: str, place: str) -> None:
         """Plug the controller of a line in."""
         rng = Random(f"{self._kernel.seed} usb {line}")
-        self.plugged.append(Socket(floor, line, floor.floor.usb(line)[0], place, rng))  # type: ignore[arg-type]
+        self.plugged.append(Socket(floor, line, sides(floor.floor, line)[0], place, rng))
 
     def quiet(self, climate: Climate) -> None:
         """Give every controller the faults of another climate."""

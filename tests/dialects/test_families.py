@@ -9,11 +9,11 @@ import pytest
 from multidrop.dialects.families import DEFAULT, FAMILIES, TABLE, family_of, languages, program_languages, seen
 from multidrop.dialects.family import Hints
 from multidrop.shell.connect import urls
-from multidrop.shell.connect.url_forms import URL_FORMS
+from multidrop.shell.connect.schemes import schemes
 from tests.support.paths import sources
 
 ROOMS = ("drives", "shell", "tui", "macros", "multidrop")
-SCHEMES = {"shell/connect/url_forms.py"}
+SCHEMES = {"shell/connect/schemes.py"}
 """The table of URL schemes, where `modbus` is a scheme."""
 
 
@@ -37,7 +37,7 @@ def test_codec_and_state_lead_to_their_record(family) -> None:
 @pytest.mark.parametrize("family", FAMILIES.values(), ids=FAMILIES)
 def test_a_url_names_a_family_by_its_scheme_or_by_dialect(family) -> None:
     if scheme := TABLE[family.name].scheme:
-        assert scheme in URL_FORMS and urls.parse(f"{scheme}://h").hints == Hints(family=family.name)
+        assert scheme in schemes() and urls.parse(f"{scheme}://h").hints == Hints(family=family.name)
     else:
         assert urls.parse(f"/dev/ttyUSB0?dialect={family.name}").hints == Hints(family=family.name)
 

@@ -8,9 +8,11 @@ import pytest
 
 from multidrop.base import registry
 from multidrop.base.registry import IN_WHEEL
+from multidrop.shell.connect.scheme import Scheme
 from multidrop.shell.hooks import AtSession, Options
 from multidrop.shell.operations.operation import Operation
 from multidrop.shell.sections import Section
+from multidrop.simulator.cell.endpoint_kinds import EndpointKind
 from tests.support.paths import ROOT
 
 
@@ -26,8 +28,11 @@ def test_the_table_has_the_words_that_the_record_answers_to(name: str) -> None:
     operations = [each for each in record.adds if isinstance(each, Operation)]
     words = {word for each in operations for word in (each.name, each.command) if word}
     words |= {f"[{each.name}]" for each in record.adds if isinstance(each, Section)}
+    words |= {f"{each.name}:" for each in record.adds if isinstance(each, Scheme)}
+    words |= {f"{each.scheme}:" for each in record.adds if isinstance(each, EndpointKind)}
     assert words == set(IN_WHEEL[name])
-    assert all(isinstance(each, Operation | AtSession | Options | Section) for each in record.adds)
+    kinds = Operation | AtSession | Options | Section | Scheme | EndpointKind
+    assert all(isinstance(each, kinds) for each in record.adds)
     for each in operations:
         assert each.meaning if each.command else each.help
         assert callable(each.run) or not each.run, "a feature names its functions, not their places"

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from multidrop.dialects.families import FAMILIES, TABLE
-from multidrop.shell.connect.url_forms import URL_FORMS
+from multidrop.shell.connect.schemes import schemes
 from multidrop.shell.connect.urls import parse
 from tests.support.cases import for_each
 from tests.support.paths import ROOT
@@ -22,7 +22,7 @@ def texts(file: Path) -> list[str]:
     ]
 
 
-@for_each("file", [file for file in FILES if file.name != "url_forms.py"])
+@for_each("file", [file for file in FILES if file.name != "schemes.py"])
 def test_no_family_is_named(file: Path) -> None:
     assert not set(FAMILIES) & set(texts(file))
 
@@ -30,7 +30,7 @@ def test_no_family_is_named(file: Path) -> None:
 @pytest.mark.parametrize("family", FAMILIES.values(), ids=lambda family: family.name)
 def test_every_family_is_opened_by_its_scheme_or_by_dialect(family) -> None:
     if scheme := TABLE[family.name].scheme:
-        assert scheme in URL_FORMS
+        assert scheme in schemes()
         assert parse(f"{scheme}://host").hints.family == family.name
     else:
         assert parse(f"tcp://host?dialect={family.name}").hints.family == family.name

@@ -180,8 +180,10 @@ def test_a_relative_path_of_a_saved_connection_starts_at_the_configuration(
     saved = configuration.load().connections
     found = parse("press", saved)
     path = str(config.parent / "cells" / "press.toml")
-    assert (found.target, found.anchored, found.bus) == (path, f"sim:{path}#line?em=1", "line")
-    assert parse("sim:cells/press.toml?em=1").anchored == f"sim:{tmp_path}/cells/press.toml?em=1"
+    assert (found.target, found.bus) == (path, "line")
+    assert found.scheme.lasting(found, "line") == f"sim:{path}#line?em=1"
+    typed = parse("sim:cells/press.toml?em=1")
+    assert typed.scheme.lasting(typed, "line") == f"sim:{tmp_path}/cells/press.toml#line"
     config.write_text('[connections.tty]\nurl = "serial:./press.tty?baud=9600"\n[connections.com]\nurl = "COM3"\n')
     saved = configuration.load().connections
     assert parse("tty", saved).target == str(config.parent / "press.tty")

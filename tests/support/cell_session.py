@@ -6,10 +6,10 @@ import json
 from collections.abc import AsyncIterator, Mapping, Sequence
 from contextlib import ExitStack, asynccontextmanager
 from pathlib import Path
-from random import Random
 from types import MappingProxyType
 from typing import Any
-from unittest import mock
+
+import pytest
 
 from multidrop.dialects.units import scale
 from multidrop.drives.events import Traffic
@@ -19,8 +19,6 @@ from multidrop.shell.session import Session
 from multidrop.simulator.cells import load
 from multidrop.simulator.floor import Floor
 from multidrop.simulator.serving.running import RunningFloor
-from multidrop.transports import libusb
-from tests.support.usb_stand_in import Plugged, Sockets
 
 
 def bus(name: str, *drives: str, baud: int = 9600, serve: Sequence[str] = ()) -> str:
@@ -104,6 +102,8 @@ class CellSession:
         guards: Sequence[str] = (),
         usb: bool = False,
     ) -> None:
+        if usb:
+            pytest.importorskip("multidrop.features.usb")
         (folder / "cell.toml").write_text("".join(buses))
         self.path, self.usb = folder / "cell.toml", usb
         self.url = f"sim:{self.path}"
@@ -121,12 +121,11 @@ class CellSession:
 
     async def __aenter__(self) -> CellSession:
         if self.usb:
+            from tests.support.usb_stand_in import plugged_in
+
             self._running = RunningFloor(Floor(load(self.path)))
             self._open.callback(self._running.close)
-            sides = [(name, self._running.floor.usb(name)[0]) for name in self.session.settings.connections]
-            places = enumerate(sides, 1)
-            plugged = [Plugged(self._running, name, side, f"1-{n}", Random(n)) for n, (name, side) in places]
-            self._open.enter_context(mock.patch.object(libusb, "LibusbCarrier", Sockets(*plugged)))
+            self._open.enter_context(plugged_in(self._running, self.session.settings.connections))
         for url in self.session.settings.connections if self.usb else [self.url]:
             await self.session.open(url)
         self.events.clear()

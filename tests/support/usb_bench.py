@@ -25,7 +25,7 @@ from dataclasses import dataclass
 with warnings.catch_warnings(action="ignore"):  # there is one version
     from gi.repository import GLib, UMockdev
 
-from multidrop.transports.usbip import (
+from multidrop.features.usb.usbip import (
     BUS_ID,
     OPERATION,
     RECORD,

@@ -8,18 +8,21 @@ from __future__ import annotations
 
 import asyncio
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
 from contextvars import Context, copy_context
 from dataclasses import dataclass, field
 from random import Random
+from unittest import mock
 
-from multidrop.simulator.pmx.family import UsbController
+from multidrop.features.usb import libusb
+from multidrop.features.usb.controllers import Found, chosen
+from multidrop.features.usb.device import UsbController, sides
+from multidrop.features.usb.performax import CANCELLED, GONE, PACKET, STALLED, Control
+from multidrop.features.usb.pipe import Broken, Done, TransferFailed
+from multidrop.features.usb.usbip import setup
 from multidrop.simulator.serving.running import Listener, RunningFloor
 from multidrop.transports import Unreachable
-from multidrop.transports.controllers import Found, chosen
-from multidrop.transports.performax import CANCELLED, GONE, PACKET, STALLED, Control
-from multidrop.transports.usb import Broken, Done, TransferFailed
-from multidrop.transports.usbip import setup
 
 
 @dataclass(frozen=True)
@@ -110,6 +113,16 @@ class Sockets:
     def opened(self, name: str, plugged: Plugged) -> StandIn:
         """Open a controller that nobody has."""
         return StandIn(name, plugged)
+
+
+@contextmanager
+def plugged_in(floor: RunningFloor, buses: Iterable[str]) -> Iterator[None]:
+    """Plug the first controller of each bus in to this machine, the first one as `1-1`."""
+    plugged = [
+        Plugged(floor, name, sides(floor.floor, name)[0], f"1-{n}", Random(n)) for n, name in enumerate(buses, 1)
+    ]
+    with mock.patch.object(libusb, "LibusbCarrier", Sockets(*plugged)):
+        yield
 
 
 class StandIn:

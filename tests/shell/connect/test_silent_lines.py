@@ -13,7 +13,6 @@ from multidrop.dialects.families import seen
 from multidrop.dialects.state import Remembered
 from multidrop.shell.configuration import Settings
 from multidrop.shell.connect import opening
-from multidrop.shell.connect.opening import port_name
 from multidrop.shell.connect.urls import parse
 from multidrop.shell.session import Session
 from multidrop.shell.state.port_state import PortState
@@ -41,12 +40,12 @@ URLS = [
 
 async def failure(folder: Any, patch: Any, url: str, lazy: bool, remembered: bool, **device: Any) -> str:
     async def transport(connection: Any, port: str = "", within: Any = None, baud: Any = None) -> Any:
-        return Talker(network=connection.scheme == "tcp", **device)
+        return Talker(network=connection.scheme.name == "tcp", **device)
 
     patch.setattr(opening, "_transport", transport)
     folder = folder / str(next(FOLDERS))
     if remembered:
-        kept = PortState(folder / "s", port_name(parse(url)), 9600)
+        kept = PortState(folder / "s", parse(url).port_name, 9600)
         kept.remember({"a": LAST})
         kept.close()
     session: Any = Session(Settings({}, folder / "c", folder / "s", data=folder / "d"), lazy=lazy)

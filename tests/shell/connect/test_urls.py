@@ -5,9 +5,8 @@ from hypothesis import strategies as st
 from multidrop.base.errors import Diagnostic
 from multidrop.dialects import Hints
 from multidrop.shell.configuration import SavedConnection
-from multidrop.shell.connect.opening import port_name
-from multidrop.shell.connect.urls import KEYS, SCHEMES, parse
-from multidrop.shell.finding.scanning import port_of
+from multidrop.shell.connect.schemes import schemes
+from multidrop.shell.connect.urls import KEYS, parse
 
 
 @pytest.mark.parametrize(
@@ -27,7 +26,7 @@ from multidrop.shell.finding.scanning import port_of
 )
 def test_a_port_or_a_cell_is_a_target(url, scheme, target):
     found = parse(url)
-    assert (found.scheme, found.target, found.text) == (scheme, target, url)
+    assert (found.scheme.name, found.target, found.text) == (scheme, target, url)
 
 
 @pytest.mark.parametrize(
@@ -57,15 +56,15 @@ def test_network_urls_give_host_and_port(url, host, port):
 )
 def test_a_port_of_another_machine_has_a_login_and_a_path(url, user, host, port, target, short):
     found = parse(url)
-    assert (found.scheme, found.user, found.host, found.port) == ("ssh", user, host, port)
+    assert (found.scheme.name, found.user, found.host, found.port) == ("ssh", user, host, port)
     assert target in (None, found.target) and short in (None, found.short)
-    again = parse(port_of(found, ""))
+    again = parse(found.scheme.shown(found, ""))
     assert (again.user, again.host, again.port) == (user, host, port)
 
 
 def test_a_port_of_another_machine_is_one_port_whoever_logs_in():
-    assert port_name(parse("ssh://fitter@PC3/dev/ttyUSB0")) == port_name(parse("ssh://pc3/dev/ttyUSB0?baud=19200"))
-    assert port_name(parse("ssh://pc3/dev/ttyUSB1")) != port_name(parse("ssh://pc3/dev/ttyUSB0"))
+    assert parse("ssh://fitter@PC3/dev/ttyUSB0").port_name == parse("ssh://pc3/dev/ttyUSB0?baud=19200").port_name
+    assert parse("ssh://pc3/dev/ttyUSB1").port_name != parse("ssh://pc3/dev/ttyUSB0").port_name
 
 
 def test_a_bus_of_a_cell_stands_behind_a_hash_before_or_after_the_keys():
@@ -159,7 +158,7 @@ words = st.text(st.sampled_from("ab019:/?&=#,._-%[]@ CMsimtcp"), max_size=30)
     st.one_of(
         st.text(max_size=30),
         words,
-        st.builds("{}:{}?{}={}".format, st.sampled_from(SCHEMES), words, st.sampled_from([*KEYS]), words),
+        st.builds("{}:{}?{}={}".format, st.sampled_from([*schemes()]), words, st.sampled_from([*KEYS]), words),
     )
 )
 def test_any_text_is_a_connection_or_one_line_of_complaint(text):
@@ -168,8 +167,8 @@ def test_any_text_is_a_connection_or_one_line_of_complaint(text):
     except Diagnostic as problem:
         assert str(problem)
     else:
-        assert found.scheme in SCHEMES
-        assert found.target or found.host or found.scheme == "sim"
+        assert found.scheme in schemes().values()
+        assert found.target or found.host or found.scheme.simulated
 
 
 @given(

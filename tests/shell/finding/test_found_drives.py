@@ -10,7 +10,7 @@ from multidrop.base.errors import Diagnostic
 from multidrop.dialects.families import FAMILIES
 from multidrop.dialects.mcode.host.codec import MCode
 from multidrop.shell.connect.urls import parse
-from multidrop.shell.finding.scanning import FoundDrive, Scanning, port_of, url_of
+from multidrop.shell.finding.scanning import FoundDrive, Scanning, url_of
 from tests.support.cases import for_each
 
 
@@ -20,7 +20,7 @@ def found(url: str, address: str = "", family: str = "mcode", party: bool = Fals
     for name, value in known.items():
         setattr(state, name, value)
     connection = parse(url)
-    return FoundDrive(connection, port_of(connection, ""), state)
+    return FoundDrive(connection, connection.scheme.shown(connection), state)
 
 
 PORTS = {
@@ -29,7 +29,6 @@ PORTS = {
     "tcp://[fe80::1]:4000": "tcp://[fe80::1]:4000",
     "udp://10.0.0.5:503": "udp://10.0.0.5:503",
     "rfc2217://host:4000": "rfc2217://host:4000",
-    "usb:2ED42": "usb:2ED42",
     "sim:cell.toml": "sim:cell.toml",
     "sim:cell.toml#press": "sim:cell.toml#press",
     "ssh://me@host/dev/ttyUSB0": "ssh://me@host/dev/ttyUSB0",
@@ -38,7 +37,8 @@ PORTS = {
 
 @for_each("url, port", PORTS.items())
 def test_a_port_is_named_without_its_keys(url: str, port: str) -> None:
-    assert port_of(parse(url), "") == port
+    connection = parse(url)
+    assert connection.scheme.shown(connection) == port
 
 
 @for_each(
@@ -50,7 +50,8 @@ def test_a_port_is_named_without_its_keys(url: str, port: str) -> None:
     ],
 )
 def test_only_a_bus_of_a_cell_is_a_part_of_its_port(url: str, bus: str, port: str) -> None:
-    assert port_of(parse(url), bus) == port
+    connection = parse(url)
+    assert connection.scheme.shown(connection, bus) == port
 
 
 TTY = "/dev/ttyUSB9?baud=9600"

@@ -7,7 +7,7 @@ from multidrop import cli
 from multidrop.base.on_demand import imported
 from multidrop.dialects.families import FAMILIES
 from multidrop.shell.channel import Front
-from multidrop.shell.connect.url_forms import URL_FORMS
+from multidrop.shell.connect.schemes import schemes
 from multidrop.shell.connect.urls import KEYS
 from multidrop.shell.operations.table import VERBS
 from multidrop.shell.operations.usage import forms, is_placeholder
@@ -188,7 +188,7 @@ def test_every_word_of_sim_and_every_kind_of_url_is_in_help_and_usage():
     for word, usage in USAGES.items():
         assert usage in VERBS["/sim"].usage and any(line.startswith(f"  {usage}") for line in told), word
     told = "\n".join(VERBS["/open"].described())
-    assert all(form.example in told and form.example in cli.urls() for form in URL_FORMS.values())
+    assert all(form.example in told and form.example in cli.urls() for form in schemes().values())
     assert all(key in cli.urls() for key in KEYS)
 
 

@@ -10,9 +10,10 @@ from typing import Any
 
 import pytest
 
-from multidrop.transports import Unreachable, libusb, performax
-from multidrop.transports.libusb import LibusbCarrier, open_libusb
-from multidrop.transports.usb import TransferFailed
+from multidrop.features.usb import libusb, performax
+from multidrop.features.usb.libusb import LibusbCarrier, open_libusb
+from multidrop.features.usb.pipe import TransferFailed
+from multidrop.transports import Unreachable
 from tests.support.until import PATIENCE, until
 
 

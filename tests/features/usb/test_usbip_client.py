@@ -11,10 +11,10 @@ from typing import Any
 
 import pytest
 
-from multidrop.transports import Unreachable, usbip
-from multidrop.transports.performax import CANCELLED, Control
-from multidrop.transports.usb import explain_usb
-from multidrop.transports.usbip import (
+from multidrop.features.usb import usbip
+from multidrop.features.usb.performax import CANCELLED, Control
+from multidrop.features.usb.pipe import explain_usb
+from multidrop.features.usb.usbip import (
     OPERATION,
     RET_SUBMIT,
     RET_UNLINK,
@@ -28,6 +28,7 @@ from multidrop.transports.usbip import (
     imported,
     operation,
 )
+from multidrop.transports import Unreachable
 from tests.support.cases import for_each
 from tests.support.until import until
 

@@ -11,10 +11,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from multidrop.transports import Unreachable, usbip
-from multidrop.transports.performax import CANCELLED, PRODUCT, VENDOR, Control
-from multidrop.transports.usb import Broken, Done
-from multidrop.transports.usbip import (
+from multidrop.features.usb import usbip
+from multidrop.features.usb.performax import CANCELLED, PRODUCT, VENDOR, Control
+from multidrop.features.usb.pipe import Broken, Done
+from multidrop.features.usb.usbip import (
     OPERATION,
     RECORD,
     REP_IMPORT,
@@ -30,6 +30,7 @@ from multidrop.transports.usbip import (
     operation,
     setup,
 )
+from multidrop.transports import Unreachable
 from tests.support.cases import for_each
 from tests.support.until import PATIENCE
 

@@ -12,20 +12,21 @@ from typing import Any
 
 import pytest
 
-from multidrop.transports import Unreachable, performax
-from multidrop.transports import controllers as here
-from multidrop.transports.controllers import (
+from multidrop.features.usb import controllers as here
+from multidrop.features.usb import performax
+from multidrop.features.usb.controllers import (
     RULE,
     UNREAD,
     Found,
-    all_ports,
     chosen,
     controllers,
     library,
     list_controllers,
+    ports,
     refusal,
 )
-from multidrop.transports.performax import IN, OUT, PRODUCT, VENDOR, Control
+from multidrop.features.usb.performax import IN, OUT, PRODUCT, VENDOR, Control
+from multidrop.transports import Unreachable
 from tests.support.cases import for_each
 
 SEVERAL = [Found("2ED00", "1-1"), Found("2ED00", "1-1.4"), Found("2ED07", "2-3")]
@@ -112,9 +113,8 @@ def test_the_numbers_are_those_of_the_makers_driver_and_the_ends_those_of_linux(
 
 
 def test_ports_are_listed_with_their_numbers(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(here, "list_ports", list)
     monkeypatch.setattr(here, "list_controllers", lambda: [SEVERAL[2], Found(UNREAD, "1-1")])
-    assert [(each.device, each.description[:20]) for each in all_ports()] == [
+    assert [(each.device, each.description[:20]) for each in ports()] == [
         ("usb:2ED07@2-3", "Performax controller"),
         ("usb:unread@1-1", ("the maker's driver holds it" if sys.platform == "win32" else f"copy {RULE}")[:20]),
     ]
@@ -123,7 +123,7 @@ def test_ports_are_listed_with_their_numbers(monkeypatch: pytest.MonkeyPatch) ->
         raise Unreachable("usb: needs libusb")
 
     monkeypatch.setattr(here, "list_controllers", missing)
-    assert all_ports() == []
+    assert ports() == []
 
 
 class Fault(Exception):

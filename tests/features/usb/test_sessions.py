@@ -14,10 +14,9 @@ import pytest
 from multidrop.base.errors import NoAnswer, Refused, TransportLost
 from multidrop.drives.events import Sample
 from multidrop.drives.stopping import Fate
-from multidrop.shell.connect.opening import port_name
+from multidrop.features.usb import libusb
 from multidrop.shell.connect.urls import parse
 from multidrop.shell.events import OnBus
-from multidrop.transports import libusb
 from tests.support.cell_session import CellSession, bus, pmx
 from tests.support.until import until
 from tests.support.usb_stand_in import UsbFaults
@@ -201,5 +200,11 @@ async def lost_by(shop: CellSession, name: str, plug: str) -> None:
 
 
 def test_ports_have_one_name() -> None:
-    assert port_name(parse("usbip://PC3/1-1")) == port_name(parse("usbip://pc3:3240/1-1?timeout=2")) == "pc3:3240/1-1"
-    assert port_name(parse("usb:2ED01@1-1.4?timeout=2")) == "usb:2ED01@1-1.4"
+    assert parse("usbip://PC3/1-1").port_name == parse("usbip://pc3:3240/1-1?timeout=2").port_name == "pc3:3240/1-1"
+    assert parse("usb:2ED01@1-1.4?timeout=2").port_name == "usb:2ED01@1-1.4"
+
+
+def test_a_port_is_shown_without_its_keys() -> None:
+    for url in ("usb:2ED42", "usbip://[fe80::1]:3240/1-1"):
+        connection = parse(f"{url}?timeout=2")
+        assert connection.scheme.shown(connection) == url

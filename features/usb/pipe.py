@@ -22,8 +22,8 @@ from math import inf
 from typing import Protocol
 
 from multidrop.base.errors import TransportLost
+from multidrop.features.usb.performax import CANCELLED, GONE, STALLED, TIMEOUT, Control
 from multidrop.transports import Undelivered, Unreachable
-from multidrop.transports.performax import CANCELLED, GONE, STALLED, TIMEOUT, Control
 from multidrop.transports.pipe import Pipe
 from multidrop.transports.sockets import explain
 

@@ -11,13 +11,9 @@ from pathlib import Path
 import pytest
 
 from multidrop.base.errors import Diagnostic
-from multidrop.simulator.cells import load, read
-from multidrop.simulator.floor import Floor
-from multidrop.simulator.serving.command import attaching, reachable
-from multidrop.simulator.serving.endpoints import serve_bus
-from multidrop.simulator.serving.running import RunningFloor
-from multidrop.transports.performax import CANCELLED, STALLED, Control
-from multidrop.transports.usbip import (
+from multidrop.features.usb.exports import attaching
+from multidrop.features.usb.performax import CANCELLED, STALLED, Control
+from multidrop.features.usb.usbip import (
     INTERFACE,
     OPERATION,
     RECORD,
@@ -32,6 +28,11 @@ from multidrop.transports.usbip import (
     operation,
     setup,
 )
+from multidrop.simulator.cells import load, read
+from multidrop.simulator.floor import Floor
+from multidrop.simulator.serving.command import reachable
+from multidrop.simulator.serving.endpoints import serve_bus
+from multidrop.simulator.serving.running import RunningFloor
 from tests.support.cell_session import TCP, bus, drive, pmx
 from tests.support.until import PATIENCE
 
@@ -143,6 +144,12 @@ def test_only_a_bus_of_controllers_is_served_so() -> None:
     for drives in ([], [drive("LMDCM", "a", party=True)], [pmx("00"), drive("LMDCM", "a", party=True)]):
         with pytest.raises(Diagnostic, match=r"^cell.toml:6: .*usbip://.*valid: a bus of PMX only"):
             read("seed = 1\n\n\n" + bus("w", *drives, serve=["usbip://127.0.0.1:0"]), "cell.toml")
+
+
+def test_it_is_the_last_of_the_endpoints_that_are_known() -> None:
+    with pytest.raises(Diagnostic) as refused:
+        read(CELL.replace("usbip:", "http:"))
+    assert refused.value.hint == "valid: pty:, tcp://, udp://, modbus:// or usbip:// at the beginning"
 
 
 def test_the_command_that_attaches_it_is_said_and_a_network_warned_of() -> None:

@@ -11,9 +11,9 @@ from collections.abc import Callable
 import pytest
 
 from multidrop.base.errors import TransportLost
+from multidrop.features.usb.performax import CANCELLED, GONE, STALLED, Control
+from multidrop.features.usb.pipe import LATE, REPLY, TAKEN, Broken, Done, TransferFailed, UsbPipe, open_usb
 from multidrop.transports import Undelivered, Unreachable
-from multidrop.transports.performax import CANCELLED, GONE, STALLED, Control
-from multidrop.transports.usb import LATE, REPLY, TAKEN, Broken, Done, TransferFailed, UsbPipe, open_usb
 from tests.support.cases import for_each
 from tests.support.until import until
 

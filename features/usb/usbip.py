@@ -15,10 +15,10 @@ import threading
 from collections.abc import Iterator
 from dataclasses import dataclass
 
+from multidrop.features.usb.performax import IN, OUT, PACKET, PRODUCT, REQUEST, REQUEST_TYPE, VENDOR, Control
+from multidrop.features.usb.pipe import Broken, Done, TransferFailed
 from multidrop.transports import Unreachable
-from multidrop.transports.performax import IN, OUT, PACKET, PRODUCT, REQUEST, REQUEST_TYPE, VENDOR, Control
 from multidrop.transports.sockets import connected, explain, host_port
-from multidrop.transports.usb import Broken, Done, TransferFailed
 
 PORT = 3240
 VERSION = 0x0111

@@ -11,10 +11,11 @@ import contextlib
 import threading
 from typing import Any
 
-from multidrop.transports import Unreachable, performax
-from multidrop.transports.controllers import ASKING, OTHER, STATUS, chosen, controllers, library, refusal
+from multidrop.features.usb import performax
+from multidrop.features.usb.controllers import ASKING, OTHER, STATUS, chosen, controllers, library, refusal
+from multidrop.features.usb.pipe import Broken, Done, TransferFailed, UsbPipe, open_usb
+from multidrop.transports import Unreachable
 from multidrop.transports.pipe import in_thread
-from multidrop.transports.usb import Broken, Done, TransferFailed, UsbPipe, open_usb
 
 
 async def open_libusb(target: str) -> UsbPipe:

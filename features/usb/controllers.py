@@ -16,9 +16,10 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-from multidrop.transports import Unreachable, performax
+from multidrop.features.usb import performax
+from multidrop.transports import Unreachable
 from multidrop.transports.port_users import holder
-from multidrop.transports.serial_ports import PortInfo, list_ports, natural
+from multidrop.transports.serial_ports import PortInfo, natural
 
 RULE = Path(__file__).with_name("60-multidrop-usb.rules")
 """The rule of udev that gives the users of this machine access."""
@@ -106,17 +107,16 @@ def list_controllers() -> list[Found]:
         return []  # a machine without USB
 
 
-def all_ports() -> list[PortInfo]:
-    """The serial ports of this machine, and its controllers on USB where the library is installed."""
+def ports() -> list[PortInfo]:
+    """The controllers of this machine as ports; none where the library is not installed."""
     try:
         found = list_controllers()
     except Unreachable:
         found = []
-    usb = [
+    return [
         PortInfo(each.url, description=permission() if each.number == UNREAD else "Performax controller")
         for each in found
     ]
-    return list_ports() + usb
 
 
 def chosen(found: list[Found], target: str) -> Found:

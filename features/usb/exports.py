@@ -8,16 +8,18 @@ from __future__ import annotations
 
 import asyncio
 from collections import deque
+from contextlib import AsyncExitStack
 from dataclasses import dataclass, field
 from typing import cast
+from urllib.parse import urlsplit
 
-from multidrop.simulator.family import UsbSide
-from multidrop.simulator.serving.running import Listener, RunningFloor
-from multidrop.transports.performax import CANCELLED, IN, OUT, PACKET, STALLED
-from multidrop.transports.usbip import (
+from multidrop.features.usb.device import UsbController, sides
+from multidrop.features.usb.performax import CANCELLED, IN, OUT, PACKET, STALLED
+from multidrop.features.usb.usbip import (
     BUS_ID,
     INTERFACE,
     OPERATION,
+    PORT,
     REP_IMPORT,
     REP_LIST,
     REQ_IMPORT,
@@ -32,6 +34,8 @@ from multidrop.transports.usbip import (
     Transfers,
     operation,
 )
+from multidrop.simulator.cell.spec import Endpoint
+from multidrop.simulator.serving.running import Listener, RunningFloor
 
 BUSY, ABSENT = 2, 4
 """The status of a refused import."""
@@ -46,10 +50,27 @@ class Plugged:
     """A controller, and the client that has it."""
 
     exported: Exported
-    controller: UsbSide
+    controller: UsbController
     client: UsbipClient | None = None
     waiting: deque[Transfer] = field(default_factory=deque)
     """Transfers to the host that wait for a reply."""
+
+
+async def export(floor: RunningFloor, bus: str, endpoint: Endpoint, stack: AsyncExitStack) -> list[str]:
+    """Export the controllers of a bus, until the stack closes that; return the URL of each. Raises OSError."""
+    server = UsbipServer(floor, bus)
+    stack.push_async_callback(server.close)
+    port = await server.open(endpoint.host, endpoint.port)
+    host = f"[{endpoint.host}]" if ":" in endpoint.host else endpoint.host
+    return [f"usbip://{host}:{port}/{bus_id}" for bus_id in server.devices]
+
+
+def attaching(endpoint: str) -> str:
+    """The command that plugs in an endpoint of USB/IP."""
+    place = urlsplit(endpoint)
+    port = f"--tcp-port {place.port} " if place.port != PORT else ""
+    command = f"usbip {port}attach -r {place.hostname} -b {place.path[1:]}"
+    return f"{command}   (as root, on Linux; on Windows with usbip-win2) plugs it in"
 
 
 class UsbipServer(Listener):
@@ -59,7 +80,7 @@ class UsbipServer(Listener):
         self.floor, self.bus = floor, bus
         self.devices = {
             f"1-{number}": Plugged(Exported(f"1-{number}", 1, number + 1), controller)
-            for number, controller in enumerate(floor.floor.usb(bus), 1)
+            for number, controller in enumerate(sides(floor.floor, bus), 1)
         }
         self.clients: set[UsbipClient] = set()
         self._server: asyncio.Server | None = None

@@ -13,14 +13,14 @@ from typing import Any
 import pytest
 
 from multidrop.base.errors import TransportLost
+from multidrop.features.usb.device import UsbController, sides
+from multidrop.features.usb.exports import UsbipServer
+from multidrop.features.usb.pipe import UsbPipe, open_usb
+from multidrop.features.usb.usbip import imported
 from multidrop.simulator.cells import read
 from multidrop.simulator.floor import Floor
-from multidrop.simulator.pmx.family import UsbController
 from multidrop.simulator.serving.running import RunningFloor
-from multidrop.simulator.serving.usbip import UsbipServer
 from multidrop.transports import Unreachable
-from multidrop.transports.usb import UsbPipe, open_usb
-from multidrop.transports.usbip import imported
 from tests.support.cell_session import bus, pmx
 from tests.support.front_door import command
 from tests.support.tools import tool
@@ -82,7 +82,7 @@ async def test_the_host_side_of_the_library_lists_imports_and_asks() -> None:
             b"1234\0",
             "stalled",
         ]
-        assert [each.device.programs.variables[1] for each in floor.floor.usb("w")] == [0, 1234]
+        assert [each.device.programs.variables[1] for each in sides(floor.floor, "w")] == [0, 1234]
 
 
 def _conversation(port: int) -> list[Any]:
@@ -121,7 +121,7 @@ async def test_a_reply_that_was_not_read_comes_first_to_the_next_host_unless_it_
                     handle.bulk_out(0x02, text)
                 return bytes(handle.bulk_in(0x82, 64).partition(b"\0")[0])
 
-        [controller] = floor.floor.usb("w")
+        [controller] = sides(floor.floor, "w")
         for flush, expected in ((False, b"OK"), (True, b"7")):
             assert await asyncio.to_thread(ask, True, b"V1=7\0", b"V2=8\0") == b"OK"  # the second reply stays unread
             await until(lambda: len(controller.replies) == 1)
@@ -164,7 +164,7 @@ def plugged(vendor: int = 0x1589) -> Iterator[tuple[Performax, int]]:
     """A device of the library, and the port where it is served."""
     floor = Floor(read(bus("w", pmx("07")), "cell"))
     device = usbip.USBDevice(vendor, 0xA101, product="Performax USB", serial="2ED07")
-    interface = device.add(Performax(floor.usb("w")[0]))
+    interface = device.add(Performax(sides(floor, "w")[0]))
     transport = usbip.USBIP(HOST, 0)
     with device.plug(via=transport):
         yield interface, transport._listener.socks[0].getsockname()[1]

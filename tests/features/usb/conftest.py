@@ -1,0 +1,7 @@
+"""Served cells, whose controllers are exported."""
+
+from __future__ import annotations
+
+from tests.support.served_cells import dial, serve_text
+
+__all__ = ["dial", "serve_text"]
