@@ -10,6 +10,7 @@ from multidrop.base import registry
 from multidrop.base.registry import IN_WHEEL
 from multidrop.shell.hooks import AtSession, Options
 from multidrop.shell.operations.operation import Operation
+from multidrop.shell.relaying import Lent
 from multidrop.shell.sections import Section
 from tests.support.paths import ROOT
 
@@ -26,8 +27,11 @@ def test_the_table_has_the_words_that_the_record_answers_to(name: str) -> None:
     operations = [each for each in record.adds if isinstance(each, Operation)]
     words = {word for each in operations for word in (each.name, each.command) if word}
     words |= {f"[{each.name}]" for each in record.adds if isinstance(each, Section)}
+    options = [each for each in record.adds if isinstance(each, Options)]
+    words |= {f"{each.command} {notation.partition(' ')[0]}" for each in options for notation in each.arguments}
+    words |= {f"relay {each.name}" for each in record.adds if isinstance(each, Lent)}
     assert words == set(IN_WHEEL[name])
-    assert all(isinstance(each, Operation | AtSession | Options | Section) for each in record.adds)
+    assert all(isinstance(each, Operation | AtSession | Options | Section | Lent) for each in record.adds)
     for each in operations:
         assert each.meaning if each.command else each.help
         assert callable(each.run) or not each.run, "a feature names its functions, not their places"
