@@ -106,7 +106,7 @@ function _shtab_multidrop_using
   test "$_shtab_multidrop_cmdpath" = "$argv"
 end
 
-set -g _shtab_multidrop_commands demo tui shell send run sim program 'program check' 'program test' 'program sweep' 'program convert' 'program list' 'program diff' 'program upload' 'program download' params 'params backup' 'params diff' 'params restore' macro 'macro list' 'macro show' 'macro play' 'macro edit' 'macro describe' 'macro rename' 'macro copy' 'macro delete' 'macro key' 'macro import' 'macro export' plot poll publish plant share snapshot twin 'twin fit' certify ports relay scan rescue log 'log show' 'log follow' 'log grep' 'log at' 'log bisect' 'log judge' 'log replay' config 'config path' 'config show' 'config check' help lsp report completion
+set -g _shtab_multidrop_commands demo tui shell send run sim program 'program check' 'program test' 'program sweep' 'program convert' 'program list' 'program diff' 'program upload' 'program download' params 'params backup' 'params diff' 'params restore' macro 'macro list' 'macro show' 'macro play' 'macro edit' 'macro describe' 'macro rename' 'macro copy' 'macro delete' 'macro key' 'macro import' 'macro export' plot poll publish plant share snapshot twin 'twin fit' certify ports relay scan rescue log 'log show' 'log follow' 'log grep' 'log at' 'log bisect' 'log judge' 'log replay' config 'config path' 'config show' 'config check' features help lsp report completion
 set -g _shtab_multidrop_opts_with_value --against --allow --baud --break --cell --cluster --compare --csv --dialect --drive --every --expect --from --jobs --join --junit --language --on --other --output --page --parquet --personality --random --rate --resume --rfc2217 --role --rows --run --save --search --seed --serve --set --speed --svg --tcp --times --to --until --vary --watch --with -o
 
 complete -c multidrop -e
@@ -485,6 +485,10 @@ complete -c multidrop -n '_shtab_multidrop_using config show' -l no-config -d 'r
 complete -c multidrop -n '_shtab_multidrop_using config; and test $_shtab_multidrop_npos -eq 0' -a check -d 'Report what is wrong in the configuration, by line.'
 complete -c multidrop -n '_shtab_multidrop_using config check' -s h -l help -d 'show this help message and exit'
 complete -c multidrop -n '_shtab_multidrop_using config check' -l no-config -d 'read no configuration file'
+complete -c multidrop -n '_shtab_multidrop_using; and test $_shtab_multidrop_npos -eq 0' -a features -d 'List the features: of multidrop, of other packages, and your own files; where each is from, and its state.'
+complete -c multidrop -n '_shtab_multidrop_using features' -s h -l help -d 'show this help message and exit'
+complete -c multidrop -n '_shtab_multidrop_using features' -l json -d 'print one JSON object a feature'
+complete -c multidrop -n '_shtab_multidrop_using features' -l no-config -d 'read no configuration file'
 complete -c multidrop -n '_shtab_multidrop_using; and test $_shtab_multidrop_npos -eq 0' -a help -d 'Explain a command of the drives, an error number or a verb; without a connection.'
 complete -c multidrop -n '_shtab_multidrop_using help' -s h -l help -d 'show this help message and exit'
 complete -c multidrop -n '_shtab_multidrop_using help' -l dialect -xka "mcode modbus pmx tmcl" -d 'in this language (default: the first that has the word)'
