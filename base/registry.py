@@ -59,13 +59,14 @@ IN_WHEEL: dict[str, tuple[str, ...]] = {
     "log_analysis": ("log at", "log bisect", "log judge", "log replay"),
     "lsp": ("lsp",),
     "publishing": ("publish", "plant", "[mqtt]"),
+    "shared_screen": ("relay screen:", "tui --join", "tui --share"),
     "sharing": ("share",),
     "sweeps": ("program sweep", "[sweep]"),
     "twin_fit": ("twin", "twin fit"),
-    "twins": ("/twin",),
+    "twins": ("/twin", "shell --twin", "tui --twin"),
     "usb": ("usb:", "usbip:"),
 }
-"""The features of the wheel, and the words that each answers to: `/twin`, `program sweep`, `usb:`."""
+"""The features of the wheel, and the words that each answers to: `/twin`, `program sweep`, `tui --twin`, `usb:`."""
 _failed: dict[str, Failed] = {}
 _untold: list[str] = []
 """The warnings that nobody was told yet."""
@@ -120,6 +121,12 @@ def with_word(word: str) -> Feature | None:
                 raise Diagnostic(f"the feature {name} is not there", word.rstrip(":"), "install multidrop again, whole")
             return found
     return None
+
+
+def with_words(begin: str) -> Iterator[Feature]:
+    """The features of the wheel that are there and answer to a word that begins so; no other one is imported."""
+    names = [name for name, words in IN_WHEEL.items() if any(word.startswith(begin) for word in words)]
+    return filter(None, map(wheel, names))
 
 
 def words() -> tuple[str, ...]:

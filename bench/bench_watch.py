@@ -29,7 +29,7 @@ from terminal import ROOT, Terminal, multidrop
 
 sys.path.insert(0, str(ROOT))
 
-from multidrop.shell.watching.wire import greeting
+from multidrop.features.shared_screen.wire import greeting
 
 WATCHERS = 5
 ROUND = 4.0

@@ -83,6 +83,7 @@ class Parser(argparse.ArgumentParser):
         own = COMMANDS.parts(self.operation.command)
         named = given[:1] and given[0] in own
         if self.operation.run and not named:
+            _check_options(self.operation.command, given)
             add_arguments(self, with_options(self.operation.command, self.operation.arguments))
             _add_no_config(self)
             self.set_defaults(run_by=self.operation, command=self.operation.command)
@@ -159,6 +160,18 @@ def _the_one(name: str, commands: Mapping[str, Operation]) -> Mapping[str, Opera
         raise SystemExit(fail(problem)) from None
 
 
+def _check_options(command: str, given: Sequence[str]) -> None:
+    """Raise SystemExit for an option whose feature is not there."""
+    from multidrop.base.errors import Diagnostic
+    from multidrop.shell.hooks import check
+    from multidrop.shell.streams.stdout import fail
+
+    try:
+        check(command, given)
+    except Diagnostic as problem:
+        raise SystemExit(fail(problem)) from None
+
+
 def _add_no_config(parser: Parser) -> None:
     suppressed = argparse.SUPPRESS  # a default of the command would replace what stood before the command
     parser.add_argument("--no-config", action="store_true", default=suppressed, help="read no configuration file")
@@ -225,11 +238,12 @@ def urls() -> str:
 def _epilog(operation: Operation) -> str:
     import textwrap
 
+    from multidrop.shell.hooks import examples
     from multidrop.shell.operations.table import COMMANDS
 
     own = COMMANDS.parts(operation.command)
-    examples = operation.examples or [each.examples[-1] for each in own.values()]
-    lines = ["examples:", *(f"  multidrop {each}" for each in examples)]
+    given = [*operation.examples, *examples(operation.command)] or [each.examples[-1] for each in own.values()]
+    lines = ["examples:", *(f"  multidrop {each}" for each in given)]
     if own and operation.run:  # argparse does not list them
         lines = ["also:", *(f"  {each.command:<15} {each.meaning}" for each in own.values()), "", *lines]
     if operation.own_urls:

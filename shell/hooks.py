@@ -6,15 +6,21 @@ A feature's verbs and commands are `shell.operations.operation.Operation`s.
 from __future__ import annotations
 
 import argparse
-from collections.abc import Awaitable, Callable, Iterator, Mapping
+from collections.abc import Awaitable, Callable, Iterator, Mapping, Sequence
+from contextlib import AbstractContextManager, ExitStack, contextmanager, nullcontext
+from itertools import takewhile
 from typing import Any, NamedTuple
 
 from multidrop.base import registry
 
 Session = Any
 """`shell.session.Session`, which knows this module."""
+App = Any
+"""`tui.app.MultidropApp`, which knows this module."""
 Prepare = Callable[[Session], None]
 """Takes a session before a URL is opened."""
+Around = Callable[[App], AbstractContextManager[object]]
+"""What is entered before a screen runs, and left after that."""
 
 
 def nothing(session: Session) -> None:
@@ -33,8 +39,8 @@ class AtSession(NamedTuple):
 class Options(NamedTuple):
     """Options of a command that is there already.
 
-    Both functions take the session and the parsed arguments: `prepare` before a URL is opened, `opened` once all are,
-    in a command that is not for a person.
+    `prepare` and `opened` take the session and the parsed arguments: `prepare` before a URL is opened, `opened` once
+    all are, in a command that is not for a person. `instead` and `around` are of the options of `tui`.
     """
 
     command: str
@@ -44,6 +50,12 @@ class Options(NamedTuple):
     """The option of the command that these exclude."""
     prepare: Callable[[Session, argparse.Namespace], None] = lambda session, chosen: None
     opened: Callable[[Session, argparse.Namespace], Awaitable[None]] | None = None
+    instead: Callable[[argparse.Namespace], int | None] = lambda chosen: None
+    """Runs something in place of the command and returns the exit code; None: its option was not given."""
+    around: Callable[[App, argparse.Namespace], AbstractContextManager[object]] = lambda app, chosen: nullcontext()
+    """What is entered before the screen runs, and left after that."""
+    examples: Sequence[str] = ()
+    """Further examples of the command."""
 
 
 def begin(session: Session, own: bool) -> list[str]:
@@ -65,8 +77,16 @@ def begin(session: Session, own: bool) -> list[str]:
 
 
 def options(command: str) -> Iterator[Options]:
-    """The options that features add to a command."""
-    return (each for each in registry.added(Options) if each.command == command)
+    """The options that features add to a command; a feature of the wheel that adds none is not imported."""
+    for feature in (*registry.with_words(f"{command} -"), *registry.by_others()):
+        yield from (each for each in feature.adds if isinstance(each, Options) and each.command == command)
+
+
+def check(command: str, given: Sequence[str]) -> None:
+    """Raise Diagnostic if an option is given of a feature of the wheel that is not there."""
+    for each in takewhile("--".__ne__, given):
+        if each.startswith("-"):
+            registry.with_word(f"{command} {each.partition('=')[0]}")
 
 
 def with_options(command: str, arguments: Mapping[str, Any]) -> dict[str, Any]:
@@ -86,9 +106,9 @@ def with_options(command: str, arguments: Mapping[str, Any]) -> dict[str, Any]:
     return found
 
 
-def asked_for(chosen: argparse.Namespace) -> bool:
-    """Whether any option of a feature was given."""
-    notations = (notation for each in options(chosen.command) for notation in each.arguments)
+def asked_for(chosen: argparse.Namespace, besides: str) -> bool:
+    """Whether any option of a feature was given, besides one in its notation."""
+    notations = (name for each in options(chosen.command) for name in each.arguments if name != besides)
     return any(getattr(chosen, each.partition(" ")[0].strip("-").replace("-", "_")) for each in notations)
 
 
@@ -103,3 +123,23 @@ async def opened(session: Session, chosen: argparse.Namespace) -> None:
     for each in options(chosen.command):
         if each.opened is not None:
             await each.opened(session, chosen)
+
+
+def instead(chosen: argparse.Namespace) -> int | None:
+    """Run what an option asks for in place of its command, and return the exit code; None: no option does."""
+    codes = (each.instead(chosen) for each in options(chosen.command))
+    return next((code for code in codes if code is not None), None)
+
+
+@contextmanager
+def around(app: App, chosen: argparse.Namespace) -> Iterator[None]:
+    """What the options of features ask for while a screen runs. Raises what they raise as they begin."""
+    with ExitStack() as stack:
+        for each in options(chosen.command):
+            stack.enter_context(each.around(app, chosen))
+        yield
+
+
+def examples(command: str) -> list[str]:
+    """The examples that features add to those of a command."""
+    return [example for each in options(command) for example in each.examples]

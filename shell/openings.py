@@ -119,9 +119,13 @@ class Openings:
             self._workspace.changed()
 
     def url_of(self, bus: Bus) -> str:
-        """The URL of an open bus, without the name of a saved connection, and with the stable name of its port."""
+        """The URL of an open bus, without the name of a saved connection, and with the stable name of its port.
+
+        It is empty for one that nobody opened here.
+        """
         connection = self._workspace.of(bus).connection
-        assert connection is not None, bus.name  # only a search has none, and keeps its bus for itself
+        if connection is None:  # a search has one such for itself, and what is shown of another session has none
+            return ""
         return connection.scheme.lasting(connection, self._workspace.of(bus).in_cell)
 
     async def raw_on(self, bus: Bus) -> None:

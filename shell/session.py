@@ -77,7 +77,7 @@ def _forget_restarted(session: Session, event: SessionEvent) -> None:
     """Forget the program and the settings that were read of a drive that was restarted, or may have been."""
     if isinstance(event, OnBus) and isinstance(event.event, Restarted) and event.bus in session.buses:
         drive = session.buses[event.bus].drives.get(event.event.address)
-        if drive is not None and not session.watching:
+        if drive is not None:
             imported("multidrop.shell.program_listing:forget")(session, drive)
 
 

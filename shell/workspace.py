@@ -152,8 +152,6 @@ class Workspace(Channel):
         """The macros whose `on_early_end` lines a stop dropped; `/resume` says so."""
         self.doubted = ""
         """Why drives are read only: the stop key may be swallowed. Empty: it is not doubted."""
-        self.watching = ""
-        """What it does in a word or two, if it mirrors a shared screen: nothing of its own leaves but stops."""
         self.quitting = False
         """After `/quit`: front ends end, scripts too."""
         self.reconnections = Reconnections(lambda bus, text: self.notify(text, bus=bus, warning=True), reconnect)

@@ -22,7 +22,7 @@ from multidrop.tui.outbox import ended
 from multidrop.tui.palette import LATELY, PADDING, PALETTE, Command, all_commands, commands_like, entries, ordered
 from multidrop.tui.palette import found as help_on
 from multidrop.tui.panels.view import glances_of
-from multidrop.tui.polling import Polling
+from multidrop.tui.purpose import Purpose
 from multidrop.tui.screens.dialogs import Ask, Choose, Offer, Search
 from multidrop.tui.screens.main_screen import MainScreen
 from multidrop.tui.screens.page import Host, Page, page_entry
@@ -32,8 +32,6 @@ from multidrop.tui.tour import Tour
 from multidrop.tui.typist import Selection
 from multidrop.tui.widgets.theme import THEMES, SignFilter, Signs, ink_of
 
-WATCHED = ("drives", "plot")
-"""The pages that a watcher has."""
 HELP = "Help"
 """The heading of the help."""
 CTRL_C = "Ctrl+Q quits, Ctrl+X stops all drives"
@@ -51,7 +49,7 @@ class Parts(Host):
     app: App[int]
     main: MainScreen
     assist: Assist
-    polling: Polling
+    purpose: Purpose
     selection: Selection
     questions: Questions
     keymap: Keymap
@@ -86,7 +84,8 @@ class Actions:
         self._parts.model.changed = True
 
     def action_polling(self) -> None:
-        self._parts.polling.on = not self._parts.polling.on
+        polling = self._parts.purpose.polling
+        polling.on = not polling.on
         self._parts.model.changed = True
 
     def action_clear(self) -> None:
@@ -278,7 +277,7 @@ class Actions:
         parts = self._parts
         front = parts.app.screen
         sheet = front.SHEET if isinstance(front, Page) else ""
-        switches = {"polling": parts.polling.on, "mouse": parts.mouse_on, "twin": parts.model.bus("").twinned}
+        switches = {"polling": parts.purpose.polling.on, "mouse": parts.mouse_on, "twin": parts.model.bus("").twinned}
         found = all_commands(parts.session, parts.macros, parts.assist.verbs(), parts.keymap, switches, sheet)
         return ordered(list(found), parts.recent)
 
@@ -327,8 +326,8 @@ class Actions:
         """Show a page in front of the main screen; one page at a time. Raises Diagnostic."""
         parts, app = self._parts, self._parts.app
         page = page_entry(name).page()
-        if parts.session.watching and name not in WATCHED:
-            parts.show_line(f"the page of {name} is at the host; a watcher has {' and '.join(WATCHED)}", "x")
+        if why := parts.purpose.refused(name):
+            parts.show_line(why, "x")
             return
         shown = next((each for each in app.screen_stack if isinstance(each, Page)), None)
         if shown is None:

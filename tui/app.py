@@ -43,8 +43,8 @@ from multidrop.tui.keymap import FunctionKeys, keymap
 from multidrop.tui.leaving import Leaving
 from multidrop.tui.outbox import Outbox
 from multidrop.tui.panels.view import between_at, figures_at, name_at
-from multidrop.tui.polling import Polling
 from multidrop.tui.presenter import Presenter
+from multidrop.tui.purpose import Purpose
 from multidrop.tui.screen_model import Record, ScreenModel
 from multidrop.tui.screens.dialogs import LEAST, Over, TooSmall
 from multidrop.tui.screens.main_screen import MainScreen
@@ -91,6 +91,7 @@ class MultidropApp(Dressed):
         driver: type[Driver] | None = None,
         look: Look = DEFAULT_LOOK,
         model: ScreenModel | None = None,
+        purpose: Purpose | None = None,
     ) -> None:
         self._is_composed = False
         """The main screen has its parts: they can be painted."""
@@ -101,9 +102,9 @@ class MultidropApp(Dressed):
         self.boundary = Boundary(session.settings.state, partial(self.show_line, mark="x"))
         self.boundary.own(self, lambda: self._is_composed)
         self._end_boundary: Callable[[], None] = lambda: None
-        self.polling, self.macros = Polling(), FunctionKeys()
+        self.purpose, self.macros = purpose or Purpose(session), FunctionKeys()
         self.keymap = keymap(bindings(), look.keys)
-        self.presenter = Presenter(session, self.model, self.polling, self.macros, self.keymap, self.boundary)
+        self.presenter = Presenter(session, self.model, self.purpose, self.macros, self.keymap, self.boundary)
         self.main = MainScreen(
             self.assist.complete,
             self.assist.history,
@@ -115,7 +116,7 @@ class MultidropApp(Dressed):
         self.keyboard = Keyboard(self, self._tell)
         self.outbox = Outbox(session, self._warn, self.run_worker)
         self.selection = Selection(
-            session, self.model, self.main, self.presenter.label, self.keyboard.turn_deaf, self.show_line
+            session, self.model, self.main, self.purpose.label, self.keyboard.turn_deaf, self.show_line
         )
         self.unsent = Unsent(self.main, self.model, session.now, self.assist.keep, self._warn)
         self.questions = Questions(self, session, self.main, self.keyboard, lambda: self._check_size(self.size))
@@ -130,8 +131,7 @@ class MultidropApp(Dressed):
             self, session, self.keyboard, self.outbox, self.questions, self.stop_all, unsaved, self._warn
         )
         self._inbox: list[SessionEvent] = []
-        self._unsubscribe = session.subscribe(self._receive)
-        self._stops = session.stops
+        self._unsubscribe, self._stops = session.subscribe(self._receive), session.stops
         self.stops_to_the_end = False
         """The reading of the terminal goes on after the app, until `Terminal.release`, for the stop key."""
         self._own_task: asyncio.Task[Any] | None = None
@@ -161,7 +161,7 @@ class MultidropApp(Dressed):
             self,
             self.main,
             self.assist,
-            self.polling,
+            self.purpose,
             self.selection,
             self.questions,
             self.keymap,
@@ -267,8 +267,8 @@ class MultidropApp(Dressed):
         if self.urls:
             self.frames.first()
             self.call_after_refresh(self._begin)  # the first frame is shown before anything is opened
-        elif self.session.watching:
-            self.run_worker(self.session.open_all(()))
+        elif (filling := self.purpose.fill()) is not None:
+            self.run_worker(filling)
         elif not self.session.buses:
             await self.opener.ask()
             self.run_worker(self.assist.prepare())
@@ -285,7 +285,7 @@ class MultidropApp(Dressed):
         """Keep copies of texts that are not saved, and end the subscriptions of the screen."""
         self.texts.flush()
         self._unsubscribe()
-        self.polling.end()
+        self.purpose.polling.end()
         self._end_boundary()
 
     def interrupted(self) -> None:
@@ -381,7 +381,8 @@ class MultidropApp(Dressed):
     def _poll(self) -> None:
         page = next((each for each in self.screen_stack if isinstance(each, Page)), None)
         with self.boundary.at("the polls"):
-            self.polling.update(self.session, self.model, self.main.wants() if page is None else page.WANTS)
+            wants = self.main.wants() if page is None else page.WANTS
+            self.purpose.polling.update(self.session, self.model, wants)
 
     def _raise_banner(self) -> None:
         row = self.boundary.do(

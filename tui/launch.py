@@ -7,7 +7,7 @@ import os
 import signal
 import sys
 from collections.abc import Sequence
-from contextlib import AbstractContextManager, nullcontext
+from contextlib import nullcontext
 from functools import partial
 
 from textual.driver import Driver
@@ -17,14 +17,11 @@ from multidrop.base.on_demand import importing
 from multidrop.shell.automation import stop_key_trial
 from multidrop.shell.configuration import Settings
 from multidrop.shell.console import swallows
-from multidrop.shell.hooks import Prepare, nothing
+from multidrop.shell.hooks import Around, Prepare, nothing
 from multidrop.shell.session import Session
 from multidrop.shell.signals import SIGNALS, early_ends, in_loop
 from multidrop.tui.app import MultidropApp
 from multidrop.tui.assist import Assist
-
-SCREENS = "screens"
-"""The folder of the sockets of shared screens, in the state folder."""
 
 
 def run(
@@ -32,12 +29,12 @@ def run(
     reconnect: bool = True,
     raw: bool = False,
     prepare: Prepare = nothing,
-    share: bool = False,
+    around: Around = nullcontext,
 ) -> int:
     """Show the URLs, a tab for each bus; without URLs, show the start page. Return the exit code.
 
     `reconnect`: lost buses are tried again. `raw`: the URLs are opened in raw mode. `prepare`: takes the
-    session before a URL is opened. `share`: others of this account may watch.
+    session before a URL is opened. `around`: what is entered while the screen runs.
 
     Raises Diagnostic if there is no terminal, or if the configuration is wrong.
     """
@@ -48,44 +45,11 @@ def run(
         raise Diagnostic("the screen needs a terminal", "tui", "multidrop shell reads lines from standard input")
     sys.setswitchinterval(SWITCH)
     with early_ends():
-        return asyncio.run(_run(urls, load(lenient=True), reconnect, raw, prepare, share))
-
-
-def join(where: str) -> int:
-    """Watch a screen that this account shares, as `shell.watching.join.joined` finds it. Raises Diagnostic."""
-    if sys.platform == "win32":
-        raise Diagnostic("watching together is not there on Windows", "tui --join", "watch on Linux or macOS")
-    else:
-        from multidrop.shell.configuration import load
-        from multidrop.shell.prompt.keyboard import SWITCH
-        from multidrop.shell.watching.join import joined
-
-        settings = load(lenient=True)
-        connection, name, early = joined(where, settings.state / SCREENS)
-        if not (sys.stdin.isatty() and sys.stdout.isatty()):
-            connection.close(False)
-            raise Diagnostic("the screen needs a terminal", "tui --join")
-        sys.setswitchinterval(SWITCH)
-
-        async def body() -> int:
-            from multidrop.tui.watching import watch
-
-            app = watch(connection, name, early, settings, driver())
-            app.stops_to_the_end = True
-            try:
-                return await show(app)
-            finally:
-                await app.session.close()
-                _release(app)
-
-        try:
-            return asyncio.run(body())
-        finally:
-            connection.close(False)
+        return asyncio.run(_run(urls, load(lenient=True), reconnect, raw, prepare, around))
 
 
 async def _run(
-    urls: Sequence[str], settings: Settings, reconnect: bool, raw: bool, prepare: Prepare, share: bool
+    urls: Sequence[str], settings: Settings, reconnect: bool, raw: bool, prepare: Prepare, around: Around
 ) -> int:
     with importing():
         from multidrop.shell.log.writer import begin
@@ -102,22 +66,13 @@ async def _run(
             begin(session)
             if swallows():
                 session.doubted = stop_key_trial(session)
-            with _sharing(app, settings) if share else nullcontext():
+            with around(app):
                 return await show(app)
     finally:
         await _leave(session)
         await session.close()
         if app is not None:
-            _release(app)
-
-
-def _sharing(app: MultidropApp, settings: Settings) -> AbstractContextManager[object]:
-    if sys.platform == "win32":
-        raise Diagnostic("watching together is not there on Windows", "tui --share", "share on Linux or macOS")
-    else:
-        from multidrop.tui.sharing import sharing
-
-        return sharing(app, settings.state / SCREENS)
+            release(app)
 
 
 async def _leave(session: Session) -> None:
@@ -149,7 +104,7 @@ async def _leave(session: Session) -> None:
             await finish(streams, lambda: True)
 
 
-def _release(app: MultidropApp) -> None:
+def release(app: MultidropApp) -> None:
     """Give the terminal back, at the very end: until then the stop key works. Name what was typed and not sent."""
     from multidrop.shell.streams.stdout import write
 

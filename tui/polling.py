@@ -54,8 +54,6 @@ class Polling:
 
     def update(self, session: Session, model: ScreenModel, wants: Container[str]) -> None:
         """Subscribe to what is shown, and end all other subscriptions. `wants`: as panels name it."""
-        if session.watching:
-            return
         chosen = list(dict.fromkeys([*(plotted(session) if "plot" in wants else []), *_awaited(session, model)]))
         drives = _drives(session, model, chosen, PLOT if "samples" in wants else REST) if self.on else {}
         watches = _watches(session, plotted(session)) if self.on else {}

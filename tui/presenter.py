@@ -14,7 +14,7 @@ from multidrop.tui.panels.drive import trouble_of
 from multidrop.tui.panels.drives import narrow_rows
 from multidrop.tui.panels.table import column_rows
 from multidrop.tui.panels.view import View, glances_of
-from multidrop.tui.polling import Polling
+from multidrop.tui.purpose import Purpose
 from multidrop.tui.readout import State
 from multidrop.tui.screen_model import BusFacts, Record, ScreenModel, bus_old, bus_state
 from multidrop.tui.screens.main_screen import MainScreen
@@ -35,21 +35,21 @@ class Presenter:
         self,
         session: Session,
         model: ScreenModel,
-        polling: Polling,
+        purpose: Purpose,
         macros: FunctionKeys,
         keys: Keymap,
         boundary: Boundary,
     ) -> None:
         self.boundary = boundary
-        self.session, self.model, self.polling, self.macros, self.keymap = session, model, polling, macros, keys
+        self.session, self.model, self.purpose, self.macros, self.keymap = session, model, purpose, macros, keys
         self._shown_at = float("-inf")
         self._flooded = False
         self.behind = False
         """Records wait for the next paint of a transcript."""
-        self.on_records: Callable[[str, Sequence[Record]], None] = lambda bus, records: None
-        """Called with the new records of a bus."""
-        self.watchers: Sequence[str] = ()
-        """Who watches the screen."""
+        self.on_records: dict[str, Callable[[str, Sequence[Record]], None]] = {}
+        """Called with the new records of a bus; by what each makes, in words, which name it where it has a defect."""
+        self.notes: list[Callable[[int], str]] = []
+        """Each makes a note for the top line from its width in cells; an empty one is none."""
 
     def view(self, now: float) -> View:
         bus = self.session.buses.get(self.session.selected_bus)
@@ -59,7 +59,8 @@ class Presenter:
             self.model,
             glances,
             now,
-            self.polling.on,
+            self.purpose.polling.on,
+            self.purpose.works,
             keys=self.keymap,
             macros=self.macros,
             boundary=self.boundary,
@@ -89,7 +90,7 @@ class Presenter:
             self._paint_frame(page, now)
             _show_page(page, view)
             return
-        main.set_label(self.boundary.do("the label", self.label, lambda _: ((" ▸ ", "error"),)))
+        main.set_label(self.boundary.do("the label", self.purpose.label, lambda _: ((" ▸ ", "error"),)))
         with self.boundary.at("the heading of the other half"):
             main.beside.name_it(self.keymap.shown("split"))
         with self.boundary.at("the search in the transcript"):
@@ -104,8 +105,9 @@ class Presenter:
             if facts.fresh and (main.current or not name):  # else the page of no bus is about to become its page
                 main.page(name).take(facts.fresh)
                 main.beside.take(name, facts.fresh)
-                with self.boundary.at("what is sent to watchers"):
-                    self.on_records(name, facts.fresh)
+                for what, take in self.on_records.items():
+                    with self.boundary.at(what):
+                        take(name, facts.fresh)
                 facts.fresh.clear()
 
     def _show_records(self, main: MainScreen, now: float) -> None:
@@ -142,8 +144,9 @@ class Presenter:
         clock = f"{self.session.wall(now):%H:%M:%S}"
         playing = " ".join(each.short for each in self.session.playing)
         log = self.session.log is not None
-        tabs = self.tabs(now)
-        return top_row(tabs, self.session.recording, clock, screen.size.width, log, playing, self.watchers)
+        tabs, width = self.tabs(now), screen.size.width
+        notes = [*filter(None, (note(width) for note in self.notes))]
+        return top_row(tabs, self.session.recording, clock, width, log, playing, notes)
 
     def _footer_row(self, screen: Framed) -> Row:
         width = screen.size.width
@@ -155,24 +158,8 @@ class Presenter:
             first.append((self.keymap.shown("macro-page"), self.macros.place))
         for key, name in self.macros.shown if plays else ():  # a person may have given it another key
             first.append((self.keymap.shown(f"play-{key.lower()}") or key, name))
-        recording, latched = bool(self.session.recording), self.session.latched and not self.session.watching
+        recording, latched = bool(self.session.recording), self.session.latched and self.purpose.works
         return footer_row([*first, *shown], recording, latched, width, self.model.progress)
-
-    def label(self) -> Row:
-        """The row before the input line: the drive that the line goes to, with its bus if several are open.
-
-        In raw mode it is the bus.
-        """
-        if self.session.watching:
-            return ((f" {self.session.watching} {':'.join(filter(None, self.session.place))} ▸ ", "motion"),)
-        if self.session.selected_bus in self.session.raw:
-            return ((f" {self.session.selected_bus} raw, /raw off ends ▸ ", "motion"),)
-        drive = self.session.selected
-        bus = self.session.selected_bus if len(self.session.tabs.shown) > 1 else ""
-        where = ":".join(filter(None, (bus, drive.label or drive.address if drive is not None else "")))
-        if drive is not None and drive.programming:
-            return ((f" {where} ◆ stores ▸ ", "motion"),)
-        return ((f" {where} ▸ " if where else " ▸ ", "accent"),)
 
     def _paint_panels(self, main: MainScreen, view: View) -> None:
         """Paint the columns beside the transcript, or the panel and the status lines below it."""

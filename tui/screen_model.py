@@ -204,7 +204,7 @@ class Record(NamedTuple):
     help: str = ""
     """The line that explains it: `/help 35`."""
     private: bool = False
-    """A remark of this screen to its person, which watchers do not get."""
+    """A remark of this screen to its person, which is shown nowhere else."""
     name: str = ""
     """The name that a person gave to the drive, which is shown in place of its address."""
 

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 from multidrop.base.errors import Diagnostic
 from multidrop.base.on_demand import importing
 from multidrop.shell import hooks
-from multidrop.shell.hooks import Prepare
+from multidrop.shell.hooks import Around, Prepare
 
 if TYPE_CHECKING:
     from multidrop.dialects.family import Language
@@ -114,14 +114,10 @@ def demo(chosen: argparse.Namespace) -> int:
 
 
 def tui(chosen: argparse.Namespace) -> int:
-    if chosen.join is None:
-        prepare = partial(hooks.prepare, chosen=chosen)
-        return _screen(chosen.urls, not chosen.no_reconnect, chosen.raw, prepare, chosen.share)
-    if chosen.urls or chosen.share or chosen.raw or hooks.asked_for(chosen):
-        raise Diagnostic("a watcher opens nothing itself", "tui --join", "give --join alone, or with ssh://HOST")
-    from multidrop.tui.launch import join
-
-    return join(chosen.join)
+    if (code := hooks.instead(chosen)) is not None:
+        return code
+    prepare, around = partial(hooks.prepare, chosen=chosen), partial(hooks.around, chosen=chosen)
+    return _screen(chosen.urls, not chosen.no_reconnect, chosen.raw, prepare, around)
 
 
 def _screen(
@@ -129,14 +125,14 @@ def _screen(
     reconnect: bool = True,
     raw: bool = False,
     prepare: Prepare = hooks.nothing,
-    share: bool = False,
+    around: Around = contextlib.nullcontext,
 ) -> int:
     if not (sys.stdin.isatty() and sys.stdout.isatty()):
         raise Diagnostic("the screen needs a terminal", hint="multidrop shell reads lines from anywhere")
     with importing():
         from multidrop.tui.launch import run
 
-    return run(urls, reconnect, raw, prepare, share)
+    return run(urls, reconnect, raw, prepare, around)
 
 
 def help_(chosen: argparse.Namespace) -> int:

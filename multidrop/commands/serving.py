@@ -75,11 +75,13 @@ def relay(chosen: argparse.Namespace) -> int:
                 "multidrop relay",
                 f"open ssh://THIS-HOST{chosen.port} on the other machine",
             )
-        if chosen.port.startswith("screen:"):
-            from multidrop.base.places import state_folder
-            from multidrop.shell.watching.join import connect, splice
+        from multidrop.base import registry
+        from multidrop.shell.relaying import lender
 
-            splice(connect(chosen.port.partition(":")[2], state_folder() / "screens"))
+        lent = lender(chosen.port)
+        write(sys.stderr, *(f"warning: {each}" for each in registry.warnings()))
+        if lent is not None:
+            lent.lend(chosen.port.partition(":")[2])
             return 0
         if "://" in chosen.port:
             from multidrop.shell.secrets import url_without_secrets

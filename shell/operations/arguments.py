@@ -212,6 +212,12 @@ def spoken() -> Mapping[str, Any]:
     }
 
 
+def relayed() -> str:
+    from multidrop.shell.relaying import ports
+
+    return ports()
+
+
 def dialect() -> Mapping[str, Any]:
     from multidrop.dialects.families import FAMILIES
 

@@ -75,7 +75,8 @@ _ENTRY = re.compile(
     re.M | re.S,
 )
 """A head, with the name of its table; or a key and its text of several lines, or another value."""
-_WORD = re.compile(r"/?[a-z][a-z0-9-]*( [a-z][a-z0-9-]*)?")
+_VERB = re.compile(r"/[a-z][a-z0-9-]*")
+_COMMAND = re.compile(r"[a-z][a-z0-9-]*( [a-z][a-z0-9-]*)?")
 BY_OTHERS = "Added by others"
 """The title of `/help` for verbs that name no other one."""
 _KEY = re.compile(r'"([^"]*)"|([\w-]+)')
@@ -88,9 +89,16 @@ class Declared(Mapping[str, Operation]):
     A section is parsed, and a feature imported, when its operation is asked for: a start needs one or two of them.
     """
 
-    def __init__(self, sections: Mapping[str, str], order: Sequence[str], name_of: Callable[[Operation], str]) -> None:
+    def __init__(
+        self,
+        sections: Mapping[str, str],
+        order: Sequence[str],
+        name_of: Callable[[Operation], str],
+        named: re.Pattern[str],
+    ) -> None:
+        """`named`: matches the names; the table of features has other words, too."""
         self._sections = {name: sections[name] for name in (*order, *(each for each in sections if each not in order))}
-        self._name_of = name_of
+        self._name_of, self._named = name_of, named
 
     def __getitem__(self, name: str) -> Operation:
         if name in self._sections:
@@ -115,7 +123,7 @@ class Declared(Mapping[str, Operation]):
         """Whether there is such an operation; a feature of the wheel is not imported for that."""
         if name in self._sections or any(name in self._added(each) for each in registry.by_others()):
             return True
-        return name in registry.words()
+        return name in registry.words() and self._named.fullmatch(str(name)) is not None
 
     def _added(self, feature: Feature) -> dict[str, Operation]:
         operations = (each for each in feature.adds if isinstance(each, Operation))
@@ -200,11 +208,17 @@ def _declared() -> Iterator[tuple[str, str, str]]:
 
 _FOUND = [*_declared()]
 VERBS = Declared(
-    {verb: text for verb, _, text in _FOUND if verb}, " ".join(VERB_GROUPS.values()).split(), lambda each: each.name
+    {verb: text for verb, _, text in _FOUND if verb},
+    " ".join(VERB_GROUPS.values()).split(),
+    lambda each: each.name,
+    _VERB,
 )
 """By name, in the order of `/help`."""
 COMMANDS = Declared(
-    {command: text for _, command, text in _FOUND if command}, COMMAND_ORDER.split(), lambda each: each.command
+    {command: text for _, command, text in _FOUND if command},
+    COMMAND_ORDER.split(),
+    lambda each: each.command,
+    _COMMAND,
 )
 """By their words, in the order of `--help`; the parts of a group after it."""
 
@@ -221,6 +235,10 @@ def groups() -> dict[str, list[str]]:
     return found
 
 
+def _is_name(word: str) -> bool:
+    return bool(_VERB.fullmatch(word) or _COMMAND.fullmatch(word))
+
+
 def load_others(own: bool = True) -> list[str]:
     """Load the features by others; return a warning for each that cannot be, or whose words are taken."""
     from multidrop.shell.connect.scheme import Scheme
@@ -232,7 +250,7 @@ def load_others(own: bool = True) -> list[str]:
         adds = [each for each in feature.adds if isinstance(each, Operation)]
         schemes = [f"{each.name}:" for each in feature.adds if isinstance(each, Scheme)]
         words = [word for each in adds for word in (each.name, each.command) if word]
-        odd = [word for word in words if not _WORD.fullmatch(word)]
+        odd = [word for word in words if not _is_name(word)]
         words += schemes
         if wrong := next((word for word in words if word in taken or word in odd), ""):
             why = f"{wrong} is taken" if wrong in taken else f"{wrong} is no name of a verb or a command"

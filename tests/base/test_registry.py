@@ -143,9 +143,11 @@ def test_a_package_is_loaded_by_its_entry_point(tmp_path: Path, monkeypatch: pyt
 
 
 def test_the_word_of_a_feature_that_was_deleted_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(registry, "IN_WHEEL", {"gone_away": ("gone", "/gone")})
+    monkeypatch.setattr(registry, "IN_WHEEL", {"gone_away": ("gone", "/gone", "relay usb:")})
     with pytest.raises(Diagnostic, match="gone: the feature gone_away is not there; install multidrop again, whole"):
         registry.with_word("gone")
+    with pytest.raises(Diagnostic, match="^relay usb: the feature gone_away is not there"):
+        registry.with_word("relay usb:")
     assert list(registry.wheels()) == [] and registry.with_word("other") is None
     assert [(entry.name, said) for entry, _, said in registry.states("1.2")] == [("gone_away", "not there")]
 

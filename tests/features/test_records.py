@@ -11,6 +11,7 @@ from multidrop.base.registry import IN_WHEEL
 from multidrop.shell.connect.scheme import Scheme
 from multidrop.shell.hooks import AtSession, Options
 from multidrop.shell.operations.operation import Operation
+from multidrop.shell.relaying import Lent
 from multidrop.shell.sections import Section
 from multidrop.simulator.cell.endpoint_kinds import EndpointKind
 from tests.support.paths import ROOT
@@ -30,8 +31,11 @@ def test_the_table_has_the_words_that_the_record_answers_to(name: str) -> None:
     words |= {f"[{each.name}]" for each in record.adds if isinstance(each, Section)}
     words |= {f"{each.name}:" for each in record.adds if isinstance(each, Scheme)}
     words |= {f"{each.scheme}:" for each in record.adds if isinstance(each, EndpointKind)}
+    options = [each for each in record.adds if isinstance(each, Options)]
+    words |= {f"{each.command} {notation.partition(' ')[0]}" for each in options for notation in each.arguments}
+    words |= {f"relay {each.name}" for each in record.adds if isinstance(each, Lent)}
     assert words == set(IN_WHEEL[name])
-    kinds = Operation | AtSession | Options | Section | Scheme | EndpointKind
+    kinds = Operation | AtSession | Options | Section | Scheme | EndpointKind | Lent
     assert all(isinstance(each, kinds) for each in record.adds)
     for each in operations:
         assert each.meaning if each.command else each.help

@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import asyncio
-import contextlib
 import io
 import json
-import os
 import signal
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
-from unittest import mock
 
 import pytest
 
@@ -22,29 +20,9 @@ from multidrop.shell.batch.virtual_loop import VirtualLoop
 from multidrop.transports.serial_ports import PortInfo
 from tests.support.cases import for_each
 from tests.support.cell_session import bus, party
-from tests.support.front_door import Command, Done
+from tests.support.front_door import Called, Command, Done, at_terminal
 
 CELL = bus("press", party("a", CK=0), party("b", CK=0), baud=0)
-
-
-class Terminal(io.StringIO):
-    """A stream that is a terminal, or none."""
-
-    terminal = True
-
-    def isatty(self) -> bool:
-        return self.terminal
-
-
-class Called:
-    """A function that keeps what it is called with, and returns a code."""
-
-    def __init__(self, code: int = 0) -> None:
-        self.code, self.calls = code, list[tuple[Any, ...]]()
-
-    def __call__(self, *given: Any, **named: Any) -> int:
-        self.calls.append((*given, named) if named else given)
-        return self.code
 
 
 Person = Callable[..., Done]
@@ -53,41 +31,27 @@ Person = Callable[..., Done]
 @pytest.fixture
 def person(tmp_path: Path) -> Person:
     """Run a command at a terminal; those of the standard streams that are `closed` are none."""
-
-    def run(*words: str, closed: Sequence[str] = ()) -> Done:
-        streams = {name: Terminal() for name in ("stdin", "stdout", "stderr")}
-        for name in closed:
-            streams[name].terminal = False
-        with contextlib.ExitStack() as around:
-            around.enter_context(contextlib.chdir(tmp_path))
-            around.enter_context(mock.patch.dict(os.environ, MULTIDROP_CONFIG_DIR=str(tmp_path / "conf")))
-            for name, stream in streams.items():
-                around.enter_context(mock.patch.object(sys, name, stream))
-            code = main(words)
-        return Done(code, streams["stdout"].getvalue(), streams["stderr"].getvalue())
-
-    return run
+    return partial(at_terminal, tmp_path)
 
 
 # The screen and the prompt
 
 
 @for_each("words, given", [
-    ([], ([], True, False, False)),
-    (["demo"], (["sim:"], True, False, False)),
-    (["tui"], ([], True, False, False)),
-    (["tui", "a", "b"], (["a", "b"], True, False, False)),
-    (["tui", "a", "--no-reconnect"], (["a"], False, False, False)),
-    (["tui", "a", "--raw"], (["a"], True, True, False)),
-    (["tui", "a", "--share"], (["a"], True, False, True)),
+    ([], ([], True, False)),
+    (["demo"], (["sim:"], True, False)),
+    (["tui"], ([], True, False)),
+    (["tui", "a", "b"], (["a", "b"], True, False)),
+    (["tui", "a", "--no-reconnect"], (["a"], False, False)),
+    (["tui", "a", "--raw"], (["a"], True, True)),
 ])  # fmt: skip
 def test_the_screen_gets_urls_and_options(person: Person, words: list[str], given: tuple[Any, ...]) -> None:
     with pytest.MonkeyPatch.context() as patched:
         screen = Called(7)
         patched.setattr("multidrop.tui.launch.run", screen)
         assert person(*words) == Done(7, "", "")
-    [(*urls_and_more, prepare, share)] = screen.calls
-    assert (*urls_and_more, share) == given and callable(prepare)
+    [(*urls_and_more, prepare, around)] = screen.calls
+    assert tuple(urls_and_more) == given and callable(prepare) and callable(around)
 
 
 @for_each("closed", ["stdin", "stdout"])
@@ -97,17 +61,6 @@ def test_the_screen_needs_a_terminal_on_both_sides(person: Person, closed: str) 
         patched.setattr("multidrop.tui.launch.run", screen)
         said = "the screen needs a terminal; multidrop shell reads lines from anywhere\n"
         assert person("demo", closed=[closed]) == Done(2, "", said) and screen.calls == []
-
-
-def test_a_watcher_joins_one_screen_and_opens_nothing(person: Person, monkeypatch: pytest.MonkeyPatch) -> None:
-    join = Called(5)
-    monkeypatch.setattr("multidrop.tui.launch.join", join)
-    assert person("tui", "--join").returncode == 5 == person("tui", "--join", "ssh://pc").returncode
-    assert join.calls == [("",), ("ssh://pc",)]
-    said = "tui --join: a watcher opens nothing itself; give --join alone, or with ssh://HOST\n"
-    for more in ("sim:", "--share", "--raw", "--twin"):
-        assert person("tui", more, "--join") == Done(2, "", said)
-    assert len(join.calls) == 2
 
 
 @for_each("words, given", [
@@ -283,19 +236,6 @@ def test_a_relay_takes_no_url_no_person_and_no_port_of_windows(multidrop: Comman
         "",
         "multidrop relay: another multidrop starts this, through ssh, and speaks frames to it; "
         "open ssh://THIS-HOST/dev/ttyUSB7 on the other machine\n",
-    )
-
-
-@pytest.mark.fork
-def test_a_relay_of_a_screen_joins_it_by_its_name(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    joined, spliced = Called(17), Called()
-    monkeypatch.setattr("multidrop.shell.watching.join.connect", joined)
-    monkeypatch.setattr("multidrop.shell.watching.join.splice", spliced)
-    monkeypatch.setattr(sys, "stdin", io.StringIO())
-    monkeypatch.setenv("MULTIDROP_STATE_DIR", str(tmp_path))
-    assert main(["relay", "screen:press"]) == main(["relay", "screen:"]) == 0
-    assert (
-        joined.calls == [("press", tmp_path / "screens"), ("", tmp_path / "screens")] and spliced.calls == [(17,)] * 2
     )
 
 

@@ -195,7 +195,6 @@ class FakeSession:
         self.scaled = True
         self.settings = Settings()
         self.raw: set[str] = set()
-        self.watching = ""
         self.latched = False
         self.recording = ""
         self.playing: list[SimpleNamespace] = []

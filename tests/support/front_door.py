@@ -9,7 +9,7 @@ import json
 import os
 import subprocess
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 from unittest import mock
@@ -170,3 +170,37 @@ def home(tmp_path: Path) -> Iterator[Home]:
     made = Home(tmp_path)
     yield made
     made.close()
+
+
+class Terminal(io.StringIO):
+    """A stream that is a terminal, or none."""
+
+    terminal = True
+
+    def isatty(self) -> bool:
+        return self.terminal
+
+
+class Called:
+    """A function that keeps what it is called with, and returns a code."""
+
+    def __init__(self, code: int = 0) -> None:
+        self.code, self.calls = code, list[tuple[Any, ...]]()
+
+    def __call__(self, *given: Any, **named: Any) -> int:
+        self.calls.append((*given, named) if named else given)
+        return self.code
+
+
+def at_terminal(folder: Path, *words: str, closed: Sequence[str] = ()) -> Done:
+    """Run a command in a folder, at a terminal; those of the standard streams that are `closed` are none."""
+    streams = {name: Terminal() for name in ("stdin", "stdout", "stderr")}
+    for name in closed:
+        streams[name].terminal = False
+    with contextlib.ExitStack() as around:
+        around.enter_context(contextlib.chdir(folder))
+        around.enter_context(mock.patch.dict(os.environ, MULTIDROP_CONFIG_DIR=str(folder / "conf")))
+        for name, stream in streams.items():
+            around.enter_context(mock.patch.object(sys, name, stream))
+        code = main(words)
+    return Done(code, streams["stdout"].getvalue(), streams["stderr"].getvalue())

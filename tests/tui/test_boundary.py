@@ -234,7 +234,7 @@ async def test_a_widget_that_cannot_be_rendered_is_rendered_once_it_can(
 
 
 TIMERS: dict[str, Callable[[Machine, pytest.MonkeyPatch], None]] = {
-    "the polls": lambda it, planted: planted.setattr(it.app.polling, "update", boom),  # type: ignore[attr-defined]
+    "the polls": lambda it, planted: planted.setattr(it.app.purpose.polling, "update", boom),  # type: ignore[attr-defined]
     "a poll of a drive": lambda it, planted: planted.setattr(Poller, "_converse", boom),
     "the ageing": lambda it, planted: it.app.set_interval(0.01, boom) and None,
     "a timer of the loop": lambda it, planted: asyncio.get_running_loop().call_later(0.01, boom) and None,

@@ -99,7 +99,7 @@ def cards_rows(view: View, width: int, height: int) -> list[Row]:
             rows[height - 1 :] = [((f" {len(buses) - number} more lines; ^A shows all drives", "dim"),)]
             break
         drives = f"{len(bus.drives)} drives " if len(bus.drives) != 1 else "1 drive "
-        url = "" if session.watching else url_without_secrets(session.openings.url_of(bus))
+        url = url_without_secrets(session.openings.url_of(bus))
         left: Row = ((f" {bus.name} ", "accent"), (url, "text"))
         if session.tabs.missing(bus):
             drives = f"✗ lost: {bus.lost} "
@@ -132,13 +132,12 @@ def _fact(fact: tuple[str, str], width: int, indent: str = " ") -> Row:
 
 def next_rows(view: View, width: int, height: int) -> list[Row]:
     """What to press or to type: what the state asks for, macros on keys, pages, functions, lines."""
-    mine = not view.session.watching  # a watcher's lines go nowhere
-    offers = [*_asked_for(view), *_macros(view)] if mine else []
+    offers = [*_asked_for(view), *_macros(view)] if view.works else []
     about = view.keys.about
     for name in (*(each for each in about if each.startswith("page-")), *(each for each in FUNCTIONS if each in about)):
         key = view.keys.shown(name) or (f"/page {name.removeprefix('page-')}" if name.startswith("page-") else "")
         offers += [(key, about[name])] if key else []
-    offers += LINES.items() if mine else ()
+    offers += LINES.items() if view.works else ()
     shown = [(f" {key:<{KEY}} ", words) for key, words in offers[:height]]
     return [((key, "key"), (fit(words, width - len(key)), "dim")) for key, words in shown]
 

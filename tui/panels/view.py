@@ -142,6 +142,8 @@ class View:
     now: float
     polling: bool
     """False while the person has switched polling off."""
+    works: bool = True
+    """Lines that are typed go somewhere (`tui.purpose.Purpose`)."""
     only: tuple[Series, ...] = ()
     """The series that are plotted in place of those that the person chose."""
     keys: Keymap = field(default_factory=Keymap)

@@ -274,17 +274,15 @@ def top_row(
     width: int,
     log: bool = False,
     playing: str = "",
-    watchers: Sequence[str] = (),
+    notes: Sequence[str] = (),
 ) -> Row:
-    """The whole line: tabs at the left; the macro that plays, recording, watchers, log and clock at the right."""
+    """The whole line: tabs at the left; the macro that plays, recording, notes, log and clock at the right."""
     right: list[Span] = []
     if playing:
         right.append((f" ▶ {fit(playing, 20).rstrip()} ", "motion"))
     if recording:
         right.append((f" ● rec {recording[:16]} ", "error"))
-    if watchers:
-        who = watchers[0] if len(watchers) == 1 and width >= 100 else str(len(watchers))
-        right.append((f" watched by {who[:24]} ", "accent"))
+    right += ((f" {note} ", "accent") for note in notes)
     if log:
         right.append((" ● log ", "text"))
     right.append((f" {clock} ", "dim"))

@@ -130,15 +130,15 @@ class _Gate:
 
 async def watched(world: World, rng: Random) -> None:
     """Share the screen; a watcher presses the stop key while automation moves a drive; then more of it begins."""
-    from multidrop.tui import sharing
+    from multidrop.features.shared_screen import feed
 
     async with workshop(world, rng, "mcode", PARTY[:2]) as shop:
         session = shop.session
         app: Any = SimpleNamespace(
-            session=session, stop_ahead=session.stop_ahead, presenter=SimpleNamespace(watchers=[])
+            session=session, stop_ahead=session.stop_ahead, presenter=SimpleNamespace(notes=[], on_records={})
         )
-        with mock.patch.object(sharing, "Gate", _Gate):
-            feed = sharing.Feed(app, shop.folder)
+        with mock.patch.object(feed, "Gate", _Gate):
+            fed = feed.Feed(app, shop.folder)
         calls = _Gate.made.calls
         running = shop.start(_automation(shop)(["@a SL 40000", "/sleep 30"])) if rng.random() < 0.7 else None
         await asyncio.sleep(0.5 + rng.random() * 2)
@@ -154,7 +154,7 @@ async def watched(world: World, rng: Random) -> None:
         await shop.type("/resume")
         why = await _automation(shop)([f"@b R2={value + 1}"])
         shop.fact("lost", why or f"R2={value + 1}" in shop.executed("b"), "automation after /resume was not executed")
-        feed.close()
+        fed.close()
 
 
 KINDS = ("limit", "stall", "other")

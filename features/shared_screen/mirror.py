@@ -9,10 +9,11 @@ from __future__ import annotations
 import asyncio
 import sys
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Container, Coroutine, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 from textual.driver import Driver
 
@@ -22,6 +23,7 @@ from multidrop.dialects.families import FAMILIES
 from multidrop.drives.bus import Bus
 from multidrop.drives.events import BusEvent
 from multidrop.drives.stopping import Fate
+from multidrop.features.shared_screen.wire import Dropped, Garbled, Heard, Item, Items, Now
 from multidrop.macros import MacroStore
 from multidrop.shell.configuration import Settings
 from multidrop.shell.connect.opening import Opened
@@ -31,17 +33,19 @@ from multidrop.shell.openings import Failed as OpeningFailed
 from multidrop.shell.playing import Playing
 from multidrop.shell.session import Session
 from multidrop.shell.stop_report import Found, Tally
-from multidrop.shell.watching.wire import Dropped, Garbled, Heard, Item, Items, Now
 from multidrop.transports import Lost, Received, Transport
 from multidrop.tui.app import MultidropApp
 from multidrop.tui.assist import Assist
 from multidrop.tui.figures import NATIVE, Figures
+from multidrop.tui.polling import Polling
+from multidrop.tui.purpose import Purpose
 from multidrop.tui.screen_model import Record, ScreenModel
+from multidrop.tui.widgets.lines import Row
 
 if sys.platform != "win32":
-    from multidrop.shell.watching.join import Stops
+    from multidrop.features.shared_screen.feed import ON_BUS, TYPES, Shared, SharedBus, SharedDrive, note
+    from multidrop.features.shared_screen.join import Stops
     from multidrop.transports.relay_pipe import SocketStream
-    from multidrop.tui.sharing import ON_BUS, TYPES, Shared, SharedBus, SharedDrive
 
 assert sys.platform != "win32"
 
@@ -52,6 +56,8 @@ SILENCE = 3.0
 """Seconds without a sign of life that are said."""
 OWN = ("/help", "/page", "/clear", "/quit", "/use", "/times", "/filter")
 """The verbs that change only what this screen shows."""
+PAGES = ("drives", "plot")
+"""The pages that a watcher has."""
 READ_ONLY = "read only; Ctrl+X stops everything there, Ctrl+Q leaves"
 REFUSED = "this screen only watches: Ctrl+X stops everything, and all other lines are typed at the host"
 
@@ -156,7 +162,8 @@ class Mirror(Session):
         """Its stops that the host has not counted yet, and the number that the host has counted."""
         super().__init__(settings)
         self.macros = MacroStore(settings.state / "none")  # they are the host's
-        self.watching = host.words
+        self.said = host.words
+        """What the screen does, as its prompt says it."""
 
     def now(self) -> float:
         return super().now() + self._host.offset
@@ -168,7 +175,7 @@ class Mirror(Session):
     def changed(self) -> None:
         """Take over what the host says, and publish it."""
         state = self._host.shared
-        self.watching = self._host.words
+        self.said = self._host.words
         self.latched = state.latched or self._host.pending
         self.plotted = state.plotted
         self.playing = [Playing(each.name, each.steps, 1, each.key, 0, each.step, None, None) for each in state.macros]
@@ -241,6 +248,33 @@ class Mirror(Session):
         return []
 
 
+class NoPolling(Polling):
+    """The polls of a screen whose values come from the host: there are none."""
+
+    def update(self, session: Session, model: ScreenModel, wants: Container[str]) -> None:
+        return None
+
+
+class Watching(Purpose):
+    """The purpose of a watcher's screen: it shows what the host sends, and lines that are typed go nowhere."""
+
+    works = False
+
+    def __init__(self, session: Mirror) -> None:
+        super().__init__(session)
+        self._mirror = session
+        self.polling = NoPolling()
+
+    def fill(self) -> Coroutine[Any, Any, object]:
+        return self._mirror.open_all(())
+
+    def refused(self, page: str) -> str:
+        return "" if page in PAGES else f"the page of {page} is at the host; a watcher has {' and '.join(PAGES)}"
+
+    def label(self) -> Row:
+        return ((f" {self._mirror.said} {':'.join(filter(None, self._mirror.place))} ▸ ", "motion"),)
+
+
 class MirrorModel(ScreenModel):
     """A screen model that takes values of a host without making records of them: those come by themselves."""
 
@@ -275,7 +309,9 @@ class Receiver:
         self._session = Mirror(replace(settings, connections={}), self._host, self)
         self._model = MirrorModel(self._session, self._host)
         assist = Assist(self._session, settings)
-        self._app = MultidropApp(self._session, [], assist, driver, settings.look, self._model)
+        purpose = Watching(self._session)
+        self._app = MultidropApp(self._session, [], assist, driver, settings.look, self._model, purpose)
+        self._app.presenter.notes.append(lambda width: note(self._host.shared.watchers, width))
         return self._app
 
     async def run(self) -> None:
@@ -306,7 +342,7 @@ class Receiver:
         """Show a host that gives no sign of life."""
         while True:
             await asyncio.sleep(SILENCE / 3)
-            if self._session.watching != self._host.words or self._host.pending:
+            if self._session.said != self._host.words or self._host.pending:
                 self._session.changed()
 
     async def _take(self, item: Item) -> None:
@@ -353,7 +389,6 @@ class Receiver:
         for read in state.readouts:
             readout = self._model.bus(read.bus).readout(read.address)
             readout.period, readout.watched = read.period, read.watched
-        self._app.presenter.watchers = state.watchers
         wanted = Place(*state.selected) if follows else own
         if wanted.bus in session.buses:
             with suppress(Diagnostic):  # the drive is gone

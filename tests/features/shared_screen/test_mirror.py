@@ -14,18 +14,18 @@ from textual import events
 from textual.pilot import Pilot
 
 from multidrop.drives.stopping import Fate
+from multidrop.features.shared_screen.feed import Feed, Shared, SharedBus, SharedDrive, sharing
+from multidrop.features.shared_screen.join import joined
+from multidrop.features.shared_screen.mirror import watch
+from multidrop.features.shared_screen.wire import Dropped, Item, line
 from multidrop.shell.configuration import Settings
 from multidrop.shell.roles import Series
 from multidrop.shell.secrets import without_secrets
 from multidrop.shell.stop_report import Found, headline
-from multidrop.shell.watching.join import joined
-from multidrop.shell.watching.wire import Dropped, Item, line
 from multidrop.transports.relay_pipe import SocketStream
 from multidrop.tui.app import MultidropApp
 from multidrop.tui.curves.samples import Quantity
 from multidrop.tui.screen_model import Record
-from multidrop.tui.sharing import Feed, Shared, SharedBus, SharedDrive, sharing
-from multidrop.tui.watching import watch
 from tests.support.fake_session import painted, readable
 from tests.support.real_screen import real_app
 from tests.support.until import PATIENCE, until
@@ -69,7 +69,7 @@ async def watched(url: str = "sim:#press", size: tuple[int, int] = (80, 24)) -> 
                 watcher = watch(connection, name, early, Settings(folder=folder / "other", state=folder / "others"))
                 async with watcher.run_test(size=size) as pilot:
                     pair = Pair(host, at_host, watcher, pilot, connection, feed)
-                    await pair.until(lambda: watcher.session.buses and host.presenter.watchers)
+                    await pair.until(lambda: watcher.session.buses and feed.watchers)
                     try:
                         yield pair
                     finally:
@@ -112,8 +112,8 @@ async def test_a_watcher_sees_and_stops_what_the_host_has() -> None:
             *zip(other.at, other.values, strict=True)
         ]
         await pair.until(lambda: "5.00000 mm" in shown(watcher))
-        names = pair.host.presenter.watchers
-        assert list(watcher.presenter.watchers) == names != []
+        names = pair.feed.watchers
+        assert names
         await pair.until(lambda: "watched by 1" in shown(watcher) and names[0][:20] in shown(pair.host))
         watcher.stop_ahead()  # as the thread that reads the keys does
         watcher.stop_all()
@@ -134,7 +134,7 @@ async def test_the_end_of_a_watcher_is_no_end_at_the_host() -> None:
         pair.watcher.interrupted()
         pair.connection.close(True)
         await pair.until(lambda: any(text.endswith("no longer watches this screen") for text in texts(pair.host)))
-        assert (host.stops, host.latched, host.busy, pair.host.presenter.watchers) == (0, False, True, [])
+        assert (host.stops, host.latched, host.busy, pair.feed.watchers) == (0, False, True, [])
         task.cancel()
 
 

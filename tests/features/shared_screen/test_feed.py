@@ -10,9 +10,9 @@ from typing import Any
 import pytest
 
 from multidrop.base.errors import Stopped
+from multidrop.features.shared_screen import feed
 from multidrop.macros import Macro, Step
 from multidrop.shell.events import By
-from multidrop.tui import sharing
 from tests.support.cell_session import CellSession, bus, party
 
 pytestmark = [pytest.mark.virtual, pytest.mark.AF_UNIX]
@@ -24,11 +24,13 @@ async def test_a_watchers_stop_stops_every_drive_and_latches_macros_and_scripts(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     gates: list[Any] = []
-    monkeypatch.setattr(sharing, "Gate", lambda folder, loop, calls: gates.append(calls))
+    monkeypatch.setattr(feed, "Gate", lambda folder, loop, calls: gates.append(calls))
     async with CellSession(tmp_path, *FLOOR) as shop:
         session = shop.session
-        app: Any = SimpleNamespace(session=session, presenter=SimpleNamespace(), stop_ahead=session.stop_ahead)
-        sharing.Feed(app, tmp_path)
+        app: Any = SimpleNamespace(
+            session=session, presenter=SimpleNamespace(notes=[], on_records={}), stop_ahead=session.stop_ahead
+        )
+        feed.Feed(app, tmp_path)
         session.macros.save(Macro("m", (Step(0.0, "@press:b SL 50000"), Step(0.0, "/sleep 100"))))
         await session.run("@gantry:c SL 5000")
         playing = asyncio.create_task(session.run("/play m"))

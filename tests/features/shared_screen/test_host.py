@@ -18,10 +18,10 @@ import pytest
 
 import multidrop
 from multidrop.base.errors import Diagnostic
-from multidrop.shell.watching import host as host_side
-from multidrop.shell.watching.host import MOST, WAITING, Calls, Gate, Watcher
-from multidrop.shell.watching.join import Stops, connect, joined
-from multidrop.shell.watching.wire import Dropped, Heard, Item, Items, Now, greeting, line
+from multidrop.features.shared_screen import host as host_side
+from multidrop.features.shared_screen.host import MOST, WAITING, Calls, Gate, Watcher
+from multidrop.features.shared_screen.join import Stops, connect, joined
+from multidrop.features.shared_screen.wire import Dropped, Heard, Item, Items, Now, greeting, line
 from multidrop.transports import Unreachable
 from tests.support.until import PATIENCE, until
 
@@ -263,7 +263,7 @@ def test_what_is_no_screen_is_refused_in_one_line(folder: Path) -> None:
 
 @pytest.mark.process
 async def test_the_relay_passes_bytes_both_ways_until_either_end(shared: Shared) -> None:
-    code = "import sys; from pathlib import Path; from multidrop.shell.watching.join import connect, splice; "
+    code = "import sys; from pathlib import Path; from multidrop.features.shared_screen.join import connect, splice; "
     code += "splice(connect('', Path(sys.argv[1])))"
     process = await asyncio.create_subprocess_exec(
         sys.executable, "-c", code, str(shared.folder), stdin=subprocess.PIPE, stdout=subprocess.PIPE

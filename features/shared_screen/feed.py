@@ -16,16 +16,16 @@ from pathlib import Path
 from typing import NamedTuple
 
 from multidrop.drives.events import Conditioned, Sample, Silent, Valued
+from multidrop.features.shared_screen.wire import Dropped, Heard, Item, Now, line
 from multidrop.shell import events
 from multidrop.shell.roles import Series
 from multidrop.shell.stop_report import Found
-from multidrop.shell.watching.wire import Dropped, Heard, Item, Now, line
 from multidrop.tui.app import MultidropApp
 from multidrop.tui.figures import Figures
 from multidrop.tui.screen_model import Record
 
 if sys.platform != "win32":
-    from multidrop.shell.watching.host import Calls, Gate, Watcher
+    from multidrop.features.shared_screen.host import Calls, Gate, Watcher
 
 assert sys.platform != "win32"
 
@@ -114,8 +114,8 @@ TYPES = (Shared, Record, Now, Heard, Dropped, *VALUES)
 """The values on the wire."""
 
 
-def shared(app: MultidropApp) -> Shared:
-    """The state of an app's session."""
+def shared(app: MultidropApp, watchers: Sequence[str]) -> Shared:
+    """The state of an app's session. `watchers`: their names."""
     session, presenter = app.session, app.presenter
     buses, readouts = list[SharedBus](), list[SharedReadout]()
     for bus in session.tabs.shown:
@@ -151,8 +151,16 @@ def shared(app: MultidropApp) -> Shared:
         tuple(session.plotted),
         tuple(buses),
         tuple(readouts),
-        tuple(presenter.watchers),
+        tuple(watchers),
     )
+
+
+def note(watchers: Sequence[str], width: int) -> str:
+    """Who watches, for the top line of a screen; empty: nobody."""
+    if not watchers:
+        return ""
+    who = watchers[0] if len(watchers) == 1 and width >= 100 else str(len(watchers))
+    return f"watched by {who[:24]}"
 
 
 class Feed:
@@ -173,7 +181,13 @@ class Feed:
         self._beats = 0
         self._timer: asyncio.TimerHandle | None = None
         self._unsubscribe = app.session.subscribe(self._take)
-        app.presenter.on_records = self._records
+        app.presenter.on_records["what is sent to watchers"] = self._records
+        app.presenter.notes.append(lambda width: note(self.watchers, width))
+
+    @property
+    def watchers(self) -> list[str]:
+        """The names of those that watch."""
+        return [each.name for each in self.gate.watchers]
 
     def close(self) -> None:
         self._unsubscribe()
@@ -216,7 +230,7 @@ class Feed:
             self._pending.append(Item(Now(self._app.session.now())))
         if self._changed or self._beats % LOOKS == 0:
             self._changed = False
-            if (state := shared(self._app)) != self._state:
+            if (state := shared(self._app, self.watchers)) != self._state:
                 self._state = state
                 self._pending.append(Item(state))
         self._flush()
@@ -233,16 +247,15 @@ class Feed:
         self._last = {key: kept for key, kept in self._last.items() if key[1] in buses}
         values = [item for kept in self._last.values() for item in list(kept)[-most:]]
         values.sort(key=lambda item: item.value.at)
-        self._state = shared(self._app)
+        self._state = shared(self._app, self.watchers)
         _put(watcher, [Item(Now(self._app.session.now())), Item(self._state), *values])
 
     # Watchers
 
     def _joined(self, watcher: Watcher) -> None:
         self._flush()
-        app, watchers = self._app, self.gate.watchers
-        watchers.append(watcher)
-        app.presenter.watchers = [each.name for each in watchers]
+        app = self._app
+        self.gate.watchers.append(watcher)
         self._catch_up(watcher, SAMPLES)
         for bus, page in app.main.pages.items():
             kept = page.records
@@ -255,7 +268,6 @@ class Feed:
     def _left(self, watcher: Watcher) -> None:
         if watcher in self.gate.watchers:
             self.gate.watchers.remove(watcher)
-            self._app.presenter.watchers = [each.name for each in self.gate.watchers]
             self._app.session.notify(f"{watcher.name} no longer watches this screen", outcome=True)
 
     def _stop(self, name: str) -> None:

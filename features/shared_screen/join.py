@@ -13,12 +13,12 @@ import time
 from pathlib import Path
 
 from multidrop.base.errors import Diagnostic
-from multidrop.shell.watching import wire
+from multidrop.features.shared_screen import wire
 from multidrop.transports import Unreachable
 from multidrop.transports.ssh import RELAY, WORD, FarPort
 
 if sys.platform != "win32":
-    from multidrop.shell.watching.host import peer
+    from multidrop.features.shared_screen.host import peer
     from multidrop.transports.relay_pipe import SocketStream
     from multidrop.transports.ssh_session import OPENING, SshSession, reason
 

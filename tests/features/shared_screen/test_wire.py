@@ -12,9 +12,7 @@ import multidrop
 from multidrop.dialects.values import Conditions, Lamp, Pace
 from multidrop.drives.events import Conditioned, Sample, Silent
 from multidrop.drives.stopping import Fate
-from multidrop.shell.events import By, Entered, Phase, ProgramSeen
-from multidrop.shell.stop_report import Found
-from multidrop.shell.watching.wire import (
+from multidrop.features.shared_screen.wire import (
     LONGEST,
     Garbled,
     Heard,
@@ -26,6 +24,8 @@ from multidrop.shell.watching.wire import (
     line,
     other_version,
 )
+from multidrop.shell.events import By, Entered, Phase, ProgramSeen
+from multidrop.shell.stop_report import Found
 
 TYPES = (Sample, Conditioned, Silent, Entered, ProgramSeen, Found, Heard, Now)
 TEXTS = st.text('ab1 é\x1b\u2028\n"', max_size=12)

@@ -22,8 +22,8 @@ from pathlib import Path
 
 from multidrop.base.atomic import make_folder
 from multidrop.base.errors import Diagnostic
+from multidrop.features.shared_screen import wire
 from multidrop.shell.threads import BoundedWriter, Loss
-from multidrop.shell.watching import wire
 
 assert sys.platform != "win32"
 

@@ -1,1 +1,0 @@
-"""Watching together: a shared screen, its watchers, and the wire between them."""
