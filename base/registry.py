@@ -62,13 +62,19 @@ IN_WHEEL: dict[str, tuple[str, ...]] = {
     "convert": ("program convert",),
     "log_analysis": ("log at", "log bisect", "log judge", "log replay"),
     "lsp": ("lsp",),
+    "notebook": ("Session.live",),
+    "plot_files": ("plot", "/plot --to", "/plot --serve", "/plot --rate", "multidrop.read_rrd"),
     "publishing": ("publish", "plant"),
     "sharing": ("share",),
     "sweeps": ("program sweep",),
     "twin_fit": ("twin", "twin fit"),
     "twins": ("/twin",),
 }
-"""The features of the wheel, and the words that each answers to: `/twin`, `program sweep`, `usb:`."""
+"""The features of the wheel, and the words that each answers to.
+
+Verbs and commands (`/twin`, `program sweep`), schemes (`usb:`), the first words of forms that it adds to a verb
+(`/plot --to`), and functions of the Python API (`multidrop.read_rrd`).
+"""
 _failed: dict[str, Failed] = {}
 _others: dict[str, tuple[Entry, Feature]] = {}
 """The features by others that are loaded, by their places."""
@@ -116,9 +122,26 @@ def with_word(word: str) -> Feature | None:
     return None
 
 
+def needed(kind: type[T], word: str) -> T:
+    """What the feature of a word adds of one class, or another one that adds it, too. Raises Diagnostic as `with_word`.
+
+    The wheel's come first.
+    """
+    with_word(word)
+    return next(added(kind))
+
+
 def words() -> tuple[str, ...]:
     """The words of the wheel's features, whether these are there or not."""
     return tuple(word for each in IN_WHEEL.values() for word in each)
+
+
+def with_forms_of(verb: str) -> Iterator[Feature]:
+    """The features that may add forms to a verb: those of the wheel that the table has with such words, and others'."""
+    for name, words in IN_WHEEL.items():
+        if any(word.startswith(f"{verb} ") for word in words) and (found := wheel(name)) is not None:
+            yield found
+    yield from by_others()
 
 
 # By others

@@ -12,7 +12,7 @@ import os
 import re
 from ast import literal_eval
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from functools import cache
+from functools import cache, reduce
 from itertools import chain
 from typing import Any
 
@@ -20,7 +20,7 @@ from multidrop.base import registry
 from multidrop.base.feature import Feature
 from multidrop.base.on_demand import imported
 from multidrop.shell.operations import arguments, conditions
-from multidrop.shell.operations.operation import Operation
+from multidrop.shell.operations.operation import Forms, Operation
 
 VERB_GROUPS = {
     "Stop and end": "/stop /resume /quit /exit",
@@ -34,7 +34,7 @@ VERB_GROUPS = {
     "Simulated drives": "/sim",
 }
 """The verbs in the order and the groups of `/help`."""
-COMMAND_ORDER = """demo tui shell send run sim program params macro plot poll snapshot ports relay scan rescue
+COMMAND_ORDER = """demo tui shell send run sim program params macro poll snapshot ports relay scan rescue
     log config features help report completion"""
 SCRIPT_VERBS: Mapping[str, tuple[str, str]] = {
     "/set": ("/set NAME EXPR", "gives a name a value, which is worked out once: a number, a text, a drive's word"),
@@ -75,7 +75,8 @@ _ENTRY = re.compile(
     re.M | re.S,
 )
 """A head, with the name of its table; or a key and its text of several lines, or another value."""
-_WORD = re.compile(r"/?[a-z][a-z0-9-]*( [a-z][a-z0-9-]*)?")
+_VERB = re.compile(r"/[a-z][a-z0-9-]*")
+_COMMAND = re.compile(r"[a-z][a-z0-9-]*( [a-z][a-z0-9-]*)?")
 BY_OTHERS = "Added by others"
 """The title of `/help` for verbs that name no other one."""
 _KEY = re.compile(r'"([^"]*)"|([\w-]+)')
@@ -97,13 +98,19 @@ class Declared(Mapping[str, Operation]):
     A section is parsed, and a feature imported, when its operation is asked for: a start needs one or two of them.
     """
 
-    def __init__(self, sections: Mapping[str, str], order: Sequence[str], name_of: Callable[[Operation], str]) -> None:
+    def __init__(
+        self,
+        sections: Mapping[str, str],
+        order: Sequence[str],
+        form: re.Pattern[str],
+        name_of: Callable[[Operation], str],
+    ) -> None:
         self._sections = {name: sections[name] for name in (*order, *(each for each in sections if each not in order))}
-        self._name_of = name_of
+        self._form, self._name_of = form, name_of
 
     def __getitem__(self, name: str) -> Operation:
         if name in self._sections:
-            return _operation(self._sections[name])
+            return reduce(Operation.with_forms, _forms(name), _operation(self._sections[name]))
         feature = registry.with_word(name)
         for each in (feature,) if feature is not None else registry.by_others():
             if (found := self._added(each).get(name)) is not None:
@@ -124,7 +131,7 @@ class Declared(Mapping[str, Operation]):
         """Whether there is such an operation; a feature of the wheel is not imported for that."""
         if name in self._sections or any(name in self._added(each) for each in registry.by_others()):
             return True
-        return name in registry.words()
+        return name in registry.words() and isinstance(name, str) and self._form.fullmatch(name) is not None
 
     def _added(self, feature: Feature) -> dict[str, Operation]:
         operations = (each for each in feature.adds if isinstance(each, Operation))
@@ -153,6 +160,12 @@ class Parts(Mapping[str, Operation]):
 
     def __contains__(self, word: object) -> bool:
         return isinstance(word, str) and word.split() == [word] and f"{self._group} {word}".strip() in self._every
+
+
+def _forms(verb: str) -> Iterator[Forms]:
+    """The forms that features add to a verb; none of them is imported for another name."""
+    for feature in registry.with_forms_of(verb) if verb.startswith("/") else ():
+        yield from (each for each in feature.adds if isinstance(each, Forms) and each.verb == verb)
 
 
 @cache
@@ -209,11 +222,17 @@ def _declared() -> Iterator[tuple[str, str, str]]:
 
 _FOUND = [*_declared()]
 VERBS = Declared(
-    {verb: text for verb, _, text in _FOUND if verb}, " ".join(VERB_GROUPS.values()).split(), lambda each: each.name
+    {verb: text for verb, _, text in _FOUND if verb},
+    " ".join(VERB_GROUPS.values()).split(),
+    _VERB,
+    lambda each: each.name,
 )
 """By name, in the order of `/help`."""
 COMMANDS = Declared(
-    {command: text for _, command, text in _FOUND if command}, COMMAND_ORDER.split(), lambda each: each.command
+    {command: text for _, command, text in _FOUND if command},
+    COMMAND_ORDER.split(),
+    _COMMAND,
+    lambda each: each.command,
 )
 """By their words, in the order of `--help`; the parts of a group after it."""
 
@@ -240,7 +259,9 @@ def load_others(own: bool = True) -> list[str]:
         words = [word for each in adds for word in (each.name, each.command) if word]
         if feature.name in known:
             taken.update(words)
-        elif wrong := next((word for word in words if word in taken or not _WORD.fullmatch(word)), ""):
+        elif wrong := next(
+            (each for each in words if each in taken or not (_VERB.fullmatch(each) or _COMMAND.fullmatch(each))), ""
+        ):
             why = f"{wrong} is taken" if wrong in taken else f"{wrong} is no name of a verb or a command"
             warnings.append(registry.refuse(feature.name, why))
         else:

@@ -6,11 +6,18 @@ import tomllib
 
 import pytest
 
+from multidrop.api.notebooks import Pictures
 from multidrop.base import registry
 from multidrop.base.registry import IN_WHEEL
 from multidrop.shell.hooks import AtSession, Options
-from multidrop.shell.operations.operation import Operation
+from multidrop.shell.operations.operation import Forms, Operation
+from multidrop.shell.operations.table import VERBS
+from multidrop.shell.plot_targets import OPTIONS, PlotTargets
 from tests.support.paths import ROOT
+
+KINDS = {Operation, AtSession, Options, Forms, PlotTargets, Pictures}
+FUNCTIONS: dict[type, tuple[str, ...]] = {PlotTargets: ("multidrop.read_rrd",), Pictures: ("Session.live",)}
+"""The functions of the Python API that need a record of a kind."""
 
 
 def test_each_folder_and_file_of_the_room_is_in_the_table() -> None:
@@ -24,11 +31,25 @@ def test_the_table_has_the_words_that_the_record_answers_to(name: str) -> None:
     assert record is not None and record.name == name and record.meaning
     operations = [each for each in record.adds if isinstance(each, Operation)]
     words = {word for each in operations for word in (each.name, each.command) if word}
+    words |= {f"{each.verb} {word}" for each in record.adds if isinstance(each, Forms) for word in each.words}
+    words |= {word for each in record.adds for word in FUNCTIONS.get(type(each), ())}
     assert words == set(IN_WHEEL[name])
-    assert all(isinstance(each, Operation | AtSession | Options) for each in record.adds)
+    assert {type(each) for each in record.adds} <= KINDS
     for each in operations:
         assert each.meaning if each.command else each.help
         assert callable(each.run) or not each.run, "a feature names its functions, not their places"
+
+
+@pytest.mark.parametrize("forms", [each for record in registry.wheels() for each in record.adds if type(each) is Forms])
+def test_forms_of_a_verb_stand_before_its_own(forms: Forms) -> None:
+    verb = VERBS[forms.verb]
+    assert verb.usage.startswith(f"{forms.verb} [{forms.usage} | ") and verb.lines == forms.help.strip().split("\n")
+    assert [*verb.words][: len(forms.words)] == [*forms.words] != [*verb.words]
+
+
+def test_the_options_of_a_plot_are_those_of_its_forms() -> None:
+    (forms,) = (each for each in registry.added(Forms) if each.verb == "/plot")
+    assert (*forms.words,) == OPTIONS
 
 
 def test_each_extra_of_a_feature_is_one_of_the_wheel() -> None:
