@@ -13,9 +13,10 @@ from typing import Any
 
 import pytest
 
-from multidrop import Diagnostic, Session, TransportLost, connect
+from multidrop import Diagnostic, Session, TransportLost, connect, read_rrd
 from multidrop.api import threads
 from multidrop.api.threads import Ended, LoopThread
+from multidrop.base import registry
 from tests.support.cell_session import bus, moves, party
 from tests.support.virtual import VirtualLoop
 
@@ -92,6 +93,15 @@ def test_an_interrupted_cell_stops_what_the_session_moves(session: Session, kern
     assert moving(session) == {"b"}
     session.close()
     assert kernel.called == []
+
+
+def test_without_its_feature_an_object_is_its_text(session: Session, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(registry, "wheel", lambda name: None)
+    assert session._repr_html_() is None and session.drive("a")._repr_html_() is None and repr(session)
+    with pytest.raises(Diagnostic, match="the feature notebook is not there; install multidrop again, whole"):
+        session.live()
+    with pytest.raises(Diagnostic, match="the feature plot_files is not there; install multidrop again, whole"):
+        read_rrd("run.rrd")
 
 
 def test_a_call_of_another_thread_at_the_end_of_its_session_says_that_it_is_closed(url: str) -> None:

@@ -12,6 +12,7 @@ from multidrop.base.errors import Diagnostic
 from multidrop.drives.events import Sample
 from multidrop.features.plot_files.plot import attach
 from multidrop.shell.events import OnBus
+from multidrop.shell.prompt.complete import complete
 from multidrop.shell.roles import Series
 from tests.support.cell_session import ETHERNET, CellSession, bus, party
 
@@ -20,6 +21,18 @@ pytestmark = pytest.mark.virtual
 
 def two_lines(folder: Path) -> CellSession:
     return CellSession(folder, bus("press", party("a", VM=51200), party("b")), bus("eth", ETHERNET))
+
+
+@pytest.mark.parametrize(
+    ("text", "offered"), [("/plot --s", ["--serve"]), ("/plot a b --t", ["--to"]), ("/plot --to r", ["run.rrd"])]
+)
+async def test_the_words_of_a_line_are_offered(
+    text: str, offered: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    async with two_lines(tmp_path) as cell:
+        (tmp_path / "run.rrd").touch()
+        monkeypatch.chdir(tmp_path)
+        assert [each.text for each in complete(cell.session, text)] == offered
 
 
 async def test_without_a_screen_a_plot_needs_a_target(tmp_path: Path) -> None:

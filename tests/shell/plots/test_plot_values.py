@@ -8,6 +8,7 @@ from typing import Any
 
 import pytest
 
+from multidrop.base import registry
 from multidrop.base.errors import Diagnostic, Refused
 from multidrop.drives.events import Valued
 from multidrop.drives.telemetry import Value
@@ -89,6 +90,21 @@ async def test_a_plot_on_the_screen_reads_each_value_once_and_shows_the_page(tmp
         assert "plotting on the screen: press:b press:a.VM" in cell.printed()
         await cell.session.run("/plot off")
         assert cell.session.plotted == ()
+
+
+@pytest.mark.parametrize("line", ["/plot --to x.csv", "/plot b --serve 9876", "/plot rerun+http://pc:9876/proxy"])
+async def test_without_its_feature_a_target_is_one_line(
+    tmp_path: Path, line: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(registry, "wheel", lambda name: None)
+    async with two_lines(tmp_path) as cell:
+        with pytest.raises(Diagnostic, match="the feature plot_files is not there; install multidrop again, whole"):
+            await cell.session.run(line)
+        with pytest.raises(Diagnostic, match="no screen to plot on$"):
+            await cell.session.run("/plot b")
+        Screen(cell)
+        await cell.session.run("/plot b")
+        assert cell.session.plotted == (Series("press", "b"),)
 
 
 async def test_a_variable_that_no_program_declares_is_not_asked_for(tmp_path: Path) -> None:
