@@ -12,7 +12,7 @@ from multidrop.base.registry import IN_WHEEL
 from multidrop.shell.hooks import AtSession, Options
 from multidrop.shell.operations.operation import Forms, Operation
 from multidrop.shell.operations.table import VERBS
-from multidrop.shell.plot_targets import OPTIONS, PlotTargets
+from multidrop.shell.plot_targets import PlotTargets
 from tests.support.paths import ROOT
 
 KINDS = {Operation, AtSession, Options, Forms, PlotTargets, Pictures}
@@ -45,11 +45,6 @@ def test_forms_of_a_verb_stand_before_its_own(forms: Forms) -> None:
     verb = VERBS[forms.verb]
     assert verb.usage.startswith(f"{forms.verb} [{forms.usage} | ") and verb.lines == forms.help.strip().split("\n")
     assert [*verb.words][: len(forms.words)] == [*forms.words] != [*verb.words]
-
-
-def test_the_options_of_a_plot_are_those_of_its_forms() -> None:
-    (forms,) = (each for each in registry.added(Forms) if each.verb == "/plot")
-    assert (*forms.words,) == OPTIONS
 
 
 def test_each_extra_of_a_feature_is_one_of_the_wheel() -> None:
