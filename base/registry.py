@@ -123,10 +123,7 @@ def with_word(word: str) -> Feature | None:
 
 
 def needed(kind: type[T], word: str) -> T:
-    """What the feature of a word adds of one class, or another one that adds it, too. Raises Diagnostic as `with_word`.
-
-    The wheel's come first.
-    """
+    """What is added of one class, for a word of the feature that adds it. Raises Diagnostic: see `with_word`."""
     with_word(word)
     return next(added(kind))
 

@@ -5,7 +5,7 @@ A person sets a trigger, reads the cursors, and saves what is visible.
 
 from __future__ import annotations
 
-from collections.abc import Awaitable
+from collections.abc import Awaitable, Callable
 from math import isfinite
 
 from multidrop.base.errors import Diagnostic
@@ -256,7 +256,7 @@ class PlotPage(AskingPage):
             if asked.kind == "save":
                 file, write = plot_targets.needed().save(text)
                 batch = samples_of(view, self.lines("charts").size.width)
-                self.app.run_worker(self._save(file, write(batch), batch))
+                self.app.run_worker(self._save(file, write, batch))
                 self._close(f"saving {file} ...")
             else:
                 self._look.arm(parse_trigger(view, text), asked.kind == "single", view.model.traces)
@@ -264,10 +264,10 @@ class PlotPage(AskingPage):
         except Diagnostic as failure:
             self.say(f"✗ {failure}", "error")
 
-    async def _save(self, file: str, written: Awaitable[None], batch: Batch) -> None:
+    async def _save(self, file: str, write: Callable[[Batch], Awaitable[None]], batch: Batch) -> None:
         """Write the file; the outcome is on the page, and in the transcript also if the page was left."""
         try:
-            await written
+            await write(batch)
         except Diagnostic as failure:
             self.say(f"✗ {failure}", "error")
             self.host.show_line(str(failure), "x")
