@@ -58,6 +58,8 @@ IN_WHEEL: dict[str, tuple[str, ...]] = {
     "convert": ("program convert",),
     "log_analysis": ("log at", "log bisect", "log judge", "log replay"),
     "lsp": ("lsp",),
+    "notebook": ("Session.live",),
+    "plot_files": ("plot", "/plot --to", "/plot --serve", "/plot --rate", "multidrop.read_rrd"),
     "publishing": ("publish", "plant", "[mqtt]"),
     "shared_screen": ("relay screen:", "tui --join", "tui --share"),
     "sharing": ("share",),
@@ -66,7 +68,12 @@ IN_WHEEL: dict[str, tuple[str, ...]] = {
     "twins": ("/twin", "shell --twin", "tui --twin"),
     "usb": ("usb:", "usbip:"),
 }
-"""The features of the wheel, and the words that each answers to: `/twin`, `program sweep`, `tui --twin`, `usb:`."""
+"""The features of the wheel, and the words that each answers to.
+
+Verbs and commands (`/twin`, `program sweep`), options (`tui --twin`), schemes (`usb:`), tables of the configuration
+(`[mqtt]`), the first words of forms that it adds to a verb (`/plot --to`), and functions of the Python API
+(`multidrop.read_rrd`).
+"""
 _failed: dict[str, Failed] = {}
 _untold: list[str] = []
 """The warnings that nobody was told yet."""
@@ -129,9 +136,23 @@ def with_words(begin: str) -> Iterator[Feature]:
     return filter(None, map(wheel, names))
 
 
+def needed(kind: type[T], word: str) -> T:
+    """What is added of one class, for a word of the feature that adds it. Raises Diagnostic: see `with_word`."""
+    with_word(word)
+    return next(added(kind))
+
+
 def words() -> tuple[str, ...]:
     """The words of the wheel's features, whether these are there or not."""
     return tuple(word for each in IN_WHEEL.values() for word in each)
+
+
+def with_forms_of(verb: str) -> Iterator[Feature]:
+    """The features that may add forms to a verb: those of the wheel that the table has with such words, and others'."""
+    for name, words in IN_WHEEL.items():
+        if any(word.startswith(f"{verb} ") for word in words) and (found := wheel(name)) is not None:
+            yield found
+    yield from by_others()
 
 
 # By others

@@ -30,7 +30,7 @@ EPILOG = (
     "Without a command: the screen, with saved connections, serial ports and the demo cell. "
     "multidrop COMMAND --help shows its arguments."
 )
-EXTRAS = {"notebook": "ipykernel", "pytest": "pytest", "rerun": "rerun"}
+EXTRAS = {"pytest": "pytest"}
 """The modules of the extras in pyproject.toml that are no feature's, by extra."""
 
 

@@ -21,11 +21,11 @@ from multidrop.base import new_file
 from multidrop.base.atomic import write_atomically
 from multidrop.base.errors import Diagnostic
 from multidrop.base.files import bytes_of, utf8, why
+from multidrop.base.parquet import pyarrow
 from multidrop.base.text import cell, counted, of_cell, whole
 from multidrop.features.sweeps.plan import Plan
 from multidrop.features.sweeps.trial import CUT, DIED, HELD, MARGIN, REFUSED, Result, bench
 from multidrop.features.sweeps.variation import spelled
-from multidrop.shell.plots.file import pyarrow
 
 LARGEST = 1 << 30
 """The largest file that is read, bytes."""

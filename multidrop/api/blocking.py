@@ -1,18 +1,14 @@
 """The blocking API, made from the awaited one: each call is awaited in a thread of the session.
 
-So it works in a notebook, too, whose own loop runs already. There a table and plots of drives stay up to date below a
-cell, and an interrupted cell stops the drives. Of notebooks only IPython is used, which every kernel has; nothing is
-loaded before it is there.
+So it works in a notebook, too, whose own loop runs already. There an interrupted cell stops the drives. Of notebooks
+only IPython is used, which every kernel has; nothing is loaded before it is there.
 """
 
 from __future__ import annotations
 
 import concurrent.futures
 import contextlib
-import importlib
 import sys
-import threading
-from collections import deque
 from collections.abc import Callable, Coroutine
 from functools import update_wrapper
 from types import TracebackType
@@ -23,26 +19,19 @@ from multidrop.api.calls import CLOSED, StopReport
 from multidrop.api.drives import AsyncDrive, DriveFacts
 from multidrop.api.events import Event
 from multidrop.api.fixed import Fixed
-from multidrop.api.pictures import table
+from multidrop.api.notebooks import Live, live
 from multidrop.api.programs import AsyncParameters, AsyncPrograms
 from multidrop.api.sessions import AsyncSession, Notice, log
 from multidrop.api.streams import AsyncStream
-from multidrop.api.telemetry import RATE, AsyncTelemetry, Sample, Samples
+from multidrop.api.telemetry import RATE, AsyncTelemetry, Sample
 from multidrop.api.threads import Ended, LoopThread, Notices
-from multidrop.base.errors import Diagnostic, TransportLost
+from multidrop.base.errors import Diagnostic
 from multidrop.drives.telemetry import PERIOD
 from multidrop.shell.events import FAILURES
 
 P = ParamSpec("P")
 T = TypeVar("T")
 Self = TypeVar("Self", bound="Stream[Any]")
-EVERY = 0.5
-"""Seconds between two pictures."""
-SPAN = 30.0
-"""Seconds that the plots show."""
-LONGEST = 3600.0
-"""Seconds after which a picture that nobody closed ends: it reads drives."""
-HEADS = ("drive", "axis", "position", "velocity", "in units", "read")
 
 
 def blocking(method: Callable[Concatenate[Any, P], Coroutine[Any, Any, T]]) -> Callable[Concatenate[Any, P], T]:
@@ -197,7 +186,7 @@ class Session(Fixed):
 
         `rate`: samples of each drive a second. Raises Diagnostic outside a notebook.
         """
-        return Live(self.telemetry(*addresses, rate=rate))
+        return live(self.telemetry(*addresses, rate=rate))
 
     def events(self, *addresses: str, every: float = PERIOD) -> Events:
         """Iterate over what happens to drives (all without an address) and their lines: see `Event`.
@@ -231,7 +220,7 @@ class Session(Fixed):
         """Return its lines and their drives."""
         return repr(self._awaited)
 
-    def _repr_html_(self) -> str:
+    def _repr_html_(self) -> str | None:
         """Return a table of the drives, for a notebook."""
         return self._awaited._repr_html_()
 
@@ -379,62 +368,6 @@ def on_interrupt(stop: Callable[[], object]) -> Callable[[], object]:
 
     shell.events.register("post_run_cell", check)
     return leave
-
-
-def shown(html: str) -> Callable[[str], object]:
-    """Show a picture below the cell; return what replaces it. Raises Diagnostic outside a notebook."""
-    if not hasattr(running(), "kernel"):
-        hint = "telemetry() works everywhere; pip install 'multidrop[notebook]' has a kernel for Jupyter"
-        raise Diagnostic("live() shows in a notebook, and this is none", "session", hint)
-    display = importlib.import_module("IPython.display")
-    handle = display.display(display.HTML(html), display_id=True)
-    return lambda now: handle.update(display.HTML(now))
-
-
-class Live:
-    """A table and plots of drives below a cell, until `close`, the end of the session, or an hour."""
-
-    def __init__(self, readings: Telemetry) -> None:
-        self._readings = readings
-        self._rows: deque[Sample] = deque()
-        self._over = threading.Event()
-        self._replace = shown("<p>multidrop: reading</p>")
-        self._thread = threading.Thread(target=self._run, daemon=True, name="multidrop live")
-        self._thread.start()
-
-    def close(self) -> None:
-        """End it; the last picture stays. May be called again."""
-        self._over.set()
-        self._thread.join()
-
-    def _run(self) -> None:
-        with contextlib.suppress(Diagnostic, TransportLost):  # the session is closed, or its line is gone
-            for _ in range(int(LONGEST / EVERY)):
-                ended = self._over.wait(EVERY)
-                self._rows += self._readings.samples()
-                while self._rows and self._rows[0].elapsed < self._rows[-1].elapsed - SPAN:
-                    self._rows.popleft()
-                self._replace(self.html())
-                if ended:
-                    break
-        self._readings.close()
-
-    def html(self) -> str:
-        """Return the picture of now."""
-        last = {(row.drive, row.axis): row for row in self._rows}
-        newest = self._rows[-1].time if self._rows else 0.0
-        rows = [
-            (
-                row.drive,
-                row.axis,
-                f"{row.position}",
-                f"{row.velocity}",
-                "" if row.place is None else f"{row.place:g} {row.unit}",
-                "now" if newest - row.time < 2 * EVERY else f"{newest - row.time:.0f} s ago",
-            )
-            for row in last.values()
-        ]
-        return table("multidrop", HEADS, rows) + Samples(self._rows)._repr_html_()
 
 
 def connect(*urls: str, yes: bool = False, beyond: bool = False, reconnect: bool = False) -> Session:

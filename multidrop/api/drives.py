@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 from multidrop.api.calls import Calls, Stopping
 from multidrop.api.events import Fault, fault_of
 from multidrop.api.fixed import Fixed
-from multidrop.api.pictures import table
+from multidrop.api.notebooks import picture
 from multidrop.api.programs import AsyncParameters, AsyncPrograms
 from multidrop.api.values import seconds, short_text_of, text_of
 from multidrop.base.errors import Diagnostic, DriveError, Inexpressible, Refused
@@ -139,11 +139,9 @@ class DriveFacts(Fixed):
         axis = f", axis {self.axis}" if self.axis else ""
         return f"<drive {self.name or self._target}: {self.version or self.product}" + f"{axis}>"
 
-    def _repr_html_(self) -> str:
+    def _repr_html_(self) -> str | None:
         """Return what is known of it, for a notebook."""
-        seen = "" if self._drive.seen is None else f"{self._drive.seen.velocity}"
-        heads = ("drive", "axis", "product", "version", "last velocity")
-        return table("drive", heads, [(self.name, self.axis, self.product, self.version, seen)])
+        return picture("Drive", self)
 
 
 def _first(drive: DriveFacts) -> str:

@@ -16,7 +16,7 @@ from multidrop.api.calls import Calls, Stopping
 from multidrop.api.drives import AsyncDrive
 from multidrop.api.events import AsyncEvents
 from multidrop.api.fixed import Fixed
-from multidrop.api.pictures import drives_table, table
+from multidrop.api.notebooks import picture
 from multidrop.api.returns import Returns
 from multidrop.api.telemetry import RATE, AsyncTelemetry
 from multidrop.api.values import seconds, text_of
@@ -48,13 +48,9 @@ class Run:
         """All lines that it printed."""
         return [text for result in self.results for text in result.printed]
 
-    def _repr_html_(self) -> str:
+    def _repr_html_(self) -> str | None:
         """Return a table of the lines, for a notebook."""
-        rows = [
-            (f"{result.line.number}", result.sent, "\n".join(result.printed) or result.error, f"{result.seconds:.3f}")
-            for result in self.results
-        ]
-        return table(self.file, ("line", "sent", "printed", "s"), rows)
+        return picture("Run", self)
 
 
 T = TypeVar("T")
@@ -283,9 +279,9 @@ class AsyncSession(Fixed):
         lines = [f"{bus.name}: {', '.join(bus.drives) or 'no drive'}" for bus in self._shell.buses.values()]
         return f"<multidrop: {'; '.join(lines) or 'nothing is open'}>"
 
-    def _repr_html_(self) -> str:
+    def _repr_html_(self) -> str | None:
         """Return a table of the drives, for a notebook."""
-        return drives_table(self._shell) if self._calls.opened else "<p>multidrop: a closed session</p>"
+        return picture("Session", self)
 
 
 def connect_async(*urls: str, yes: bool = False, beyond: bool = False, reconnect: bool = False) -> AsyncSession:

@@ -9,14 +9,14 @@ from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple, SupportsIndex, overload
 
-from multidrop.api.pictures import Curve, plot
+from multidrop.api.notebooks import picture
 from multidrop.api.streams import AsyncStream
 from multidrop.base.errors import Diagnostic
-from multidrop.base.files import why
 from multidrop.dialects.units import Takes
 from multidrop.drives.drive import Drive
 from multidrop.drives.events import Lost
 from multidrop.drives.events import Sample as Read
+from multidrop.shell import plot_targets
 from multidrop.shell.events import OnBus, SessionEvent
 from multidrop.shell.session import Session
 from multidrop.shell.workspace import address_of
@@ -119,17 +119,9 @@ class Samples(Sequence[Sample]):
         """Return the columns for another library that speaks Arrow. Needs pyarrow."""
         return self.arrow().__arrow_c_stream__(requested_schema)
 
-    def _repr_html_(self) -> str:
+    def _repr_html_(self) -> str | None:
         """Return plots of position and velocity, for a notebook."""
-        return plot("position", self._curves("position")) + plot("velocity", self._curves("velocity"))
-
-    def _curves(self, field: str) -> Iterator[Curve]:
-        series: dict[tuple[str, str], list[Sample]] = {}
-        for row in self._rows:
-            series.setdefault((row.drive, row.axis), []).append(row)
-        for (drive, axis), rows in series.items():
-            finite = [row for row in rows if math.isfinite(getattr(row, field))]
-            yield f"{drive} {axis}".strip(), [row.elapsed for row in finite], [getattr(row, field) for row in finite]
+        return picture("Samples", self)
 
 
 RATE = 50.0
@@ -181,76 +173,10 @@ class AsyncTelemetry(AsyncStream[Sample]):
         return Samples(rows)
 
 
-QUANTITIES = ("position", "velocity")
-"""Both are in every sample of a drive, and of its twin."""
-Key = tuple[float, str, str]
-"""Seconds since the plot began, drive, axis."""
-
-
 def read_rrd(file: str | Path, *, twin: bool = False) -> Samples:
     """Read the samples of a plot that multidrop wrote; `twin`: those that the twins of its drives predicted.
 
     Raises Diagnostic for another file, for one without such samples, and without rerun.
     """
-    from multidrop.shell.plots.rerun_calls import load
-
-    load()
-    path = Path(file)
-    if not path.exists():
-        raise Diagnostic("cannot be read: there is no such file", str(path))
-    rows: dict[Key, dict[str, float]] = {}
-    for drive, axis, what, elapsed, wall, value in _values(path, twin):
-        rows.setdefault((elapsed, drive, axis), {"time": wall})[what] = value
-    whole = (each for each in sorted(rows.items()) if all(what in each[1] for what in QUANTITIES))
-    found = Samples(
-        Sample(elapsed, row["time"], drive, axis, int(row["position"]), int(row["velocity"]))
-        for (elapsed, drive, axis), row in whole
-    )
-    if not found:
-        missing, hint = (
-            ("twins", "/twin on, then /plot --to FILE.rrd")
-            if twin
-            else ("multidrop", "multidrop plot URL --to FILE.rrd")
-        )
-        raise Diagnostic(f"has no samples of {missing}", str(path), f"{hint} writes such a file")
+    found: Samples = plot_targets.needed("multidrop.read_rrd").read(file, twin)
     return found
-
-
-def _values(path: Path, twin: bool) -> Iterator[tuple[str, str, str, float, float, float]]:
-    """Drive, axis, quantity, elapsed, time of day and value of each entry."""
-    from rerun.chunk import RrdReader
-
-    try:
-        for chunk in RrdReader(str(path)).stream():
-            series = _series(chunk.entity_path, twin)
-            if series is not None and "elapsed" in chunk.timeline_names:
-                yield from ((*series, *row) for row in _column(chunk.to_record_batch()))
-    except (OSError, RuntimeError, ValueError) as problem:
-        reason = why(problem) if isinstance(problem, OSError) else "not a recording of rerun"
-        raise Diagnostic(f"cannot be read: {reason}", str(path)) from None
-
-
-def _series(entity: str, twin: bool) -> tuple[str, str, str] | None:
-    """The drive, axis and quantity of an entity `/BUS/ADDRESS/AXIS/position`; None for another one.
-
-    `twin`: of `/BUS/ADDRESS/AXIS/twin/position`.
-    """
-    from multidrop.shell.plots.rerun_calls import TWIN
-
-    *parts, what = entity.strip("/").replace("\\", "").split("/")
-    of_twin = len(parts) > 1 and parts[-1] == TWIN
-    if not parts or what not in QUANTITIES or of_twin is not twin:
-        return None
-    bus, address, axis = (*(parts[:-1] if twin else parts), "", "")[:3]
-    return f"{bus}:{address}" if address else bus, axis, what
-
-
-def _column(batch: Any) -> Iterator[tuple[float, float, float]]:
-    names = batch.schema.names
-    if "Scalars:scalars" not in names:
-        return
-    for elapsed, wall, values in zip(
-        batch.column("elapsed"), batch.column("time"), batch.column("Scalars:scalars"), strict=True
-    ):
-        if elapsed.is_valid and values.as_py():
-            yield elapsed.value / 1e9, wall.value / 1e9, values.as_py()[0]

@@ -1,6 +1,6 @@
 """Commands that serve until interrupted, and small ones: each imports what it needs when it runs.
 
-`multidrop sim`, `relay`, `plot`, `poll`, `ports`, `completion`.
+`multidrop sim`, `relay`, `poll`, `ports`, `completion`.
 """
 
 from __future__ import annotations
@@ -42,21 +42,8 @@ def sim(chosen: argparse.Namespace) -> int:
     return asyncio.run(body())
 
 
-def plot(chosen: argparse.Namespace) -> int:
-    from multidrop.shell.plots import command
-
-    return command.run(
-        chosen.url,
-        [] if "all" in chosen.drive else chosen.drive,
-        to=chosen.to,
-        serve=chosen.serve,
-        rate=chosen.rate,
-        reconnect=not chosen.no_reconnect,
-    )
-
-
 def poll(chosen: argparse.Namespace) -> int:
-    from multidrop.shell.plots import command
+    from multidrop.shell.plots import poll as command
 
     asked = command.Polling(chosen.names, chosen.drive or "all", chosen.every, chosen.rows, chosen.json)
     return command.poll(chosen.url, asked, reconnect=not chosen.no_reconnect)

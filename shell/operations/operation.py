@@ -98,6 +98,11 @@ class Operation(NamedTuple):
         if self.checked:
             self.imported(self.checked)(self, rest)
 
+    def with_forms(self, added: Forms) -> Operation:
+        """The verb, whose forms are a group in brackets, with the forms of a feature before them."""
+        usage = self.usage.replace("[", f"[{added.usage} | ", 1)
+        return self._replace(usage=usage, help=added.help, words={**added.words, **self.words})
+
     def imported(self, place: str | Callable[..., Any]) -> Any:
         return imported(f"multidrop.shell.verbs.{place}") if isinstance(place, str) else place
 
@@ -116,6 +121,18 @@ class Operation(NamedTuple):
 
         usage = f"usage: {self.usage}"
         return Diagnostic(message, self.name, usage) if message else Diagnostic(usage, self.name)
+
+
+class Forms(NamedTuple):
+    """Forms of a verb that is there already, whose work takes them to the feature."""
+
+    verb: str
+    usage: str
+    """The forms, as in the usage of an Operation: `[ADDR ...] --to FILE | [ADDR ...] --serve PORT`."""
+    help: str
+    """The help on the verb with them, whole."""
+    words: Mapping[str, str] = NOTHING
+    """The meanings of their literal words; these are unlike those of the verb."""
 
 
 def add_arguments(parser: argparse._ActionsContainer, arguments: Arguments) -> None:

@@ -12,7 +12,7 @@ import os
 import re
 from ast import literal_eval
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from functools import cache
+from functools import cache, reduce
 from itertools import chain
 from typing import Any
 
@@ -20,7 +20,7 @@ from multidrop.base import registry
 from multidrop.base.feature import Feature
 from multidrop.base.on_demand import imported
 from multidrop.shell.operations import arguments, conditions
-from multidrop.shell.operations.operation import Operation
+from multidrop.shell.operations.operation import Forms, Operation
 
 VERB_GROUPS = {
     "Stop and end": "/stop /resume /quit /exit",
@@ -34,7 +34,7 @@ VERB_GROUPS = {
     "Simulated drives": "/sim",
 }
 """The verbs in the order and the groups of `/help`."""
-COMMAND_ORDER = """demo tui shell send run sim program params macro plot poll snapshot ports relay scan rescue
+COMMAND_ORDER = """demo tui shell send run sim program params macro poll snapshot ports relay scan rescue
     log config features help report completion"""
 SCRIPT_VERBS: Mapping[str, tuple[str, str]] = {
     "/set": ("/set NAME EXPR", "gives a name a value, which is worked out once: a number, a text, a drive's word"),
@@ -102,7 +102,7 @@ class Declared(Mapping[str, Operation]):
 
     def __getitem__(self, name: str) -> Operation:
         if name in self._sections:
-            return _operation(self._sections[name])
+            return reduce(Operation.with_forms, _forms(name), _operation(self._sections[name]))
         feature = registry.with_word(name)
         for each in (feature,) if feature is not None else registry.by_others():
             if (found := self._added(each).get(name)) is not None:
@@ -152,6 +152,12 @@ class Parts(Mapping[str, Operation]):
 
     def __contains__(self, word: object) -> bool:
         return isinstance(word, str) and word.split() == [word] and f"{self._group} {word}".strip() in self._every
+
+
+def _forms(verb: str) -> Iterator[Forms]:
+    """The forms that features add to a verb; none of them is imported for another name."""
+    for feature in registry.with_forms_of(verb) if verb.startswith("/") else ():
+        yield from (each for each in feature.adds if isinstance(each, Forms) and each.verb == verb)
 
 
 @cache

@@ -1,1 +1,1 @@
-"""Plots of positions and velocities to rerun."""
+"""What is plotted, and values of drives in rows."""

@@ -107,8 +107,8 @@ def _arguments(workspace: Workspace, typed: list[str], word: str) -> Found:
     """The completions that a verb's usage allows here."""
     verb = VERBS.get(typed[0])
     for each in following(verb.usage, typed[1:]) if verb else ():
-        if each in PLACEHOLDERS:
-            yield from offered(workspace, each, word)
+        if (kind := kind_of(each)) in PLACEHOLDERS:
+            yield from offered(workspace, kind, word)
         elif each == each.lower():
             yield each, verb.words.get(each, "") if verb else ""
 
@@ -145,12 +145,16 @@ def verbs(workspace: Workspace) -> Found:
     return ((verb.name, verb.lines[0]) for verb in VERBS.values() if verb.fits is None or verb.fits(workspace))
 
 
-PLOTS = ("FILE.rrd", "FILE.csv", "FILE.parquet")
 PLACEHOLDERS = (
-    *("ADDR", "@ADDR", "BUS", "BUS[:ADDR]", "DRIVE", "F2..F12", "FILE", *PLOTS, "MACRO", "PAGE"),
+    *("ADDR", "@ADDR", "BUS", "BUS[:ADDR]", "DRIVE", "F2..F12", "FILE", "MACRO", "PAGE"),
     *("PERSONALITY", "URL", "WORD"),
 )
 """The words of a usage for which values are known; only a person knows the value of any other placeholder."""
+
+
+def kind_of(placeholder: str) -> str:
+    """The placeholder without the ending of a file: that of `FILE.csv` is `FILE`."""
+    return "FILE" if placeholder.startswith("FILE.") else placeholder
 
 
 def offered(workspace: Workspace, placeholder: str, word: str) -> Found:
@@ -186,7 +190,7 @@ def offered(workspace: Workspace, placeholder: str, word: str) -> Found:
             yield from language.complete("", product)
     if placeholder in ("BUS", "BUS[:ADDR]"):
         yield from ((bus.name, ", ".join(bus.drives)) for bus in workspace.buses.values())
-    if placeholder in ("FILE", *PLOTS, "URL"):
+    if placeholder in ("FILE", "URL"):
         yield from _files(word)
 
 

@@ -13,13 +13,12 @@ from multidrop.dialects import Procedure
 from multidrop.dialects.families import FAMILIES, TABLE
 from multidrop.dialects.family import Registers
 from multidrop.drives.drive import Drive
-from multidrop.shell import motions
+from multidrop.shell import motions, plot_targets
 from multidrop.shell.events import By
 from multidrop.shell.operations.conditions import simulated_cell
 from multidrop.shell.params import work
 from multidrop.shell.params.work import Options
-from multidrop.shell.plots.plot import begin
-from multidrop.shell.plots.request import DEFAULT, FILES, TABLES, parse_rate, parse_series, parse_target, read_first
+from multidrop.shell.plots.series import parse_series, read_first
 from multidrop.shell.session import TRAVEL
 from multidrop.shell.verbs.call import Call
 
@@ -96,17 +95,7 @@ async def plot(call: Call) -> None:
         case words:
             options, texts = _plotted(call, words)
             if options:
-                workspace = call.session
-                target = parse_target(options.get("--to"), options.get("--serve"))
-                if target.file is not None:
-                    call.output_file(str(target.file))
-                period = parse_rate(options.get("--rate", DEFAULT))
-                series = parse_series(workspace, texts)
-                await read_first(workspace, series)
-                begun, _ = await begin(workspace, target, series, period)
-                workspace.notify(f"plotting to {begun.where}, {begun.rate}")
-                if begun.desk:
-                    workspace.notify(f"at your desk: {begun.desk}, then rerun {begun.where}")
+                await plot_targets.needed().begin(call, options, texts)
             else:
                 await _plot_on_screen(call, texts)
 
@@ -116,7 +105,8 @@ async def _plot_on_screen(call: Call, texts: list[str]) -> None:
     workspace = call.session
     screen = workspace.front.screen
     if screen is None:
-        raise Diagnostic("no screen to plot on", "/plot", f"valid here: --to {FILES} or --serve [HOST:]PORT")
+        targets = plot_targets.offered()
+        raise Diagnostic("no screen to plot on", "/plot", f"valid here: {targets.valid}" if targets is not None else "")
     series = parse_series(workspace, texts)
     await read_first(workspace, series)
     workspace.plotted = series
@@ -129,12 +119,14 @@ def _plotted(call: Call, words: list[str]) -> tuple[dict[str, str], list[str]]:
     """The options, and what to plot; a bare word that can only be a target counts as `--to`."""
     options: dict[str, str] = {}
     addresses: list[str] = []
+    targets = plot_targets.offered()
+    endings = targets.endings if targets is not None else ()
     left = iter(words)
     for word in left:
         option = word
-        if word in ("--to", "--serve", "--rate", "--drive"):
+        if word in (*plot_targets.OPTIONS, "--drive"):
             value = next(left, "")
-        elif word.endswith((".rrd", *TABLES)) or "://" in word:
+        elif word.endswith(endings) or "://" in word:
             option, value = "--to", word
         else:
             option, value = "--drive", word
@@ -144,8 +136,6 @@ def _plotted(call: Call, words: list[str]) -> tuple[dict[str, str], list[str]]:
             addresses.append(value)
         else:
             options[option] = value
-    if options.keys() == {"--rate"}:
-        raise call.wrong("no target for the plot")
     return options, addresses
 
 

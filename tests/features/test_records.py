@@ -6,15 +6,22 @@ import tomllib
 
 import pytest
 
+from multidrop.api.notebooks import Pictures
 from multidrop.base import registry
 from multidrop.base.registry import IN_WHEEL
 from multidrop.shell.connect.scheme import Scheme
 from multidrop.shell.hooks import AtSession, Options
-from multidrop.shell.operations.operation import Operation
+from multidrop.shell.operations.operation import Forms, Operation
+from multidrop.shell.operations.table import VERBS
+from multidrop.shell.plot_targets import PlotTargets
 from multidrop.shell.relaying import Lent
 from multidrop.shell.sections import Section
 from multidrop.simulator.cell.endpoint_kinds import EndpointKind
 from tests.support.paths import ROOT
+
+KINDS = (Operation, AtSession, Options, Forms, PlotTargets, Pictures, Section, Scheme, EndpointKind, Lent)
+FUNCTIONS: dict[type, tuple[str, ...]] = {PlotTargets: ("multidrop.read_rrd",), Pictures: ("Session.live",)}
+"""The functions of the Python API that need a record of a kind."""
 
 
 def test_each_folder_and_file_of_the_room_is_in_the_table() -> None:
@@ -34,12 +41,20 @@ def test_the_table_has_the_words_that_the_record_answers_to(name: str) -> None:
     options = [each for each in record.adds if isinstance(each, Options)]
     words |= {f"{each.command} {notation.partition(' ')[0]}" for each in options for notation in each.arguments}
     words |= {f"relay {each.name}" for each in record.adds if isinstance(each, Lent)}
+    words |= {f"{each.verb} {word}" for each in record.adds if isinstance(each, Forms) for word in each.words}
+    words |= {word for each in record.adds for word in FUNCTIONS.get(type(each), ())}
     assert words == set(IN_WHEEL[name])
-    kinds = Operation | AtSession | Options | Section | Scheme | EndpointKind | Lent
-    assert all(isinstance(each, kinds) for each in record.adds)
+    assert all(isinstance(each, KINDS) for each in record.adds)
     for each in operations:
         assert each.meaning if each.command else each.help
         assert callable(each.run) or not each.run, "a feature names its functions, not their places"
+
+
+@pytest.mark.parametrize("forms", [each for record in registry.wheels() for each in record.adds if type(each) is Forms])
+def test_forms_of_a_verb_stand_before_its_own(forms: Forms) -> None:
+    verb = VERBS[forms.verb]
+    assert verb.usage.startswith(f"{forms.verb} [{forms.usage} | ") and verb.lines == forms.help.strip().split("\n")
+    assert [*verb.words][: len(forms.words)] == [*forms.words] != [*verb.words]
 
 
 def test_each_extra_of_a_feature_is_one_of_the_wheel() -> None:

@@ -1,4 +1,4 @@
-"""In a notebook: a picture that stays up to date, and an interrupted cell that stops what the session moved."""
+"""In a notebook an interrupted cell stops what the session moved; calls that meet the end of their session."""
 
 from __future__ import annotations
 
@@ -13,9 +13,10 @@ from typing import Any
 
 import pytest
 
-from multidrop import Diagnostic, Session, TransportLost, connect
-from multidrop.api import blocking, threads
+from multidrop import Diagnostic, Session, TransportLost, connect, read_rrd
+from multidrop.api import threads
 from multidrop.api.threads import Ended, LoopThread
+from multidrop.base import registry
 from tests.support.cell_session import bus, moves, party
 from tests.support.virtual import VirtualLoop
 
@@ -94,25 +95,13 @@ def test_an_interrupted_cell_stops_what_the_session_moves(session: Session, kern
     assert kernel.called == []
 
 
-def test_a_picture_is_replaced_until_it_is_closed(
-    session: Session, kernel: Kernel, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(blocking, "EVERY", 0.01)
-    session.drive("a").move(25600)
-    session.drive("a").wait()
-    live = session.live("a")
-    live.close()
-    live.close()
-    assert kernel.shown[0] == "<p>multidrop: reading</p>" and len(kernel.shown) > 1
-    assert "<td" in kernel.shown[-1] and ">25600<" in kernel.shown[-1] and "<svg" in kernel.shown[-1]
-
-
-def test_a_picture_ends_with_its_session(session: Session, kernel: Kernel, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(blocking, "EVERY", 0.01)
-    live = session.live()
-    session.close()
-    live._thread.join(10)
-    assert not live._thread.is_alive()
+def test_without_its_feature_an_object_is_its_text(session: Session, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(registry, "wheel", lambda name: None)
+    assert session._repr_html_() is None and session.drive("a")._repr_html_() is None and repr(session)
+    with pytest.raises(Diagnostic, match="the feature notebook is not there; install multidrop again, whole"):
+        session.live()
+    with pytest.raises(Diagnostic, match="the feature plot_files is not there; install multidrop again, whole"):
+        read_rrd("run.rrd")
 
 
 def test_a_call_of_another_thread_at_the_end_of_its_session_says_that_it_is_closed(url: str) -> None:
@@ -147,8 +136,3 @@ def test_work_that_begins_with_the_end_of_its_loop_is_refused_or_cancelled() -> 
         begun.result(10)
     with pytest.raises(Ended):
         loop.begin(endless())
-
-
-def test_outside_a_notebook_it_is_refused_in_one_line(url: str) -> None:
-    with connect(url) as session, pytest.raises(Diagnostic, match=r"this is none; telemetry\(\) works everywhere"):
-        session.live()

@@ -1,23 +1,18 @@
-"""Samples: from telemetry, as columns, as pictures, and from a plot's file."""
+"""Samples: from telemetry, and as columns."""
 
 from __future__ import annotations
 
 import asyncio
 import math
-import re
 from array import array
 from pathlib import Path
 from typing import Any
-from xml.etree import ElementTree
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
-from multidrop import Diagnostic, Sample, Samples, TransportLost, connect_async, read_rrd
-from multidrop.api import pictures, telemetry
+from multidrop import Sample, Samples, TransportLost, connect_async
+from multidrop.api import telemetry
 from tests.support.cell_session import bus, party, pmx
-from tests.support.examples import examples
 
 FAR = 10**8
 ROWS = [Sample(0.0, 10.0, "a", "", 0, 0), Sample(0.5, 10.5, "b", "x", 7, -3), Sample(1.0, 11.0, "a", "", 9, 0)]
@@ -93,75 +88,6 @@ def test_arrow_has_the_same_columns() -> None:
     table = Samples(ROWS).arrow()
     assert table.column("position").to_pylist() == [0, 7, 9] and table.column("drive").to_pylist() == ["a", "b", "a"]
     assert pyarrow.table(Samples(ROWS)) == table
-
-
-def drawn(html: str) -> list[ElementTree.Element]:
-    """The SVG pictures in it, which are XML."""
-    return [ElementTree.fromstring(each) for each in re.findall(r"<svg.*?</svg>", html, re.S)]
-
-
-STEPS = st.integers(-(2**31), 2**31)
-
-
-@examples(10, 200)
-@given(st.lists(st.tuples(st.text(max_size=3), STEPS, STEPS), max_size=6))
-def test_any_samples_make_a_small_safe_picture(rows: list[tuple[str, int, int]]) -> None:
-    samples = Samples(Sample(at / 10, 0.0, drive, "", p, v) for at, (drive, p, v) in enumerate(rows))
-    html = samples._repr_html_()
-    pictures = drawn(re.sub(r"[^\x20-\x7e]", "?", html))
-    assert len(pictures) == (2 if rows else 0) and "<script" not in html and len(html) < 20_000
-    points = [float(each) for svg in pictures for line in svg.iter() for each in re.findall(r"[-\d.]+", _points(line))]
-    assert all(math.isfinite(each) and 0 <= each <= 640 for each in points)
-
-
-def _points(line: ElementTree.Element) -> str:
-    return line.get("points", "")
-
-
-def test_a_long_curve_is_thinned_and_keeps_its_peak() -> None:
-    values = [0.0] * 100_000
-    values[70_001] = 5.0
-    times, kept = pictures._thinned([float(each) for each in range(len(values))], values)
-    assert len(kept) <= pictures.POINTS and max(kept) == 5.0 and times == sorted(times)
-
-
-@pytest.mark.virtual
-async def test_sessions_drives_and_runs_are_escaped_tables(url: str, tmp_path: Path) -> None:
-    (tmp_path / "t.txt").write_text('@a PR "<b>&"\n/print {{\n')
-    async with connect_async(f"{url}#press") as session:
-        html = (await session.run(str(tmp_path / "t.txt")))._repr_html_()
-        assert "&lt;b&gt;&amp;" in html and "<b>" not in html and html.count("<tr>") == 3
-        assert "LMDCM" in session._repr_html_() and "LMDCM" in session.drive("a")._repr_html_()
-    assert "closed" in session._repr_html_()
-
-
-def test_long_tables_are_cut() -> None:
-    assert "and 50 more" in pictures.table("t", ["a"], [(str(each),) for each in range(pictures.ROWS + 50)])
-
-
-@pytest.mark.slow
-async def test_a_plot_reads_back_with_one_call(url: str, tmp_path: Path) -> None:
-    pytest.importorskip("rerun")
-    file = tmp_path / "run.rrd"
-    async with connect_async(url) as session:
-        await session.send(f"/plot --to {file}")
-        await session.drive("press:a").move(20000)
-        await session.drive("press:a").wait()
-        await asyncio.sleep(0.2)
-        await session.send("/plot off")
-    samples = read_rrd(file)
-    a = samples.of("press:a")
-    assert a[-1].position == 20000 and max(each.velocity for each in a) > 0
-    assert {(each.drive, each.axis) for each in samples} >= {("press:a", ""), ("pmx:00", "x"), ("pmx:00", "y")}
-    assert list(a.arrays()["elapsed"]) == sorted(a.arrays()["elapsed"]) and a[0].time > 1.7e9
-
-
-def test_a_file_that_is_no_plot_is_one_line(tmp_path: Path) -> None:
-    pytest.importorskip("rerun")
-    (tmp_path / "x.rrd").write_text("no")
-    for name, said in (("x.rrd", "not a recording of rerun"), ("gone.rrd", "cannot be read: there is no such file")):
-        with pytest.raises(Diagnostic, match=said):
-            read_rrd(tmp_path / name)
 
 
 def test_samples_compare(tmp_path: Path) -> None:

@@ -13,7 +13,7 @@ from multidrop.simulator.families import PROGRAMS, TABLE
 from tests.support.paths import ROOT
 from tests.support.until import PATIENCE
 
-COMMANDS = ["demo", "tui", "shell", "send", "run", "sim", "program", "macro", "plot", "ports", "report", "completion"]
+COMMANDS = ["demo", "tui", "shell", "send", "run", "sim", "program", "macro", "ports", "report", "completion"]
 RUN = [each for each in table.COMMANDS.values() if each.run]
 
 
@@ -37,9 +37,6 @@ def test_a_process_has_the_exit_code_and_its_lines_on_either_output(home, argume
         (["run", "x.txt", "--on", "sim:", "--set", "STEPS"], "STEPS is not NAME=VALUE"),
         (["sim", "--speed", "never"], "never is not a number"),
         (["macro"], "list|show|play"),
-        (["plot", "sim:"], "--to"),
-        (["plot", "sim:", "--to", "a.rrd", "--serve", "1"], "--serve"),
-        (["plot", "sim:", "--to", "a.txt"], "a.txt"),
         (["--frob"], "--frob"),
         (["send", "sim:?em=7", "PR P"], "em=7"),
         (["send", "nowhere", "PR P"], "nowhere"),
@@ -50,6 +47,7 @@ def test_a_process_has_the_exit_code_and_its_lines_on_either_output(home, argume
         (["macro", "show", "gone"], "gone"),
         (["macro", "play", "gone", "--on", "sim:"], "gone"),
         (["sim", "gone.toml"], "gone.toml"),
+        (["/plot"], "/plot"),
         ([], "terminal"),
     ],
 )

@@ -1,6 +1,6 @@
 """The main job, end to end through the front door: a party line, a program, a macro, a plot of both plays.
 
-How often a plotted drive is read is tested in virtual time: `tests/shell/plots/test_plots_session.py`.
+How often a plotted drive is read is tested in virtual time: `tests/shell/plots/test_polled_rates.py`.
 """
 
 from __future__ import annotations

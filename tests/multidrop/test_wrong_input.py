@@ -31,7 +31,6 @@ from multidrop.shell import configuration
 from multidrop.shell.configuration import Settings
 from multidrop.shell.connect import urls
 from multidrop.shell.events import FAILURES
-from multidrop.shell.plots.request import parse_target
 from multidrop.shell.session import Session
 from multidrop.shell.streams.stdout import LONGEST, report, shortened
 from multidrop.simulator import cells
@@ -318,15 +317,6 @@ def test_where_in_the_file_it_is_stands_in_front() -> None:
     ):
         with pytest.raises(Diagnostic, match=f"^{re.escape(says)}"):
             toml_of(text, "x.toml")
-
-
-@given(st.text(max_size=40))
-def test_any_text_is_a_target_of_a_plot_or_none(text: str) -> None:
-    for to, serve in ((text, None), (None, text), (f"rerun+http://{text}/proxy", None), (f"{text}.rrd", None)):
-        try:
-            parse_target(to, serve)
-        except Diagnostic as problem:
-            assert str(problem)
 
 
 @given(st.sampled_from(["", "tcp://", "sim:", "udp://h:", "serial:", "modbus://", "sim:?"]), st.text(max_size=40))

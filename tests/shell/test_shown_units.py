@@ -1,21 +1,17 @@
-"""What a session shows and hands on in units: status, help, settings, snapshots, samples, MQTT, recordings."""
+"""What a session shows and hands on in units: status, help, settings, snapshots, samples."""
 
 from __future__ import annotations
 
 import asyncio
 from pathlib import Path
-from typing import Any
 
 import pytest
 
 from multidrop.api.telemetry import AsyncTelemetry
 from multidrop.base.errors import DriveError
 from multidrop.dialects.tmcl.manual.commands import Axis, Call, Command
-from multidrop.drives.events import Sample
 from multidrop.shell import setting_units, snapshots
 from multidrop.shell.events import Notified, Output
-from multidrop.shell.plots.plot import attach
-from multidrop.shell.roles import Series
 from multidrop.shell.waits import standings
 from multidrop.simulator import cells
 from multidrop.tui.figures import NATIVE, figures_of
@@ -119,38 +115,6 @@ async def test_where_a_drive_stands_has_its_place_in_units(tmp_path: Path) -> No
         assert other.fact == {"position": 0, "velocity": 0}
 
 
-class Kept:
-    """A plot that keeps quantities in units."""
-
-    def __init__(self) -> None:
-        self.samples: set[str] = set()
-        self.units: set[tuple[str, str, float, str]] = set()
-
-    def __getattr__(self, name: str) -> Any:
-        return lambda *values: None
-
-    def sample(self, bus: str, sample: Sample) -> None:
-        self.samples.add(sample.address)
-
-    def in_units(self, bus: str, sample: Sample, word: str, value: float, unit: str) -> None:
-        self.units.add((sample.address, word, value, unit))
-
-    def not_in_units(self, bus: str, sample: Sample) -> None:
-        """Take no quantity."""
-
-
-async def test_a_recording_has_curves_in_units_beside_those_in_steps(tmp_path: Path) -> None:
-    plot: Any = Kept()
-    async with CellSession(tmp_path, PRESS) as shop:
-        await shop.session.run("@a MR {10 mm}")
-        await shop.session.run("/wait stopped")
-        detach = attach(shop.session, plot, [Series("press", "a"), Series("press", "b")], 0.5)
-        await asyncio.sleep(2)
-        detach()
-    assert plot.samples == {"a", "b"}
-    assert plot.units == {("a", "position", 10.0, "mm"), ("a", "velocity", 0.0, "mm/s")}
-
-
 async def test_samples_of_the_api_have_the_unit_as_a_further_field(tmp_path: Path) -> None:
     async with CellSession(tmp_path, PRESS) as shop:
         await shop.session.run("@a MR {10 mm}")
@@ -191,7 +155,6 @@ CHANGES = {
 async def test_a_setting_that_the_scale_rests_on_ends_the_units_in_every_output(
     floor: str, to: str, change: str, tmp_path: Path
 ) -> None:
-    plot: Any = Kept()
     async with CellSession(tmp_path, floor) as shop:
         drive, units = next(iter(shop.session.buses["press"].drives.values())), shop.session.units
         axis = drive.family.units.axes(drive.state)[0]
@@ -204,10 +167,6 @@ async def test_a_setting_that_the_scale_rests_on_ends_the_units_in_every_output(
         assert figures_of(units.of(drive, axis), True) is NATIVE
         assert units.given(drive, axis, 1000) is None and units.words(drive, axis, 1000) == ""
         assert "not shown in units, as " in (await output(shop, "/units"))[0]
-        detach = attach(shop.session, plot, [Series("press", drive.address)], 0.5)
-        await asyncio.sleep(2)
-        detach()
-        assert drive.address in plot.samples and not {each for each in plot.units if each[0] == axis or not axis}
         await shop.session.run(f"/units {drive.address}{f'.{axis}' if axis else ''}")
         assert units.words(drive, axis, 1000) != ""
 

@@ -10,6 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from multidrop.base import registry
 from multidrop.base.errors import Diagnostic, TransportLost
 from multidrop.drives.events import Lost, Sample, Valued
 from multidrop.shell.events import By, OnBus
@@ -398,3 +399,13 @@ async def test_what_cannot_be_saved_has_one_line(
         await settle(pilot)
         assert why in app.screen.lines("below").plain
         assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.tui
+async def test_without_the_feature_of_files_nothing_is_asked_for(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(registry, "wheel", lambda name: None)
+    async with on_screen() as (pilot, app, session):
+        session.emit(*wave("a", session))
+        await press(pilot, "ctrl+g", "ctrl+s")
+        assert not isinstance(app.focused, Field)
+        assert "the feature plot_files is not there" in app.screen.lines("below").plain

@@ -5,12 +5,12 @@ A person sets a trigger, reads the cursors, and saves what is visible.
 
 from __future__ import annotations
 
+from collections.abc import Awaitable, Callable
 from math import isfinite
 
 from multidrop.base.errors import Diagnostic
-from multidrop.shell.plots.plot import write
-from multidrop.shell.plots.request import PlotTarget, parse_target
-from multidrop.shell.plots.rerun_calls import Batch, Curve
+from multidrop.shell import plot_targets
+from multidrop.shell.plots.batch import Batch, Curve
 from multidrop.shell.roles import DIFFERENCE
 from multidrop.tui.curves.chart import Look
 from multidrop.tui.curves.trigger import Setting, State
@@ -239,8 +239,13 @@ class PlotPage(AskingPage):
             self.action_trigger("single")
 
     def action_save(self) -> None:
-        self.ask_for("save", "", "FILE.csv or FILE.rrd")
-        self.say("save what is visible: FILE.csv or FILE.rrd", "dim")
+        try:
+            files = plot_targets.needed().files
+        except Diagnostic as failure:
+            self.say(f"✗ {failure}", "error")
+            return
+        self.ask_for("save", "", files)
+        self.say(f"save what is visible: {files}", "dim")
 
     def typed(self, text: str) -> None:
         asked, view = self.asked, self._view
@@ -249,24 +254,25 @@ class PlotPage(AskingPage):
             return
         try:
             if asked.kind == "save":
-                target, batch = parse_target(text, None), samples_of(view, self.lines("charts").size.width)
-                self.app.run_worker(self._save(target, batch))
-                self._close(f"saving {target.text} ...")
+                file, write = plot_targets.needed().save(text)
+                batch = samples_of(view, self.lines("charts").size.width)
+                self.app.run_worker(self._save(file, write, batch))
+                self._close(f"saving {file} ...")
             else:
                 self._look.arm(parse_trigger(view, text), asked.kind == "single", view.model.traces)
                 self._close("")
         except Diagnostic as failure:
             self.say(f"✗ {failure}", "error")
 
-    async def _save(self, target: PlotTarget, batch: Batch) -> None:
+    async def _save(self, file: str, write: Callable[[Batch], Awaitable[None]], batch: Batch) -> None:
         """Write the file; the outcome is on the page, and in the transcript also if the page was left."""
         try:
-            await write(target, batch)
+            await write(batch)
         except Diagnostic as failure:
             self.say(f"✗ {failure}", "error")
             self.host.show_line(str(failure), "x")
         else:
-            said = f"{sum(map(len, batch.curves.values()))} values of {len(batch.curves)} curves are in {target.text}"
+            said = f"{sum(map(len, batch.curves.values()))} values of {len(batch.curves)} curves are in {file}"
             self.say(said)
             self.host.show_line(said, ".")
         self.host.frames.wake()

@@ -8,9 +8,9 @@ from __future__ import annotations
 
 from typing import Any
 
+import multidrop.features.plot_files.plot
 import multidrop.features.publishing.feed
 import multidrop.features.twins.pair
-import multidrop.shell.plots.plot
 import multidrop.shell.prompt.terminal_input
 import multidrop.shell.scripts.executor
 import multidrop.shell.snapshots
@@ -20,7 +20,7 @@ import multidrop.shell.verbs.drives
 import multidrop.shell.verbs.macros
 import multidrop.shell.verbs.programs
 import multidrop.shell.verbs.session
-from multidrop.shell.plots.request import PlotTarget
+from multidrop.features.plot_files.request import PlotTarget
 
 
 class NoRecording:
@@ -43,6 +43,6 @@ def ignored(*_: object, **__: object) -> None:
 
 
 SEAMS: tuple[tuple[Any, str, Any], ...] = (
-    (multidrop.shell.plots.plot, "Sink", NoRecording),
+    (multidrop.features.plot_files.plot, "Sink", NoRecording),
     (multidrop.shell.prompt.terminal_input, "write", ignored),
 )

@@ -9,7 +9,6 @@ import socket
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from pathlib import Path
-from typing import Any
 
 import pytest
 
@@ -289,19 +288,3 @@ async def test_without_any_line_or_without_a_second_attempt_the_failure_is_raise
 async def test_a_wrong_url_is_raised_whatever_opens(session: Session, tmp_path: Path) -> None:
     with pytest.raises(Diagnostic, match="gone.toml"):
         await open_lines(session, [url(tmp_path, "here"), url(tmp_path, "gone")], later=True)
-
-
-async def test_published_values_have_the_unit_as_a_further_field(tmp_path: Path) -> None:
-    async with CellSession(tmp_path, bus("press", party("a", 'units = "5 mm/turn"'), party("b"))) as shop:
-        await shop.session.run("@a MR {10 mm}")
-        await shop.session.run("/wait stopped")
-        async with published(shop) as broker:
-            await asyncio.sleep(6)
-        last: dict[str, Any] = json.loads(broker.texts("p/press/a/position")[-1])
-        assert {key: last[key] for key in ("value", "quantity", "unit")} == {
-            "value": 102400,
-            "quantity": 10.0,
-            "unit": "mm",
-        }
-        assert json.loads(broker.texts("p/press/a/velocity")[-1])["unit"] == "mm/s"
-        assert set(json.loads(broker.texts("p/press/b/position")[-1])) == {"time", "value"}

@@ -8,12 +8,12 @@ from typing import Any
 
 import pytest
 
+from multidrop.base import registry
 from multidrop.base.errors import Diagnostic, Refused
-from multidrop.drives.events import Sample, Valued
+from multidrop.drives.events import Valued
 from multidrop.drives.telemetry import Value
 from multidrop.shell.events import OnBus
-from multidrop.shell.plots.plot import attach
-from multidrop.shell.plots.request import parse_series
+from multidrop.shell.plots.series import parse_series
 from multidrop.shell.roles import Series
 from tests.support.cell_session import ETHERNET, CellSession, bus, party, pmx
 
@@ -92,11 +92,19 @@ async def test_a_plot_on_the_screen_reads_each_value_once_and_shows_the_page(tmp
         assert cell.session.plotted == ()
 
 
-async def test_without_a_screen_a_plot_needs_a_target(tmp_path: Path) -> None:
+@pytest.mark.parametrize("line", ["/plot --to x.csv", "/plot b --serve 9876", "/plot rerun+http://pc:9876/proxy"])
+async def test_without_its_feature_a_target_is_one_line(
+    tmp_path: Path, line: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(registry, "wheel", lambda name: None)
     async with two_lines(tmp_path) as cell:
-        with pytest.raises(Diagnostic, match="no screen to plot on; valid here: --to FILE.rrd"):
+        with pytest.raises(Diagnostic, match="the feature plot_files is not there; install multidrop again, whole"):
+            await cell.session.run(line)
+        with pytest.raises(Diagnostic, match="no screen to plot on$"):
             await cell.session.run("/plot b")
-        assert cell.session.plotted == ()
+        Screen(cell)
+        await cell.session.run("/plot b")
+        assert cell.session.plotted == (Series("press", "b"),)
 
 
 async def test_a_variable_that_no_program_declares_is_not_asked_for(tmp_path: Path) -> None:
@@ -203,29 +211,3 @@ async def test_other_families(tmp_path: Path, drive: str, endpoint: str, word: s
         values = {each[2] for each in read(cell)}
         assert len(read(cell)) > 10 and len(values) == 1 and (value is None or values == {value})
         assert cell.warned() == []
-
-
-async def test_where_the_most_is_asked_for_states_take_little_of_the_wire(tmp_path: Path) -> None:
-    names = "abcd"
-    async with CellSession(tmp_path, bus("line", *(party(each, CK=0) for each in names), baud=115200)) as cell:
-        telemetry = cell.session.buses["line"].telemetry
-
-        async def samples(seconds: float) -> int:
-            before = sum(isinstance(each, OnBus) and isinstance(each.event, Sample) for each in cell.events)
-            await asyncio.sleep(seconds)
-            return sum(isinstance(each, OnBus) and isinstance(each.event, Sample) for each in cell.events) - before
-
-        bare = telemetry.subscribe(list(names), 0.0)
-        alone = await samples(1.5)
-        bare.close()
-        detach = attach(cell.session, Taken(), [Series("line", each) for each in names], 0.0)  # type: ignore[arg-type]
-        assert await samples(1.5) > 0.97 * alone
-        detach()
-        assert await samples(0.5) <= 1
-
-
-class Taken:
-    """A plot that takes everything."""
-
-    def __getattr__(self, name: str) -> Any:
-        return lambda *given: None

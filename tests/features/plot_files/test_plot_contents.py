@@ -12,10 +12,12 @@ import pytest
 from multidrop import read_rrd
 from multidrop.base.errors import Diagnostic
 from multidrop.drives.events import Sample, Valued
+from multidrop.features.plot_files.plot import Plot, attach
+from multidrop.features.plot_files.request import PlotTarget, parse_target
+from multidrop.features.plot_files.rerun_calls import DIFFERS, LINES, PALE, RUNS, drives_of, layout
 from multidrop.shell.events import Predicted
-from multidrop.shell.plots.plot import Plot, attach
-from multidrop.shell.plots.request import PlotTarget, parse_series, parse_target, read_first
-from multidrop.shell.plots.rerun_calls import DIFFERS, LINES, PALE, RUNS, TWIN, drives_of, layout
+from multidrop.shell.plots.batch import TWIN
+from multidrop.shell.plots.series import parse_series, read_first
 from multidrop.shell.roles import DIFFERENCE, Series
 from tests.support.cell_session import CellSession, bus, party
 from tests.support.plot_file import contents

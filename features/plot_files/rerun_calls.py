@@ -18,20 +18,17 @@ import secrets
 import socket
 import warnings
 from collections.abc import Iterable, Mapping, Sequence, Set
-from dataclasses import dataclass, field, replace
-from typing import Any, NamedTuple
+from dataclasses import replace
+from typing import Any
 
 from multidrop.base.errors import Diagnostic
 from multidrop.base.files import why
-from multidrop.shell.plots.file import APPLICATION, FLUSH, GAP, RecordingFile, SinkBroken
-from multidrop.shell.plots.request import PlotTarget, bracketed
+from multidrop.features.plot_files.file import APPLICATION, FLUSH, GAP, RecordingFile, SinkBroken
+from multidrop.features.plot_files.request import PlotTarget, bracketed
+from multidrop.shell.plots.batch import TWIN, UNITS, Batch, Curve, State
 from multidrop.shell.roles import DIFFERENCE
 from multidrop.transports import Unreachable
 
-UNITS = {"position": "steps", "velocity": "steps/s", DIFFERENCE: "steps"}
-"""The quantities of every drive, and the difference from its twin, with their units."""
-TWIN = "twin"
-"""The part of a path before the quantities of a twin; also its lane of states."""
 RUNS, AGREES, DIFFERS = "runs", "agrees", "differs"
 """The states of a twin: it runs, it agrees with its drive again, or the two differ."""
 STATE = "state"
@@ -136,64 +133,6 @@ def entity_path(rr: Any, *parts: str) -> str:
 
 
 _INSTALL = "pip install 'multidrop[rerun]'"
-
-
-class Curve(NamedTuple):
-    """One curve: `axis` is empty for a drive with one axis, `word` is `position`, `velocity` or a word of the drive.
-
-    `twin`: of its twin.
-    """
-
-    bus: str
-    address: str
-    axis: str
-    word: str
-    twin: bool = False
-    unit: str = ""
-    """The unit of a curve beside that of what the drive counts."""
-
-    @property
-    def name(self) -> str:
-        """`position`, or `position_mm`, `velocity_mm_per_s`."""
-        return f"{self.word}_{self.unit.replace('/', '_per_')}" if self.unit else self.word
-
-    @property
-    def shown_unit(self) -> str:
-        return self.unit or UNITS.get(self.word, "")
-
-    @property
-    def place(self) -> tuple[str, ...]:
-        return (*self[:3], *(TWIN,) * self.twin, self.name)
-
-    @property
-    def drive(self) -> tuple[str, ...]:
-        return tuple(part for part in self[:3] if part)
-
-
-class State(NamedTuple):
-    """One lane of states: a program, an error, an input or an output."""
-
-    bus: str
-    address: str
-    axis: str
-    name: str
-
-
-@dataclass
-class Batch:
-    """The samples and texts since the last flush; times are (elapsed, s; wall clock, s since 1970)."""
-
-    curves: dict[Curve, list[tuple[float, float, float]]] = field(default_factory=dict)
-    texts: dict[str, list[tuple[float, float, str, str]]] = field(default_factory=dict)
-    gaps: dict[Curve, list[tuple[float, float]]] = field(default_factory=dict)
-    """Times at which a curve ends; the next sample begins it again."""
-    states: dict[State, list[tuple[float, float, str]]] = field(default_factory=dict)
-    """Changes of state; an empty one is not known."""
-    labels: dict[tuple[str, str], str] = field(default_factory=dict)
-    """Drives that begin to be plotted, in order, with the names that people gave to them."""
-
-    def __bool__(self) -> bool:
-        return bool(self.curves or self.texts or self.gaps or self.states or self.labels)
 
 
 def load() -> Any:

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from html import escape
+from math import isfinite
 
-from multidrop.shell.session import Session as Shell
+from multidrop.api.drives import DriveFacts
+from multidrop.api.sessions import AsyncSession, Run
+from multidrop.api.telemetry import Sample, Samples
 
 ROWS = 200
 """The largest number of rows of a table."""
@@ -31,17 +34,49 @@ def _cell(text: str) -> str:
     return f"<td style='white-space:pre-wrap;text-align:left'>{escape(text)}</td>"
 
 
-def drives_table(shell: Shell) -> str:
+def of_run(run: Run) -> str:
+    """Return a table of the lines of a script."""
+    rows = [
+        (f"{result.line.number}", result.sent, "\n".join(result.printed) or result.error, f"{result.seconds:.3f}")
+        for result in run.results
+    ]
+    return table(run.file, ("line", "sent", "printed", "s"), rows)
+
+
+def of_session(session: AsyncSession) -> str:
     """Return the drives of a session: name, product, version, and the last reading of their velocity."""
+    if not session._calls.opened:
+        return "<p>multidrop: a closed session</p>"
     rows = []
-    for bus in shell.buses.values():
+    for bus in session._shell.buses.values():
         for drive in bus.all_drives:
             seen = "" if drive.seen is None else f"{drive.seen.velocity}"
             rows.append((bus.name, drive.address, drive.label, drive.product, drive.version, seen))
         if not bus.all_drives:
             rows.append((bus.name, "no drive", "", "", "", ""))
-    state = " (stopped)" if shell.latched else ""
+    state = " (stopped)" if session._shell.latched else ""
     return table(f"multidrop{state}", ("bus", "address", "name", "product", "version", "last velocity"), rows)
+
+
+def of_drive(drive: DriveFacts) -> str:
+    """Return what is known of a drive."""
+    seen = "" if drive._drive.seen is None else f"{drive._drive.seen.velocity}"
+    heads = ("drive", "axis", "product", "version", "last velocity")
+    return table("drive", heads, [(drive.name, drive.axis, drive.product, drive.version, seen)])
+
+
+def of_samples(samples: Samples) -> str:
+    """Return plots of position and velocity."""
+    return plot("position", _curves(samples, "position")) + plot("velocity", _curves(samples, "velocity"))
+
+
+def _curves(samples: Samples, field: str) -> Iterator[Curve]:
+    series: dict[tuple[str, str], list[Sample]] = {}
+    for row in samples:
+        series.setdefault((row.drive, row.axis), []).append(row)
+    for (drive, axis), rows in series.items():
+        finite = [row for row in rows if isfinite(getattr(row, field))]
+        yield f"{drive} {axis}".strip(), [row.elapsed for row in finite], [getattr(row, field) for row in finite]
 
 
 def plot(title: str, curves: Iterable[Curve]) -> str:

@@ -17,10 +17,11 @@ from pathlib import Path
 from typing import Any
 
 from multidrop.base.errors import Diagnostic
+from multidrop.base.parquet import pyarrow
 from multidrop.base.text import cell, visible
-from multidrop.shell.plots.file import GAP, Locked, SinkBroken, disk_full, pyarrow, synced
-from multidrop.shell.plots.request import PlotTarget
-from multidrop.shell.plots.rerun_calls import TWIN, Batch
+from multidrop.features.plot_files.file import GAP, Locked, SinkBroken, disk_full, synced
+from multidrop.features.plot_files.request import PlotTarget
+from multidrop.shell.plots.batch import TWIN, Batch
 
 COLUMNS = ("time", "elapsed", "bus", "drive", "axis", "name", "value", "unit", "text")
 """Time of day (UTC); seconds since the plot began; a quantity with its value and unit, or a state or a line with its

@@ -20,11 +20,12 @@ from multidrop.dialects.units import Takes
 from multidrop.dialects.values import UNREAD, Conditions
 from multidrop.drives.events import Conditioned, Lost, Sample, Unsolicited, Valued
 from multidrop.drives.telemetry import MODEST, USUAL, Subscription, Telemetry, Value
+from multidrop.features.plot_files.file import SinkBroken
+from multidrop.features.plot_files.request import TABLES, PlotTarget, shown
+from multidrop.features.plot_files.rerun_calls import AGREES, COLOURS, DIFFERS, RUNS, Sink
+from multidrop.features.plot_files.table import TableSink
 from multidrop.shell import events
-from multidrop.shell.plots.file import SinkBroken
-from multidrop.shell.plots.request import TABLES, PlotTarget, shown
-from multidrop.shell.plots.rerun_calls import AGREES, COLOURS, DIFFERS, RUNS, TWIN, Batch, Curve, Sink, State
-from multidrop.shell.plots.table import TableSink
+from multidrop.shell.plots.batch import TWIN, Batch, Curve, State
 from multidrop.shell.roles import DIFFERENCE, RunningPlot, Series
 from multidrop.shell.session import Session
 from multidrop.shell.threads import in_thread

@@ -18,8 +18,8 @@ import pytest
 
 from multidrop.base.errors import Diagnostic
 from multidrop.drives.events import Sample
-from multidrop.shell.plots.plot import Plot
-from multidrop.shell.plots.request import PlotTarget, parse_target
+from multidrop.features.plot_files.plot import Plot
+from multidrop.features.plot_files.request import PlotTarget, parse_target
 from multidrop.transports import Unreachable
 from tests.support.paths import ROOT
 from tests.support.until import PATIENCE
@@ -29,7 +29,9 @@ EPOCH = 1_800_000_000.0
 
 @pytest.mark.process
 def test_rerun_is_not_loaded_before_a_plot_is_asked_for() -> None:
-    code = "import sys, multidrop.shell.plots.plot; sys.exit('rerun' in sys.modules or 'pyarrow' in sys.modules)"
+    code = (
+        "import sys, multidrop.features.plot_files.plot; sys.exit('rerun' in sys.modules or 'pyarrow' in sys.modules)"
+    )
     assert subprocess.run([sys.executable, "-c", code], cwd=ROOT, timeout=PATIENCE).returncode == 0
 
 
@@ -188,9 +190,9 @@ CHILD = """
 import asyncio, os, sys
 from datetime import UTC, datetime
 from multidrop.drives.events import Sample
-from multidrop.shell.plots import plot as plots, rerun_calls
-from multidrop.shell.plots.plot import Plot
-from multidrop.shell.plots.request import parse_target
+from multidrop.features.plot_files import plot as plots, rerun_calls
+from multidrop.features.plot_files.plot import Plot
+from multidrop.features.plot_files.request import parse_target
 
 async def main(to, limit):
     if limit:

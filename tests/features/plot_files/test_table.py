@@ -11,11 +11,11 @@ import pytest
 
 from multidrop.base.errors import Diagnostic
 from multidrop.drives.events import Sample, Valued
-from multidrop.shell.plots import table
-from multidrop.shell.plots.plot import Plot, write
-from multidrop.shell.plots.request import PlotTarget
-from multidrop.shell.plots.rerun_calls import Batch, Curve
-from multidrop.shell.plots.table import COLUMNS
+from multidrop.features.plot_files import table
+from multidrop.features.plot_files.plot import Plot, write
+from multidrop.features.plot_files.request import PlotTarget
+from multidrop.features.plot_files.table import COLUMNS
+from multidrop.shell.plots.batch import Batch, Curve
 from tests.support.plot_file import contents
 
 ENDINGS = ["csv", "parquet"]
