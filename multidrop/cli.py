@@ -84,7 +84,11 @@ class Parser(argparse.ArgumentParser):
         named = given[:1] and given[0] in own
         if self.operation.run and not named:
             _check_options(self.operation.command, given)
-            add_arguments(self, with_options(self.operation.command, self.operation.arguments))
+            arguments = with_options(self.operation.command, self.operation.arguments)
+            if _unknown(given, arguments):
+                _load_others(given)
+                arguments = with_options(self.operation.command, self.operation.arguments)
+            add_arguments(self, arguments)
             _add_no_config(self)
             self.set_defaults(run_by=self.operation, command=self.operation.command)
         if own and (named or not self.operation.run):
@@ -138,6 +142,15 @@ class _Version(argparse.Action):
     def __call__(self, parser: argparse.ArgumentParser, *_: Any) -> None:
         sys.stdout.write(f"{version()}\n")
         parser.exit()
+
+
+def _unknown(given: Sequence[str], arguments: Mapping[str, Any]) -> bool:
+    """Whether a line has an option that no feature of the wheel declares, or asks for help: others may add one."""
+    known = {"--no-config"}
+    for notation, about in arguments.items():
+        inner = about if " | " in notation else [notation]
+        known |= {name for each in inner for name in each.partition(" ")[0].split("|")}
+    return any(each.startswith("-") and each.partition("=")[0] not in known for each in given)
 
 
 def _load_others(given: Sequence[str]) -> None:

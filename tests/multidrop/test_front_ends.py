@@ -118,27 +118,6 @@ def test_options_of_the_prompt_count_for_lines_from_a_file(piped: Callable[..., 
 # Plots and servers
 
 
-@for_each("words, place, given", [
-    (["plot", "a", "--to", "x.rrd"], "plots.command.run",
-     ("a", [], {"to": "x.rrd", "serve": None, "rate": "50", "reconnect": True})),
-    (["plot", "a", "--to", "x.rrd", "--drive", "all", "--no-reconnect"], "plots.command.run",
-     ("a", [], {"to": "x.rrd", "serve": None, "rate": "50", "reconnect": False})),
-    (["plot", "a", "--to", "x.csv", "--drive", "b", "--drive", "c", "--rate", "2"], "plots.command.run",
-     ("a", ["b", "c"], {"to": "x.csv", "serve": None, "rate": "2", "reconnect": True})),
-    (["plot", "a", "--to", "x.csv", "--drive", "b", "--drive", "all"], "plots.command.run",
-     ("a", [], {"to": "x.csv", "serve": None, "rate": "50", "reconnect": True})),
-])  # fmt: skip
-def test_what_serves_gets_its_arguments(
-    multidrop: Command, words: list[str], place: str, given: tuple[Any, ...]
-) -> None:
-    with pytest.MonkeyPatch.context() as patched:
-        served = Called(9)
-        patched.setattr(f"multidrop.shell.{place}", served)
-        assert multidrop(*words).returncode == 9
-    [call] = served.calls
-    assert repr(call) == repr(given)
-
-
 @for_each("words, given", [
     (["P", "--every", "1"], (["P"], "all", 1.0, 0, False, True)),
     (["P", "b.VM", "--every", "0.5", "--drive", "a", "--rows", "3"], (["P", "b.VM"], "a", 0.5, 3, False, True)),
@@ -148,7 +127,7 @@ def test_what_serves_gets_its_arguments(
 def test_a_poll_gets_its_arguments(multidrop: Command, words: list[str], given: tuple[Any, ...]) -> None:
     with pytest.MonkeyPatch.context() as patched:
         poll = Called(9)
-        patched.setattr("multidrop.shell.plots.command.poll", poll)
+        patched.setattr("multidrop.shell.plots.poll.poll", poll)
         assert multidrop("poll", "sim:", *words).returncode == 9
     [(url, asked, named)] = poll.calls
     assert url == "sim:" and (*asked, named["reconnect"]) == (given[0], given[1], given[2], asked[3], *given[4:])
@@ -246,14 +225,14 @@ PORTS = [PortInfo("/dev/ttyUSB0", "/dev/serial/by-id/x", "FT232"), PortInfo("/de
 
 
 def test_ports_are_listed_for_a_person_and_for_a_program(multidrop: Command, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("multidrop.transports.controllers.all_ports", lambda: PORTS)
+    monkeypatch.setattr("multidrop.shell.connect.schemes.local_ports", lambda: PORTS)
     assert multidrop("ports") == Done(0, "/dev/ttyUSB0  /dev/serial/by-id/x  FT232\n/dev/ttyS0\n", "")
     facts = [json.loads(line) for line in multidrop("ports", "--json").stdout.splitlines()]
     assert facts == [
         {"port": "/dev/ttyUSB0", "stable": "/dev/serial/by-id/x", "description": "FT232"},
         {"port": "/dev/ttyS0", "stable": "", "description": ""},
     ]
-    monkeypatch.setattr("multidrop.transports.controllers.all_ports", list)
+    monkeypatch.setattr("multidrop.shell.connect.schemes.local_ports", list)
     assert multidrop("ports") == Done(0, "", "no serial port was found; multidrop demo needs none\n")
     assert multidrop("ports", "--json") == Done(0, "", "")
 

@@ -37,8 +37,8 @@ VERBS = {
 
 TABLE = {
     ("--version",): NO_LINE | {"json", "pathlib"},
-    ("--help",): NO_LINE,  # it lists the commands by others
-    ("send", "--help"): NO_LINE | {"json", "pathlib"},
+    ("--help",): NO_LINE,  # it lists the commands by others, as that of a command its options by others
+    ("send", "--help"): NO_LINE,
     ("program", "check", "a.mxt"): NO_LINE
     | {
         "json",

@@ -267,9 +267,9 @@ def test_the_report_names_ports_and_the_files_of_the_state(
     file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     ports = [PortInfo("/dev/ttyUSB0", "by-id/x", "FT232"), PortInfo("/dev/ttyS0")]
-    monkeypatch.setattr("multidrop.transports.controllers.all_ports", lambda: ports)
+    monkeypatch.setattr("multidrop.shell.connect.schemes.local_ports", lambda: ports)
     assert lines("serial ports") == ["/dev/ttyUSB0  by-id/x  FT232", "/dev/ttyS0"]
-    monkeypatch.setattr("multidrop.transports.controllers.all_ports", list)
+    monkeypatch.setattr("multidrop.shell.connect.schemes.local_ports", list)
     assert lines("serial ports") == ["no serial port"]
     state = tmp_path / "state"
     assert lines("state folder") == [str(state)]
