@@ -1,7 +1,7 @@
 """Delete features in a copy of the tree, one at a time and all at once: everything else works. Run: `make seams`.
 
 In each copy every module is imported, and the front ends run on a simulated cell: `send`, the prompt, a script, a
-Python program, the screen. With all of them gone, the quick tests of the core run, too.
+Python program, the screen. With `--tests` and all of them gone, the quick tests of the core run, too.
 """
 
 from __future__ import annotations
@@ -76,17 +76,22 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Try all copies, or those that are named; return the number of those that do not work."""
     parser = argparse.ArgumentParser(prog="make seams", description=__doc__)
     parser.add_argument("names", nargs="*", help="features, or `all` (default: each, and all)")
+    parser.add_argument(
+        "--tests", action="store_true", help="without all features, run the quick tests of the core, too"
+    )
     parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1)
     chosen = parser.parse_args(arguments)
     names = chosen.names or [*IN_WHEEL, "all"]
     began = time.monotonic()
     with tempfile.TemporaryDirectory(prefix="seams-") as folder, ThreadPoolExecutor(chosen.jobs) as pool:
-        wrong = sum(not fine for fine in pool.map(lambda name: _tried(name, Path(folder)), reversed(names)))
+        wrong = sum(
+            not fine for fine in pool.map(lambda name: _tried(name, Path(folder), chosen.tests), reversed(names))
+        )
     print(f"{len(names) - wrong} of {len(names)} copies work, {time.monotonic() - began:.0f} s")
     return int(bool(wrong))
 
 
-def _tried(name: str, folder: Path) -> bool:
+def _tried(name: str, folder: Path, tests: bool) -> bool:
     """Delete a feature, or all, in a copy; say what does not work there."""
     tree = folder / name
     shutil.copytree(ROOT, tree, symlinks=True, ignore=LEFT_OUT)
@@ -107,7 +112,7 @@ def _tried(name: str, folder: Path) -> bool:
         ("the features", ("-m", "multidrop", "features"), ""),
         ("the screen", ("-c", SCREEN), ""),
     ]
-    if name == "all":
+    if name == "all" and tests:
         options = ("-q", "-p", "no:cacheprovider", "-p", "no:xdist", "--no-header", "--tb=short", "-W", "default")
         steps.append(("the quick tests of the core", ("-m", "pytest", *options, "-m", QUICK, *LEFT), ""))
     wrong = [f"{what}: {said}" for what, command, typed in steps if (said := _run(command, tree, typed))]
