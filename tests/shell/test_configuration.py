@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from multidrop.base import places
 from multidrop.base.errors import Diagnostic
-from multidrop.shell import configuration
+from multidrop.shell import configuration, line_syntax
 
 
 @pytest.fixture
@@ -219,3 +219,20 @@ def test_a_name_in_quotation_marks_has_its_line_too(folder):
     with pytest.raises(Diagnostic) as caught:
         configuration.load()
     assert caught.value.where.endswith("multidrop.toml:3") and "connections.a b: not a name" in str(caught.value)
+
+
+def test_a_value_that_is_kept_makes_its_table_and_leaves_the_rest(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("MULTIDROP_CONFIG_DIR", str(tmp_path))
+    path = configuration.keep("screen", "times", "last")
+    assert path.read_text(encoding="utf-8") == '[screen]\ntimes = "last"\n'
+    configuration.keep("screen", "signs", "ascii")
+    assert configuration.load().look.times == "last" and configuration.load().look.signs == "ascii"
+
+
+def test_lines_name_drives_only_where_every_one_does() -> None:
+    assert line_syntax.targets(["@a PR P", "/wait stopped", "@press:b PR P", "@a MR 1"]) == ("a", "press:b")
+    for other in ("PR P", "@* PR P", "@a PR 'P"):
+        found = line_syntax.targets(["@a PR P", other])
+        assert found == (("a",) if other.startswith("@a") else ())

@@ -1,0 +1,52 @@
+"""`multidrop features`: every feature with where it is from, and its state."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+import multidrop as package
+from multidrop.base import registry
+from multidrop.base.registry import IN_WHEEL
+from tests.support.front_door import Command
+
+
+@pytest.fixture(autouse=True)
+def unloaded(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in ("_others", "_failed"):
+        monkeypatch.setattr(registry, name, {})
+    monkeypatch.setattr(registry, "_untold", [])
+
+
+def own(folder: Path, name: str, text: str) -> Path:
+    path = folder / "conf" / "features" / f"{name}.py"
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(text)
+    return path
+
+
+GOOD = 'from multidrop.base.feature import Feature\nFEATURE = Feature("clamp", "holds things")\n'
+
+
+def test_a_persons_own_features_follow_those_of_the_wheel(multidrop: Command, tmp_path: Path) -> None:
+    clamp, bad = own(tmp_path, "clamp", GOOD), own(tmp_path, "bad", "raise SystemExit(3)")
+    done = multidrop("features", "--json")
+    rows = [json.loads(line) for line in done.stdout.splitlines()]
+    assert done.returncode == 0 and done.stderr == ""
+    assert [each["name"] for each in rows if each["source"] == "multidrop"] == [*IN_WHEEL]
+    assert {each["version"] for each in rows if each["source"] == "multidrop"} == {package.__version__}
+    assert [each for each in rows if each["source"] == str(clamp)] == [
+        {"name": "clamp", "source": str(clamp), "version": "", "state": "ready", "meaning": "holds things"}
+    ]
+    [failed] = [each for each in rows if each["source"] == str(bad)]
+    assert failed["state"] == "cannot be loaded: SystemExit: 3"
+    lines = multidrop("features").stdout.splitlines()
+    assert any(line.split() == ["clamp", str(clamp), "ready", "holds", "things"] for line in lines)
+
+
+def test_without_the_configuration_ones_own_files_are_not_listed(multidrop: Command, tmp_path: Path) -> None:
+    own(tmp_path, "clamp", GOOD)
+    assert "clamp" not in multidrop("features", "--no-config").stdout
+    assert "clamp" in multidrop("features").stdout
