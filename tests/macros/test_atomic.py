@@ -119,7 +119,7 @@ def test_a_new_file_has_its_mode_less_the_umask_and_an_old_one_keeps_its_own(tmp
         write_atomically(tmp_path / "a", b"1")
         write_atomically(tmp_path / "b", b"1", 0o604)
         assert [mode(tmp_path / name) for name in "ab"] == [0o640, 0o600]
-        for kept in (0o4751, 0o666, 0o600, 0o001 | 0o600):
+        for kept in (0o751, 0o666, 0o600, 0o001 | 0o600):
             (tmp_path / "a").chmod(kept)
             write_atomically(tmp_path / "a", b"2")
             assert mode(tmp_path / "a") == kept

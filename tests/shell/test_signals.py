@@ -121,5 +121,5 @@ def test_a_broken_pipe_of_the_process_counts_as_an_end() -> None:
         taker = next(each for each in threading.enumerate() if each.name == "signals")
         assert taker.daemon and taker.ident is not None
         signal.pthread_kill(taker.ident, signal.SIGPIPE)
-        assert came.wait(5)
+        assert any(came.wait(0.01) for _ in range(500)), "a handler runs between two steps of the main thread"
     assert signal.SIGPIPE not in signal.pthread_sigmask(signal.SIG_BLOCK, ())
