@@ -147,14 +147,6 @@ def words() -> tuple[str, ...]:
     return tuple(word for each in IN_WHEEL.values() for word in each)
 
 
-def with_forms_of(verb: str) -> Iterator[Feature]:
-    """The features that may add forms to a verb: those of the wheel that the table has with such words, and others'."""
-    for name, words in IN_WHEEL.items():
-        if any(word.startswith(f"{verb} ") for word in words) and (found := wheel(name)) is not None:
-            yield found
-    yield from by_others()
-
-
 # By others
 
 

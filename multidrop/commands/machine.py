@@ -21,6 +21,7 @@ from multidrop.base.text import visible
 from multidrop.macros import MacroStore
 from multidrop.shell import configuration
 from multidrop.shell.configuration import Settings
+from multidrop.shell.operations.table import load_others
 from multidrop.shell.secrets import holds_password, toml_without_secrets, url_without_secrets, without_secrets
 from multidrop.shell.sections import sections
 from multidrop.shell.streams.stdout import write
@@ -275,7 +276,9 @@ def features(chosen: argparse.Namespace) -> int:
     """List every feature. One that cannot be loaded is listed with its error; the exit code is 0 all the same."""
     import json
 
-    found = list(registry.states(multidrop.__version__, own=not configuration.IGNORED.get()))
+    own = not configuration.IGNORED.get()
+    load_others(own)  # their warnings are in the list
+    found = list(registry.states(multidrop.__version__, own=own))
     if chosen.json:
         for entry, meaning, state in found:
             facts = {"name": entry.name, "source": entry.source, "version": entry.version, "state": state}

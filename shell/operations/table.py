@@ -156,7 +156,7 @@ class Parts(Mapping[str, Operation]):
 
 def _forms(verb: str) -> Iterator[Forms]:
     """The forms that features add to a verb; none of them is imported for another name."""
-    for feature in registry.with_forms_of(verb) if verb.startswith("/") else ():
+    for feature in (*registry.with_words(f"{verb} "), *registry.by_others()) if verb.startswith("/") else ():
         yield from (each for each in feature.adds if isinstance(each, Forms) and each.verb == verb)
 
 
@@ -246,7 +246,12 @@ def _is_name(word: str) -> bool:
 
 
 def load_others(own: bool = True) -> list[str]:
-    """Load the features by others; return a warning for each that cannot be, or whose words are taken."""
+    """Load the features by others; return a warning, once, for each that cannot be or whose words are taken."""
+    _load_others(own)
+    return registry.warnings()
+
+
+def _load_others(own: bool) -> None:
     from multidrop.shell.connect.scheme import Scheme
     from multidrop.shell.connect.schemes import CORE
 
@@ -263,11 +268,17 @@ def load_others(own: bool = True) -> list[str]:
             registry.refuse(feature.name, why)
         else:
             taken.update(words)
-    return registry.warnings()
 
 
 def find(name: str) -> Operation:
-    """Find a verb by name. Raises Diagnostic with similar names."""
+    """Find a verb by name; one that is unknown may be of others, as a script is checked before a session opens.
+
+    Raises Diagnostic with similar names.
+    """
+    from multidrop.shell.configuration import IGNORED
+
+    if name not in VERBS and name not in SCRIPT_WORDS:
+        _load_others(own=not IGNORED.get())
     if name in VERBS:
         return VERBS[name]
     import difflib

@@ -50,3 +50,28 @@ def test_without_the_configuration_ones_own_files_are_not_listed(multidrop: Comm
     own(tmp_path, "clamp", GOOD)
     assert "clamp" not in multidrop("features", "--no-config").stdout
     assert "clamp" in multidrop("features").stdout
+
+
+VERB = """
+from multidrop.base.feature import Feature
+from multidrop.shell.operations.operation import Operation
+
+async def work(call):
+    call.session.output("hi")
+
+FEATURE = Feature("{name}", "says hi", adds=(Operation(usage="{verb}", help="Say hi.", work=work),))
+"""
+
+
+def test_one_whose_verb_is_taken_is_not_ready(multidrop: Command, tmp_path: Path) -> None:
+    own(tmp_path, "taken", VERB.format(name="taken", verb="/stop"))
+    assert "cannot be loaded: /stop is taken" in multidrop("features").stdout
+
+
+def test_a_script_is_checked_with_the_verbs_of_others(multidrop: Command, tmp_path: Path) -> None:
+    own(tmp_path, "hello", VERB.format(name="hello", verb="/hello"))
+    (tmp_path / "s.txt").write_text("/hello\n/helo\n")
+    refused = multidrop("run", "s.txt", "--on", "sim:#press")
+    assert refused.returncode == 2 and "s.txt:2: no verb /helo; try /hello" in refused.stderr
+    (tmp_path / "s.txt").write_text("/hello\n")
+    assert multidrop("run", "s.txt", "--on", "sim:#press")[:2] == (0, "hi\n")
