@@ -225,10 +225,17 @@ def schemes() -> dict[str, Scheme]:
 
 
 def named(name: str) -> Scheme | None:
-    """Find a scheme, without an import of other features; None: there is none. Raises Diagnostic where it is gone."""
+    """Find a scheme; None: there is none. Raises Diagnostic where its feature is gone.
+
+    One that multidrop does not have may be of others, who are loaded for it: a URL may be read before a session opens.
+    """
+    from multidrop.shell.configuration import IGNORED
+
     if name in CORE:
         return CORE[name]
     feature = registry.with_word(f"{name}:")
+    if feature is None:
+        registry.load_others(own=not IGNORED.get())
     for each in (feature,) if feature is not None else registry.by_others():
         for found in each.adds:
             if isinstance(found, Scheme) and found.name == name:
