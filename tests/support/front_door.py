@@ -204,3 +204,20 @@ def at_terminal(folder: Path, *words: str, closed: Sequence[str] = ()) -> Done:
             around.enter_context(mock.patch.object(sys, name, stream))
         code = main(words)
     return Done(code, streams["stdout"].getvalue(), streams["stderr"].getvalue())
+
+
+def on_lines(
+    folder: Path, monkeypatch: pytest.MonkeyPatch, captured: pytest.CaptureFixture[str]
+) -> Callable[..., Done]:
+    """Return a function that runs `multidrop shell` on lines from a file, beside `cell.toml` of the folder."""
+    monkeypatch.chdir(folder)
+    for name in ("CONFIG", "STATE", "DATA"):
+        monkeypatch.setenv(f"MULTIDROP_{name}_DIR", str(folder / name))
+
+    def run(lines: str, *options: str) -> Done:
+        (folder / "lines").write_text(lines)
+        with (folder / "lines").open() as stdin, mock.patch("sys.stdin", stdin):
+            code = main(["shell", "sim:cell.toml", *options])
+        return Done(code, *captured.readouterr())
+
+    return run
