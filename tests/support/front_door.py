@@ -17,6 +17,7 @@ from unittest import mock
 import pytest
 
 from multidrop.__main__ import main
+from multidrop.shell.batch import runner
 from tests.support.processes import Running, environment
 from tests.support.until import PATIENCE
 
@@ -221,3 +222,25 @@ def on_lines(
         return Done(code, *captured.readouterr())
 
     return run
+
+
+def change_before_opening(monkeypatch: pytest.MonkeyPatch, path: Path, text: str) -> None:
+    """Let another program write a file once a command has checked its files, and before anything is opened."""
+    run = runner.run
+
+    def changed(*given: object, **more: object) -> int:
+        path.write_text(text)
+        return run(*given, **more)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(runner, "run", changed)
+
+
+def tables(done: Done) -> dict[str, list[str]]:
+    """The lines of each table that `config show` prints."""
+    found: dict[str, list[str]] = {"": []}
+    for line in done.stdout.splitlines():
+        if line.startswith("["):
+            found[line] = []
+        elif line:
+            found[[*found][-1]].append(line)
+    return found

@@ -8,7 +8,14 @@ from pathlib import Path
 
 from multidrop.base.errors import Diagnostic, DriveError, TransportLost
 from multidrop.shell.events import By, Failed, Notified, Output, Printed
-from tests.support.cell_session import CellSession
+from tests.support.cell_session import CellSession, bus, drive, party, pmx
+
+PLANT = (
+    bus("press", party("a"), party("b"), baud=0),
+    bus("pmx", pmx("00"), baud=0),
+    bus("slide", drive("TMCM-1140", "1"), baud=0),
+)
+"""The lines on which transcripts are made."""
 
 _CHANGING = (
     (r"usage: .*", "usage: ..."),
@@ -38,6 +45,11 @@ def texts(shop: CellSession) -> list[str]:
         elif isinstance(event, Notified):
             found.append(f"{'!' if event.warning else '=' if event.outcome else '-'} {event.text}")
     return found
+
+
+def spoken(expected: list[str]) -> list[str]:
+    """Return the lines that were typed in a transcript."""
+    return [each.removeprefix("> ") for each in expected if each.startswith("> ")]
 
 
 async def transcript(shop: CellSession, lines: list[str], folder: Path) -> list[str]:
