@@ -36,6 +36,18 @@ POLLS = (
         for kind, text in (("sent", f"@00{sent}\r"), ("received", f"{reply}\r"))
     ),
 )
+ENTRIES = (
+    entry("log", "session log", "", ""),
+    entry("typed", "@b PR P", by="operator"),
+    entry("sent", "bPR P\n"),
+    entry("received", "\x065"),
+    entry("received", "12\r\n", after=1.0),
+    entry("printed", "512"),
+    entry("sent", "cPR V\n", drive="c", poll=True),
+    entry("failed", "b refused 'ZZ': error 60", after=2.0),
+    entry("typed", "/drives", "", ""),
+)
+"""A session with a refusal: pieces of one reply, a poll, a line for no drive."""
 
 
 def newest_log(folder: Path, monkeypatch: pytest.MonkeyPatch) -> Path:

@@ -47,11 +47,6 @@ def texts(shop: CellSession) -> list[str]:
     return found
 
 
-def spoken(expected: list[str]) -> list[str]:
-    """Return the lines that were typed in a transcript."""
-    return [each.removeprefix("> ") for each in expected if each.startswith("> ")]
-
-
 async def transcript(shop: CellSession, lines: list[str], folder: Path) -> list[str]:
     """Run lines; return each after `> `, with what was said. The folder is `DIR`, a time of day `TIME`."""
     found = []
@@ -65,3 +60,15 @@ async def transcript(shop: CellSession, lines: list[str], folder: Path) -> list[
         failed = [each.text for each in shop.events if isinstance(each, Failed)]
         assert failed == [] or len(failed) == 1, "a line fails once"
     return found
+
+
+async def compare(shop: CellSession, file: Path, folder: Path) -> None:
+    """Run the lines of a transcript: each says what is there, and nothing else.
+
+    With `SAID=renew` in the environment the file is written anew: look at each change.
+    """
+    expected = file.read_text(encoding="utf-8").splitlines()
+    found = await transcript(shop, [each.removeprefix("> ") for each in expected if each.startswith("> ")], folder)
+    if os.environ.get("SAID") == "renew":
+        file.write_text("\n".join([*found, ""]), encoding="utf-8")
+    assert found == expected

@@ -19,7 +19,7 @@ from multidrop.shell.plot_targets import OPTIONS
 from multidrop.shell.prompt.complete import complete
 from multidrop.shell.roles import Series
 from tests.support.cell_session import ETHERNET, CellSession, bus, party
-from tests.support.said import PLANT, spoken, transcript
+from tests.support.said import PLANT, compare
 
 pytestmark = pytest.mark.virtual
 
@@ -34,9 +34,8 @@ SAID = Path(__file__).with_name("said.txt")
 async def test_each_line_says_this_and_nothing_else(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Written as the files of `tests/shell/said`."""
     monkeypatch.chdir(tmp_path)
-    expected = SAID.read_text(encoding="utf-8").splitlines()
     async with CellSession(tmp_path, *PLANT) as shop:
-        assert await transcript(shop, spoken(expected), tmp_path) == expected
+        await compare(shop, SAID, tmp_path)
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from tests.support.cell_session import CellSession
-from tests.support.said import PLANT, spoken, transcript
+from tests.support.said import PLANT, compare
 
 pytestmark = pytest.mark.virtual
 SAID = Path(__file__).with_name("said.txt")
@@ -16,6 +16,5 @@ SAID = Path(__file__).with_name("said.txt")
 async def test_each_line_says_this_and_nothing_else(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Written as the files of `tests/shell/said`."""
     monkeypatch.chdir(tmp_path)
-    expected = SAID.read_text(encoding="utf-8").splitlines()
     async with CellSession(tmp_path, *PLANT) as shop:
-        assert await transcript(shop, spoken(expected), tmp_path) == expected
+        await compare(shop, SAID, tmp_path)
