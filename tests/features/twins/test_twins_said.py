@@ -17,4 +17,5 @@ async def test_each_line_says_this_and_nothing_else(tmp_path: Path, monkeypatch:
     """Written as the files of `tests/shell/said`."""
     monkeypatch.chdir(tmp_path)
     async with CellSession(tmp_path, *PLANT) as shop:
+        shop.session.questions.agreed = True
         await compare(shop, SAID, tmp_path)
