@@ -34,7 +34,7 @@ windows: $(VENV)/.dev
 # Cheap checks first, side by side: what is wrong is said early. The tests are last, so their summary ends the output.
 check: $(VENV)/.dev
 	$(MAKE) -j lint contracts types
-	$(MAKE) seams ONLY=all
+	$(MAKE) seams ONLY=all CHEAP=1
 	$(MAKE) measured
 
 lint: $(VENV)/.dev
@@ -71,9 +71,10 @@ map: $(VENV)/.dev
 	$(BIN)/python -m pytest --collect-only -q -m "$(QUICK)" $(TESTS) > $(VENV)/quick.txt
 	$(BIN)/python -m soak.drawn --measured $(VENV)/map $(VENV)/durations.txt $(VENV)/quick.txt $(if $(TESTS),--some)
 
-# Delete every feature, one at a time and all at once, in copies of the tree, and see that the rest works; ONLY="twins all": some.
+# Delete every feature, one at a time and all at once, in copies of the tree, and see that the rest works: modules, front ends
+# and quick tests. ONLY="twins all": some; CHEAP=1: without the tests, as `make check` has time for.
 seams: $(VENV)/.dev
-	$(BIN)/python -m soak.seams $(ONLY)
+	$(BIN)/python -m soak.seams $(ONLY) $(if $(CHEAP),--cheap)
 
 # Draw mutants of the product by a seed, and say which of them the tests and the seeds see: ROOM=drives N=100 SEED=7.
 mutants: $(VENV)/.dev

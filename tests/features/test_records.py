@@ -1,4 +1,4 @@
-"""Every feature of the wheel has a record, and the registry's table says what it answers to."""
+"""Every feature that is there has a record, and the registry's table says what it answers to."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from multidrop.shell.plot_targets import PlotTargets
 from multidrop.shell.relaying import Lent
 from multidrop.shell.sections import Section
 from multidrop.simulator.cell.endpoint_kinds import EndpointKind
-from tests.support.paths import ROOT
+from tests.support.paths import ROOT, THERE
 
 KINDS = (Operation, AtSession, Options, Forms, PlotTargets, Pictures, Section, Scheme, EndpointKind, Lent)
 FUNCTIONS: dict[type, tuple[str, ...]] = {PlotTargets: ("multidrop.read_rrd",), Pictures: ("Session.live",)}
@@ -26,10 +26,10 @@ FUNCTIONS: dict[type, tuple[str, ...]] = {PlotTargets: ("multidrop.read_rrd",), 
 
 def test_each_folder_and_file_of_the_room_is_in_the_table() -> None:
     found = {each.stem for each in (ROOT / "features").iterdir() if not each.name.startswith("_")}
-    assert found == set(IN_WHEEL)
+    assert found == set(THERE)
 
 
-@pytest.mark.parametrize("name", IN_WHEEL)
+@pytest.mark.parametrize("name", THERE)
 def test_the_table_has_the_words_that_the_record_answers_to(name: str) -> None:
     record = registry.wheel(name)
     assert record is not None and record.name == name and record.meaning

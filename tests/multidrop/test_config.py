@@ -7,7 +7,8 @@ import pytest
 import tomlkit
 
 from multidrop.__main__ import main
-from tests.support.front_door import command, read_to_end
+from tests.support.front_door import read_to_end
+from tests.support.leaving_cell import assert_allowed_by_configuration, write_leaving
 from tests.support.paths import ROOT
 from tests.support.processes import Running
 
@@ -101,15 +102,10 @@ def test_the_example_of_the_page_is_right(file, capsys):
     assert main(["config", "check"]) == 0, capsys.readouterr().err
 
 
-OWN = '[[bus]]\nname = "p"\nserve = ["pty:../p.tty"]\n[[bus.drive]]\npersonality = "LMDCM"\nprogram = "../feed.mxt"\n'
-
-
 @pytest.fixture
 def own_cell(tmp_path):
     """A folder with a cell whose paths leave the folder of the cell."""
-    (tmp_path / "cell").mkdir()
-    (tmp_path / "feed.mxt").write_text("PG 1\nLB G1\n PR 7\nE\nPG\n")
-    (tmp_path / "cell" / "own.toml").write_text(OWN)
+    write_leaving(tmp_path)
     return tmp_path
 
 
@@ -117,16 +113,9 @@ def test_paths_of_a_cell_leave_its_folder_where_the_configuration_allows_it(own_
     commands = (
         ("send", "sim:cell/own.toml", "PR P"),
         ("program", "test", "feed.mxt", "--cell", "cell/own.toml", "--run", "G1"),
-        ("program", "sweep", "feed.mxt", "--cell", "cell/own.toml", "--vary", "VM=20000", "--run", "G1"),
     )
     for each in commands:
-        refused = command(own_cell, *each)
-        assert refused.returncode == 2 and refused.stderr.count("\n") == 1
-        assert "simulator.allow in the configuration" in refused.stderr
-    (own_cell / "conf").mkdir(exist_ok=True)
-    (own_cell / "conf" / "multidrop.toml").write_text('[simulator]\nallow = ["../feed.mxt", "../p.tty"]\n')
-    for each in commands:
-        assert command(own_cell, *each).returncode == 0, each
+        assert_allowed_by_configuration(own_cell, *each)
 
 
 @pytest.mark.process
@@ -143,11 +132,11 @@ def test_paths_of_a_cell_leave_its_folder_where_its_server_is_given_allow(own_ce
 
 
 def test_a_list_of_the_configuration_that_is_none_is_one_line(file, capsys):
-    for text in ('[simulator]\nallow = "x"\n', "[sweep]\nclusters = [1]\n", "simulator = 1\n", "[sweep]\nx = 1\n"):
+    for text in ('[simulator]\nallow = "x"\n', "simulator = 1\n"):
         file.write_text(text)
         assert main(["config", "check"]) == 2
         [line] = capsys.readouterr().err.splitlines()
-        assert re.search(r"multidrop.toml:\d: .*(simulator|sweep)", line)
+        assert re.search(r"multidrop.toml:\d: .*simulator", line)
 
 
 def test_a_command_goes_on_without_the_file_and_names_what_is_not_in_force(file, capsys):
@@ -164,11 +153,3 @@ def test_a_command_goes_on_without_the_file_and_names_what_is_not_in_force(file,
         assert '"left"' not in shown.out and len(shown.err.splitlines()) == 1
         assert "the guards on EX" in shown.err and "the names of a" in shown.err
     assert main(["config", "show"]) == 2
-
-
-@pytest.mark.parametrize("given", [["share", "sim:#press", "--rfc2217", "0"], ["plant", "mqtt://127.0.0.1/plant"]])
-def test_a_command_that_serves_names_each_error_of_the_file_and_the_way_on(given, file, capsys):
-    file.write_text("[log]\nfiles = 0\n[screen]\nsigns = 5\n")
-    assert main([*given, "--json"]) == 2
-    said = capsys.readouterr().err
-    assert f"{file}:2: log.files" in said and f"{file}:4: screen.signs" in said and "--no-config" in said

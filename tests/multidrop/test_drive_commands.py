@@ -1,4 +1,4 @@
-"""`program list|diff|upload|download`, `params`, `snapshot` and `certify`, beside a drive that prints without end."""
+"""`program list|diff|upload|download`, `params` and `snapshot`, beside a drive that prints without end."""
 
 from __future__ import annotations
 
@@ -61,7 +61,6 @@ def objects(done: Done) -> list[dict[str, Any]]:
     ("params", "backup", "URL", "-", "--drive", "line:b"),
     ("params", "diff", "URL", "--drive", "line:a", "--other", "line:b"),
     ("params", "restore", "URL", "kept.toml", "--drive", "line:b", "--dry-run"),
-    ("certify", "URL", "-o", "-", "--drive", "pmx:07"),
 ])  # fmt: skip
 def test_what_another_drive_prints_meanwhile_is_not_in_what_a_program_reads(
     run: Command, words: tuple[str, ...]
@@ -250,7 +249,7 @@ def test_settings_of_another_product_are_restored_where_that_is_said(run: Comman
     assert run(*words, "--other-product").stdout == "line:b: RC=33 (was 25)\n"
 
 
-# Snapshots and reports
+# Snapshots
 
 
 def test_a_snapshot_of_one_drive_needs_no_name_and_of_several_it_does(run: Command) -> None:
@@ -272,17 +271,3 @@ def test_a_snapshot_is_applied_from_another_name_only_to_one_drive(run: Command,
     assert several == Done(2, "", "snapshot apply: --from b is for one drive; --drive names one\n")
     missing = run("snapshot", "apply", "two.toml", "sim:one.toml", "--dry-run")
     assert (missing.returncode, missing.stdout) == (2, "") and 'no drive "c"' in missing.stderr
-
-
-def test_a_report_is_of_one_drive_and_is_compared(run: Command, tmp_path: Path) -> None:
-    done = run("certify", URL, "-o", "r.toml", "--drive", "pmx:07")
-    assert done == Done(0, "", "pmx:07: 15 questions answered, 0 not asked in r.toml\n")
-    done = run("certify", URL, "--compare", "r.toml", "--drive", "pmx:07")
-    assert done == Done(0, "", "pmx:07: 15 of 15 answers of r.toml are the same\n")
-    changed = (tmp_path / "r.toml").read_text().replace('["?SAP"]', '["0"]')
-    (tmp_path / "r.toml").write_text(changed)
-    done = run("certify", URL, "--compare", "r.toml", "--drive", "pmx:07")
-    assert (done.returncode, done.stdout) == (1, "polarity-word: here ?SAP; in r.toml 0\n")
-    for names in (("all",), ("pmx:07", "line:a")):
-        several = run("certify", URL, "-o", "x.toml", *(word for name in names for word in ("--drive", name)))
-        assert several == Done(2, "", f"certify: --drive {','.join(names)}: a report is of one drive; name one\n")

@@ -8,23 +8,14 @@ from pathlib import Path
 import pytest
 
 import multidrop as package
-from multidrop.base import registry
 from multidrop.base.registry import IN_WHEEL
 from tests.support.front_door import Command
+from tests.support.own_features import forget_loaded, own
 
 
 @pytest.fixture(autouse=True)
 def unloaded(monkeypatch: pytest.MonkeyPatch) -> None:
-    for name in ("_others", "_failed"):
-        monkeypatch.setattr(registry, name, {})
-    monkeypatch.setattr(registry, "_untold", [])
-
-
-def own(folder: Path, name: str, text: str) -> Path:
-    path = folder / "conf" / "features" / f"{name}.py"
-    path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_text(text)
-    return path
+    forget_loaded(monkeypatch)
 
 
 GOOD = 'from multidrop.base.feature import Feature\nFEATURE = Feature("clamp", "holds things")\n'
@@ -75,25 +66,3 @@ def test_a_script_is_checked_with_the_verbs_of_others(multidrop: Command, tmp_pa
     assert refused.returncode == 2 and "s.txt:2: no verb /helo; try /hello" in refused.stderr
     (tmp_path / "s.txt").write_text("/hello\n")
     assert multidrop("run", "s.txt", "--on", "sim:#press")[:2] == (0, "hi\n")
-
-
-SCHEME = """
-from multidrop.base.feature import Feature
-from multidrop.shell.connect.scheme import Scheme
-from multidrop.transports import Unreachable
-
-class Can(Scheme):
-    name, prefix, example, meaning, port = "can", "can://", "can://HOST:29536", "a CAN gateway", 29536
-
-    async def open(self, connection, baud, within=None):
-        raise Unreachable(f"{connection.host}:{connection.port}: no gateway")
-
-FEATURE = Feature("can", "CAN gateways", adds=(Can(),))
-"""
-
-
-def test_a_url_of_others_is_known_before_a_session_opens(multidrop: Command, tmp_path: Path) -> None:
-    own(tmp_path, "can", SCHEME)
-    assert "no kind of connection can://" in multidrop("share", "can://pc", "--rfc2217", "0", "--no-config").stderr
-    shared = multidrop("share", "can://pc", "--rfc2217", "0")
-    assert (shared.returncode, shared.stderr) == (3, "pc:29536: no gateway\n")

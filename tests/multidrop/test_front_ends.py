@@ -20,7 +20,7 @@ from multidrop.shell.batch.virtual_loop import VirtualLoop
 from multidrop.transports.serial_ports import PortInfo
 from tests.support.cases import for_each
 from tests.support.cell_session import bus, party
-from tests.support.front_door import Called, Command, Done, at_terminal
+from tests.support.front_door import Called, Command, Done, at_terminal, on_lines
 
 CELL = bus("press", party("a", CK=0), party("b", CK=0), baud=0)
 
@@ -83,19 +83,8 @@ def test_the_prompt_gets_urls_and_options(person: Person, words: list[str], give
 @pytest.fixture
 def piped(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> Callable[..., Done]:
     """Run `multidrop shell` on lines from a file."""
-    monkeypatch.chdir(tmp_path)
-    for name in ("CONFIG", "STATE", "DATA"):
-        monkeypatch.setenv(f"MULTIDROP_{name}_DIR", str(tmp_path / name))
     (tmp_path / "cell.toml").write_text(CELL)
-
-    def run(lines: str, *options: str) -> Done:
-        (tmp_path / "lines").write_text(lines)
-        with (tmp_path / "lines").open() as stdin, pytest.MonkeyPatch.context() as patched:
-            patched.setattr(sys, "stdin", stdin)
-            code = main(["shell", "sim:cell.toml", *options])
-        return Done(code, *capfd.readouterr())
-
-    return run
+    return on_lines(tmp_path, monkeypatch, capfd)
 
 
 def test_lines_from_a_file_are_run_one_after_the_other(piped: Callable[..., Done]) -> None:
@@ -111,11 +100,9 @@ def test_options_of_the_prompt_count_for_lines_from_a_file(piped: Callable[..., 
     assert piped("@a IP\n", "--yes").returncode == 0
     raw, usual = piped("/drives\n", "--raw"), piped("/drives\n")
     assert "LMDCM" in usual.stdout and "LMDCM" not in raw.stdout + raw.stderr
-    beside, alone = piped("/twin\n", "--twin"), piped("/twin\n")
-    assert beside[1:] != alone[1:] and beside.returncode == 0
 
 
-# Plots and servers
+# Plots
 
 
 @for_each("words, given", [
@@ -132,22 +119,6 @@ def test_a_poll_gets_its_arguments(multidrop: Command, words: list[str], given: 
     [(url, asked, named)] = poll.calls
     assert url == "sim:" and (*asked, named["reconnect"]) == (given[0], given[1], given[2], asked[3], *given[4:])
     assert (asked[3] or 0) == given[3]
-
-
-@for_each("words, closed, screen", [
-    ([], None, True), (["--json"], None, False), ([], "stdin", False), ([], "stdout", False), ([], "stderr", False),
-])  # fmt: skip
-def test_a_plant_is_a_screen_at_a_terminal_and_lines_elsewhere(
-    person: Person, words: list[str], closed: str | None, screen: bool
-) -> None:
-    with pytest.MonkeyPatch.context() as patched:
-        shown, watched = Called(3), Called(4)
-        patched.setattr("multidrop.features.publishing.screen.run", shown)
-        patched.setattr("multidrop.features.publishing.watch.run", watched)
-        done = person("plant", "mqtt://h/plant", *words, closed=[closed] if closed else [])
-    assert done.returncode == (3 if screen else 4)
-    assert shown.calls == ([("mqtt://h/plant",)] if screen else [])
-    assert watched.calls == ([] if screen else [("mqtt://h/plant", {"as_json": bool(words)})])
 
 
 # A cell that is served
@@ -218,7 +189,7 @@ def test_a_relay_takes_no_url_no_person_and_no_port_of_windows(multidrop: Comman
     )
 
 
-# Ports, completion, the language server
+# Ports and completion
 
 
 PORTS = [PortInfo("/dev/ttyUSB0", "/dev/serial/by-id/x", "FT232"), PortInfo("/dev/ttyS0", "", "")]
@@ -242,45 +213,6 @@ def test_ports_are_listed_for_a_person_and_for_a_program(multidrop: Command, mon
 def test_a_completion_is_that_of_its_shell(multidrop: Command, shell: str, sign: str) -> None:
     done = multidrop("completion", shell)
     assert (done.returncode, done.stderr) == (0, "") and sign in done.stdout
-
-
-@for_each("words, closed, given, said", [
-    ([], ["stdin"], ("LMDCM", None), ""),
-    (["--personality", "MDI"], ["stdin"], ("MDI", None), ""),
-    ([], [], ("LMDCM", None), "multidrop lsp speaks to an editor, which starts it; see docs/editors.md\n"),
-    (["--tcp", "0"], [], ("LMDCM", ("127.0.0.1", 0)), ""),
-])  # fmt: skip
-def test_the_language_server_gets_its_arguments_and_a_person_is_told(
-    person: Person, words: list[str], closed: list[str], given: tuple[Any, ...], said: str
-) -> None:
-    with pytest.MonkeyPatch.context() as patched:
-        served = Called(1)
-        patched.setattr("multidrop.features.lsp.serving.serve", served)
-        assert person("lsp", *words, closed=closed) == Done(1, "", said) and served.calls == [given]
-
-
-class Without:
-    """An installation whose language server lacks a module."""
-
-    def __init__(self, missing: str) -> None:
-        self._missing = missing
-
-    def find_spec(self, name: str, *_: object) -> None:
-        if name == "multidrop.features.lsp.serving":
-            raise ModuleNotFoundError(f"No module named {self._missing!r}", name=self._missing)
-
-
-@for_each("missing, hint", [("pygls", True), ("pygls.server", True), ("lsprotocol", True), ("attrs", False)])
-def test_a_language_server_without_its_library_names_the_extra(person: Person, missing: str, hint: bool) -> None:
-    with pytest.MonkeyPatch.context() as patched:
-        patched.delitem(sys.modules, "multidrop.features.lsp.serving", raising=False)
-        patched.setattr(sys, "meta_path", [Without(missing), *sys.meta_path])
-        if not hint:
-            with pytest.raises(ModuleNotFoundError, match="attrs"):
-                person("lsp")
-            return
-        said = "the language server needs pygls, which is not installed; pipx install 'multidrop[lsp]'\n"
-        assert person("lsp") == Done(2, "", said)
 
 
 # Help on a word

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import pytest
 
-from multidrop.shell.batch import runner
 from tests.support.cell_session import bus, party
-from tests.support.front_door import Command
+from tests.support.front_door import Command, change_before_opening
 
 URL = "sim:cell.toml"
 GOOD = "PG 1\nLB G1\n MR 51200\n E\nPG\n"
@@ -30,16 +30,7 @@ Changes = Callable[[Path, str], None]
 @pytest.fixture
 def changes(monkeypatch: pytest.MonkeyPatch) -> Changes:
     """Let another program write a file once a command has checked its files, and before anything is opened."""
-    run = runner.run
-
-    def during(path: Path, text: str) -> None:
-        def changed(*given: object, **more: object) -> int:
-            path.write_text(text)
-            return run(*given, **more)  # type: ignore[arg-type]
-
-        monkeypatch.setattr(runner, "run", changed)
-
-    return during
+    return partial(change_before_opening, monkeypatch)
 
 
 @pytest.mark.parametrize("drive", ["a", "all"])
@@ -77,15 +68,6 @@ def test_settings_are_those_of_the_file_that_was_checked(multidrop: Command, tmp
     file.write_text("[parameters]\nVM = 500000\n")
     done = multidrop("params", "diff", URL, "p.toml", "--drive", "a")
     assert done.stdout.splitlines() == ["VM: here 768000, there 500000 steps/s"]
-
-
-def test_answers_are_compared_with_the_report_that_was_read(
-    multidrop: Command, tmp_path: Path, changes: Changes
-) -> None:
-    assert multidrop("certify", URL, "--drive", "a", "-o", "r.toml", "--yes").returncode == 0
-    changes(tmp_path / "r.toml", "wrong\n")
-    done = multidrop("certify", "--compare", "r.toml", URL, "--drive", "a", "--yes")
-    assert done.returncode == 0 and "are the same" in done.stderr
 
 
 def test_a_macro_plays_what_was_checked_with_the_macros_that_it_calls(

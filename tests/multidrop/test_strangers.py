@@ -59,9 +59,7 @@ def test_a_write_that_is_refused_or_lost_is_followed_by_nothing(multidrop: Comma
         assert "not known whether 'MA 100' was executed" in done.stderr
 
 
-@pytest.mark.parametrize(
-    "command", ["/status", "/wait stopped", "/wait idle", "/twin on", "PR AL", "/snapshot x.toml", "/list"]
-)
+@pytest.mark.parametrize("command", ["/status", "/wait stopped", "/wait idle", "PR AL", "/snapshot x.toml", "/list"])
 def test_what_multidrop_would_choose_to_read_is_refused(multidrop: Command, command: str) -> None:
     with device() as plc:
         done = multidrop("send", plc.url, "--yes", command)
@@ -76,9 +74,6 @@ def test_what_multidrop_would_choose_to_read_is_refused(multidrop: Command, comm
         "params diff {} have.toml",
         "snapshot {} -o x.toml",
         "snapshot apply cell.toml {} --yes",
-        "certify {} -o x.toml",
-        "certify {} -o x.toml --yes",
-        "plot {} --to x.csv",
         "program list {}",
     ],
 )

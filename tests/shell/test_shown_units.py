@@ -129,18 +129,6 @@ async def test_samples_of_the_api_have_the_unit_as_a_further_field(tmp_path: Pat
     assert len(last) == 6 and list(samples.arrays())[-1] == "velocity"
 
 
-async def test_a_twin_and_its_drive_are_apart_in_units_too(tmp_path: Path) -> None:
-    stalled = party("a", 'units = "5 mm/turn"', 'world = { stall_at = "1 mm" }', EE=1)
-    async with CellSession(tmp_path, bus("press", stalled)) as shop:
-        await shop.session.run("/twin on")
-        await shop.session.run("MR {4 mm}")
-        await asyncio.sleep(5)
-        said = [each.text for each in shop.events if isinstance(each, Notified) and "from its twin" in each.text]
-        rows = await output(shop, "/twin")
-    assert said and " mm) from its twin since " in said[0]
-    assert any("apart by -2400 steps (-3 mm)" in each for each in rows), rows
-
-
 # A scale that no longer holds
 
 

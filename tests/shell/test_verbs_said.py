@@ -1,26 +1,20 @@
-"""Transcripts of every verb: the files in `said` have each typed line after `> `, and below it all that is said.
+"""Transcripts of the verbs: the files in `said` have each typed line after `> `, and below it all that is said.
 
-`!` marks a warning, `=` an outcome, `-` another notice, and `x` the error that ends the line. With `SAID=renew` in
-the environment the files are written anew: look at each change.
+`!` marks a warning, `=` an outcome, `-` another notice, and `x` the error that ends the line. `SAID=renew` in the
+environment writes the files anew (`tests.support.said.compare`). Those of the features are beside their tests.
 """
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 
 import pytest
 
-from tests.support.cell_session import CellSession, bus, drive, party, pmx
-from tests.support.said import transcript
+from tests.support.cell_session import CellSession, bus, drive
+from tests.support.said import PLANT, compare
 
 pytestmark = pytest.mark.virtual
 
-PLANT = (
-    bus("press", party("a"), party("b"), baud=0),
-    bus("pmx", pmx("00"), baud=0),
-    bus("slide", drive("TMCM-1140", "1"), baud=0),
-)
 PLAIN = (bus("line", drive("LMDCM"), baud=0),)
 SCALES = {"a": {"scale": "5 mm/turn", "zero": "120 mm", "travel": "0..300 mm"}, "00.x": "1 mm/step"}
 FILES = {
@@ -40,13 +34,7 @@ async def test_each_line_says_this_and_nothing_else(tmp_path, monkeypatch, name)
     monkeypatch.chdir(tmp_path)
     for path, text in FILES.items():
         (tmp_path / path).write_text(text)
-    file = SAID / f"{name}.txt"
-    expected = file.read_text(encoding="utf-8").splitlines()
-    lines = [each.removeprefix("> ") for each in expected if each.startswith("> ")]
     units = SCALES if name in ("units", "travel") else {}
     async with CellSession(tmp_path, *(PLAIN if name == "steps" else PLANT), units=units) as shop:
         shop.session.questions.agreed = name not in NO
-        found = await transcript(shop, lines, tmp_path)
-    if os.environ.get("SAID") == "renew":
-        file.write_text("\n".join([*found, ""]), encoding="utf-8")
-    assert found == expected
+        await compare(shop, SAID / f"{name}.txt", tmp_path)

@@ -17,6 +17,7 @@ from unittest import mock
 import pytest
 
 from multidrop.__main__ import main
+from multidrop.shell.batch import runner
 from tests.support.processes import Running, environment
 from tests.support.until import PATIENCE
 
@@ -204,3 +205,42 @@ def at_terminal(folder: Path, *words: str, closed: Sequence[str] = ()) -> Done:
             around.enter_context(mock.patch.object(sys, name, stream))
         code = main(words)
     return Done(code, streams["stdout"].getvalue(), streams["stderr"].getvalue())
+
+
+def on_lines(
+    folder: Path, monkeypatch: pytest.MonkeyPatch, captured: pytest.CaptureFixture[str]
+) -> Callable[..., Done]:
+    """Return a function that runs `multidrop shell` on lines from a file, beside `cell.toml` of the folder."""
+    monkeypatch.chdir(folder)
+    for name in ("CONFIG", "STATE", "DATA"):
+        monkeypatch.setenv(f"MULTIDROP_{name}_DIR", str(folder / name))
+
+    def run(lines: str, *options: str) -> Done:
+        (folder / "lines").write_text(lines)
+        with (folder / "lines").open() as stdin, mock.patch("sys.stdin", stdin):
+            code = main(["shell", "sim:cell.toml", *options])
+        return Done(code, *captured.readouterr())
+
+    return run
+
+
+def change_before_opening(monkeypatch: pytest.MonkeyPatch, path: Path, text: str) -> None:
+    """Let another program write a file once a command has checked its files, and before anything is opened."""
+    run = runner.run
+
+    def changed(*given: object, **more: object) -> int:
+        path.write_text(text)
+        return run(*given, **more)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(runner, "run", changed)
+
+
+def tables(done: Done) -> dict[str, list[str]]:
+    """The lines of each table that `config show` prints."""
+    found: dict[str, list[str]] = {"": []}
+    for line in done.stdout.splitlines():
+        if line.startswith("["):
+            found[line] = []
+        elif line:
+            found[[*found][-1]].append(line)
+    return found

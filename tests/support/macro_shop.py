@@ -1,13 +1,19 @@
-"""A cell in a session that plays macros, with the results of what was played last."""
+"""A cell in a session that plays macros, with the results of what was played last; one line of a macro."""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Coroutine
 from pathlib import Path
+from typing import Any
+
+import pytest
 
 from multidrop.macros import Macro, Step
-from multidrop.shell.events import Entered
+from multidrop.shell.configuration import Settings
+from multidrop.shell.events import By, Entered
 from multidrop.shell.scripts.executor import play
 from multidrop.shell.scripts.model import Ending, Result
+from multidrop.shell.session import Session
 from tests.support.cell_session import CellSession, bus, party
 
 FLOOR = (bus("press", party("a"), party("b", VM=700000), baud=0), bus("gantry", party("c"), baud=0))
@@ -38,3 +44,20 @@ class Shop(CellSession):
     def begun(self) -> list[tuple[float, str]]:
         """When each line began."""
         return [(round(event.at, 1), event.line) for event in self.events if isinstance(event, Entered)]
+
+
+def macro_runner(folder: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., Coroutine[Any, Any, None]]:
+    """Work in the folder `here`, in which `out` leads out of it; return a function that runs a line, as of a macro."""
+    (folder / "here").mkdir()
+    (folder / "here" / "out").symlink_to(folder)
+    monkeypatch.chdir(folder / "here")
+
+    async def run(line: str, by: By = By.MACRO) -> None:
+        session = Session(Settings(folder=folder, state=folder))
+        try:
+            await session.open("sim:#press")
+            await session.run(line, by=by)
+        finally:
+            await session.close()
+
+    return run

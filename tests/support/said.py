@@ -8,7 +8,14 @@ from pathlib import Path
 
 from multidrop.base.errors import Diagnostic, DriveError, TransportLost
 from multidrop.shell.events import By, Failed, Notified, Output, Printed
-from tests.support.cell_session import CellSession
+from tests.support.cell_session import CellSession, bus, drive, party, pmx
+
+PLANT = (
+    bus("press", party("a"), party("b"), baud=0),
+    bus("pmx", pmx("00"), baud=0),
+    bus("slide", drive("TMCM-1140", "1"), baud=0),
+)
+"""The lines on which transcripts are made."""
 
 _CHANGING = (
     (r"usage: .*", "usage: ..."),
@@ -53,3 +60,15 @@ async def transcript(shop: CellSession, lines: list[str], folder: Path) -> list[
         failed = [each.text for each in shop.events if isinstance(each, Failed)]
         assert failed == [] or len(failed) == 1, "a line fails once"
     return found
+
+
+async def compare(shop: CellSession, file: Path, folder: Path) -> None:
+    """Run the lines of a transcript: each says what is there, and nothing else.
+
+    With `SAID=renew` in the environment the file is written anew: look at each change.
+    """
+    expected = file.read_text(encoding="utf-8").splitlines()
+    found = await transcript(shop, [each.removeprefix("> ") for each in expected if each.startswith("> ")], folder)
+    if os.environ.get("SAID") == "renew":
+        file.write_text("\n".join([*found, ""]), encoding="utf-8")
+    assert found == expected

@@ -64,5 +64,15 @@ async def test_sessions_drives_and_runs_are_escaped_tables(url: str, tmp_path: P
     assert "closed" in session._repr_html_()
 
 
+async def test_a_drive_is_a_table_with_what_is_known_of_it(url: str) -> None:
+    async with connect_async(url) as session:
+        a, y = session.drive("press:a"), session.drive("pmx:00", "y")
+        assert "<td style='white-space:pre-wrap;text-align:left'></td></tr>" in a._repr_html_(), "no velocity is known"
+        await a.run_at(1000)
+        await a.velocity()
+        assert f">{a.version}</td>" in a._repr_html_() and ">1000</td></tr>" in a._repr_html_()
+        assert ">y</td>" in y._repr_html_()
+
+
 def test_long_tables_are_cut() -> None:
     assert "and 50 more" in pictures.table("t", ["a"], [(str(each),) for each in range(pictures.ROWS + 50)])

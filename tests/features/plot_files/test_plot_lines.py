@@ -18,8 +18,8 @@ from multidrop.shell.operations.operation import Forms
 from multidrop.shell.plot_targets import OPTIONS
 from multidrop.shell.prompt.complete import complete
 from multidrop.shell.roles import Series
-from tests.support.cell_session import ETHERNET, CellSession, bus, drive, party, pmx
-from tests.support.said import transcript
+from tests.support.cell_session import ETHERNET, CellSession, bus, party
+from tests.support.said import PLANT, compare
 
 pytestmark = pytest.mark.virtual
 
@@ -29,20 +29,13 @@ def two_lines(folder: Path) -> CellSession:
 
 
 SAID = Path(__file__).with_name("said.txt")
-PLANT = (
-    bus("press", party("a"), party("b"), baud=0),
-    bus("pmx", pmx("00"), baud=0),
-    bus("slide", drive("TMCM-1140", "1"), baud=0),
-)
 
 
 async def test_each_line_says_this_and_nothing_else(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Written as the files of `tests/shell/said`."""
     monkeypatch.chdir(tmp_path)
-    expected = SAID.read_text(encoding="utf-8").splitlines()
     async with CellSession(tmp_path, *PLANT) as shop:
-        lines = [each.removeprefix("> ") for each in expected if each.startswith("> ")]
-        assert await transcript(shop, lines, tmp_path) == expected
+        await compare(shop, SAID, tmp_path)
 
 
 @pytest.mark.parametrize(

@@ -3,16 +3,13 @@
 import pytest
 
 from multidrop.base.errors import Diagnostic
-from multidrop.shell.configuration import Settings
 from multidrop.shell.events import By
-from multidrop.shell.session import Session
+from tests.support.macro_shop import macro_runner
 
 pytestmark = pytest.mark.virtual
 OUTSIDE = [
     "/log ../x.log",
     "/log out/x.log",
-    "/plot ~/x.rrd",
-    "/plot --to /tmp/x.rrd",
     "/list a /tmp/x.mxt",
     "/upload /tmp/x.mxt a",
 ]
@@ -20,19 +17,7 @@ OUTSIDE = [
 
 @pytest.fixture
 def session(tmp_path, monkeypatch):
-    (tmp_path / "here").mkdir()
-    (tmp_path / "here" / "out").symlink_to(tmp_path)
-    monkeypatch.chdir(tmp_path / "here")
-
-    async def run(line, by=By.MACRO):
-        session = Session(Settings(folder=tmp_path, state=tmp_path))
-        try:
-            await session.open("sim:#press")
-            await session.run(line, by=by)
-        finally:
-            await session.close()
-
-    return run
+    return macro_runner(tmp_path, monkeypatch)
 
 
 @pytest.mark.parametrize("line", OUTSIDE)
