@@ -13,9 +13,9 @@ import sys
 from pathlib import Path
 
 from soak.simulation import mutants
-from soak.simulation.climate import FAULTS
 from soak.simulation.figures import Figures
-from soak.simulation.judge import judged
+from soak.simulation.judges.judge import judged
+from soak.simulation.records.climate import FAULTS
 from soak.simulation.runs import STEPS, kept, lives, run, verdict
 from soak.simulation.shrinking import Life, shrunk
 from soak.simulation.story import whole
@@ -74,7 +74,7 @@ def _one(life: Life, whole: bool) -> int:
 
 def _show(life: Life) -> None:
     world = life.live(keep=True)
-    print("\n".join(readable(world)))
+    print("\n".join(readable(world.history)))
     for rule, text in judged(world).breaches:
         print(f"{rule.name} ({rule.sentence} docs/safety.md, {rule.promise!r}): {text}")
     print(f"again: {life.command}")

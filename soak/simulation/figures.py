@@ -6,8 +6,8 @@ import statistics
 from collections import Counter
 from collections.abc import Iterator
 
-from soak.simulation.climate import FAULTS
-from soak.simulation.history import Outcome
+from soak.simulation.records.climate import FAULTS
+from soak.simulation.records.commands import Outcome
 from soak.simulation.runs import WORD, Result
 
 BUT_FOR = ", but for "

@@ -24,15 +24,16 @@ from multidrop.features.usb import pipe as usb
 from multidrop.simulator import wire
 from multidrop.transports import pipe
 from soak.simulation.acts.seams import SEAMS
-from soak.simulation.climate import Climate
-from soak.simulation.clock import Deadlock, SimulatedLoop
-from soak.simulation.cut_ins import UP, CutIns
-from soak.simulation.disk import Disk
-from soak.simulation.history import History
-from soak.simulation.places import drawn_places
+from soak.simulation.lives import Lives
+from soak.simulation.records.climate import Climate
+from soak.simulation.records.history import History
+from soak.simulation.records.places import drawn_places
 from soak.simulation.story import tell
-from soak.simulation.threads import Scheduler
-from soak.simulation.wall import Wall
+from soak.simulation.system.clock import Deadlock, SimulatedLoop
+from soak.simulation.system.cut_ins import UP, CutIns
+from soak.simulation.system.disk import Disk
+from soak.simulation.system.threads import Scheduler
+from soak.simulation.system.wall import Wall
 from soak.simulation.world import World
 
 
@@ -65,12 +66,13 @@ def lived(seed: int, steps: Iterable[int], keep: bool = False, without: Collecti
         disk = Disk(f"{folder}/", loop, wall, climate, Random(f"{seed} disk"), partial(_noted, history, loop))
         cut_ins = CutIns(lambda name: history.count("stops held up" if name == UP else "cut-ins"), loop)
         world = World(seed, loop, history, climate, places, folder, wall, scheduler, disk, cut_ins)
+        lives = Lives(world)
 
         async def life() -> None:
-            await world.begin()
+            await lives.begin()
             for step in steps:
                 await tell(world, step)
-            await world.end()
+            await lives.end()
 
         with ExitStack() as stack:
             stack.enter_context(wall.installed())

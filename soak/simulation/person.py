@@ -10,6 +10,7 @@ import asyncio
 from collections import deque
 from collections.abc import Callable
 from contextvars import Context
+from dataclasses import dataclass
 from random import Random
 
 from multidrop.shell.events import StateChanged
@@ -17,9 +18,10 @@ from multidrop.shell.prompt.keyboard import STOP_KEY, Keyboard
 from multidrop.shell.prompt.line_queue import History, LineQueue
 from multidrop.shell.prompt.terminal_input import at_keyboard
 from multidrop.shell.session import Session
-from soak.simulation.clock import SimulatedLoop
-from soak.simulation.cut_ins import LATEST, Aim, CutIns
-from soak.simulation.process import Process
+from soak.simulation.records.places import Place
+from soak.simulation.system.clock import SimulatedLoop
+from soak.simulation.system.cut_ins import LATEST, Aim, CutIns
+from soak.simulation.system.process import Process
 
 PASTE = ("\x1b[200~", "\x1b[201~")
 """What a terminal puts around a text that is pasted."""
@@ -170,3 +172,20 @@ class Person:
         if isinstance(event, StateChanged) and self._stops != self._session.stops:
             self._stops = self._session.stops
             self.lines.stopped()
+
+
+@dataclass
+class Other:
+    """Another person, with a session of their own on a line that is shared. `stops`: how many they have typed."""
+
+    place: Place
+    session: Session
+    person: Person
+    opening: asyncio.Task[None]
+    stops: int = 0
+
+    async def leave(self) -> None:
+        """Close the session."""
+        await asyncio.wait([self.opening])
+        await self.person.leave()
+        await self.session.close()

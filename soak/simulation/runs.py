@@ -17,10 +17,10 @@ from pathlib import Path
 from typing import TextIO
 
 from multidrop import __version__
-from soak.simulation.judge import Judgement, judged
-from soak.simulation.process import Killed
+from soak.simulation.judges.judge import Judgement, judged
 from soak.simulation.shrinking import Life
 from soak.simulation.story import CREW, whole
+from soak.simulation.system.process import Killed
 from soak.simulation.world import World
 
 STEPS = 30

@@ -7,9 +7,9 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
-from soak.simulation.climate import Climate
-from soak.simulation.judge import judged
+from soak.simulation.judges.judge import judged
 from soak.simulation.living import lived
+from soak.simulation.records.climate import Climate
 from soak.simulation.world import World
 
 LONGEST = 60.0

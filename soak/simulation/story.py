@@ -9,149 +9,29 @@ from __future__ import annotations
 import asyncio
 import contextlib
 from random import Random
-from typing import TYPE_CHECKING
 
-from multidrop.base.errors import Diagnostic
-from soak.simulation import acts_connections
-from soak.simulation.act import Act
+from soak.simulation.acts.act import Act
 from soak.simulation.acts.automation import AUTOMATION
+from soak.simulation.acts.connections import CONNECTIONS
 from soak.simulation.acts.crews import AFTER_CREWS as LAST_CREWS
 from soak.simulation.acts.crews import CREWS
 from soak.simulation.acts.failing import FAILING
 from soak.simulation.acts.files import FILES
 from soak.simulation.acts.hand import HAND
+from soak.simulation.acts.machine import MACHINE
 from soak.simulation.acts.meetings import HELD_UP, MEETINGS
 from soak.simulation.acts.operators import OPERATORS
+from soak.simulation.acts.prompt import PROMPT
 from soak.simulation.acts.quitting import QUITTING
 from soak.simulation.acts.strangers import STRANGER
 from soak.simulation.acts.workshop_desk import DESK
 from soak.simulation.acts.workshop_ends import ENDS, PORT
-from soak.simulation.acts_kill import files, kill, power_cut
-from soak.simulation.bounds import sample
-from soak.simulation.cut_ins import drawn_aim
-from soak.simulation.process import Killed
+from soak.simulation.system.process import Killed
+from soak.simulation.watching.bounds import sample
+from soak.simulation.world import World
 
-if TYPE_CHECKING:
-    from soak.simulation.world import World
-
-STOP = b"\x18"
-
-
-def one_line(world: World, rng: Random) -> None:
-    """Type a command."""
-    world.person.type(world.command(rng), rng.choice((0.0, 0.0, 0.01)))
-
-
-def several_lines(world: World, rng: Random) -> None:
-    """Type several commands at once."""
-    world.person.type(b"".join(world.command(rng) for _ in range(rng.randrange(2, 5))), rng.choice((0.0, 0.02)))
-
-
-def stop(world: World, rng: Random) -> None:
-    """Type the stop key, before and after commands."""
-    before = b"".join(world.command(rng) for _ in range(rng.randrange(0, 3)))
-    before += world.command(rng)[: -rng.randrange(1, 4)] * (rng.random() < 0.2)  # Enter was not typed
-    world.stops += 1
-    after = world.command(rng) if rng.random() < 0.5 else b""
-    world.person.type(before + STOP + after, rng.choice((0.0, 0.01)))
-    world.person.type(b"/resume\r", 0.0)
-
-
-def paste(world: World, rng: Random) -> None:
-    """Paste several lines in brackets; the stop may come before their Enter, or right behind it."""
-    lines = b"".join(world.command(rng) for _ in range(rng.randrange(1, 5))).decode().replace("\r", rng.choice("\r\n"))
-    stops = rng.random() < 0.2
-    world.stops += stops
-    world.person.paste(lines, enter=rng.random() < 0.8 or not stops)
-    if stops:
-        world.person.type(STOP + b"/resume\r")
-
-
-def unread(world: World, rng: Random) -> None:
-    """Let nobody read the terminal for a while, or read a byte a second, and write much to it."""
-    world.terminal.reader(rng.random() ** 2 * 30, slow=rng.random() < 0.4)
-    world.person.type(b"/help\r/status\r" + b"".join(world.command(rng) for _ in range(rng.randrange(3))))
-
-
-def hang_up(world: World, rng: Random) -> None:
-    """Type some lines, and hang up the terminal in the middle of them."""
-    world.person.type(b"".join(world.command(rng) for _ in range(rng.randrange(3))), rng.choice((0.0, 0.02)))
-    process = world.process
-
-    def gone() -> None:
-        if world.process is process:
-            world.hang_up()
-
-    world.loop.call_later(rng.random() ** 2 * 0.5, gone)
-
-
-def stop_cuts_in(world: World, rng: Random) -> None:
-    """Type commands, and a stop that comes in the middle of the loop's work."""
-    world.person.type(b"".join(world.command(rng) for _ in range(rng.randrange(1, 4))), rng.choice((0.0, 0.01)))
-    world.stops += 1
-    world.person.type_stop(drawn_aim(rng, bool(world.kernel.usb.plugged)))
-    world.person.type(world.command(rng) * (rng.random() < 0.5) + b"/resume\r", 0.0)
-
-
-def starve(world: World, rng: Random) -> None:
-    """Let the loop do nothing for a while, in which a stop may come."""
-    if rng.random() < 0.7:
-        before = b"".join(world.command(rng) for _ in range(rng.randrange(0, 3)))
-        world.stops += 1
-        world.person.type(before + STOP, rng.choice((0.0, 0.3)))
-        world.person.type(b"/resume\r", 0.0)
-    world.loop.starve(rng.random() ** 2 * 10)
-
-
-def verb(world: World, rng: Random) -> None:
-    """Type a verb that reads or waits."""
-    world.person.type(rng.choice((b"/status\r", b"/wait stopped 3\r", b"/resume\r", b"\r", b"/sleep 0.2\r")), 0.0)
-
-
-def unplug(world: World, rng: Random) -> None:
-    """Pull the cable of a line, for a while."""
-    name = rng.choice(world.places).name
-    world.floor.command(f"/sim unplug {name}")
-    world.loop.call_later(rng.random() * 5, world.floor.command, f"/sim plug {name}")
-
-
-def power_off(world: World, rng: Random) -> None:
-    """Take the power of a drive away, for a while."""
-    place = rng.choice(world.places)
-    drive = f"{place.name}:{rng.choice(place.names)}"
-    with contextlib.suppress(Diagnostic):
-        world.floor.command(f"/sim power {drive} off")
-        world.loop.call_later(rng.random() * 5, world.floor.command, f"/sim power {drive} on")
-
-
-def clock_jumps(world: World, rng: Random) -> None:
-    """Let the clock of day jump."""
-    world.wall.jump(rng.uniform(-4000, 4000))
-
-
-ACTS = (
-    Act("a line", 55, one_line),
-    Act("several lines", 20, several_lines),
-    Act("stop", 4, stop),
-    Act("stop cuts in", 5, stop_cuts_in),
-    Act("paste", 4, paste),
-    Act("terminal unread", 1, unread, fault=True),
-    Act("terminal hangs up", 1, hang_up, fault=True),
-    Act("starve", 1, starve, fault=True),
-    Act("verb", 7, verb),
-    Act("power off", 4, power_off),
-    Act("files", 4, files),
-    Act("kill", 2, kill),
-    Act("PC power cut", 1, power_cut),
-    Act("unplug", 4, unplug, fault=True),
-    Act("clock jumps", 2, clock_jumps, fault=True),
-    *(Act(*each) for each in acts_connections.ACTS),
-    *AUTOMATION,
-    *FILES,
-    *HAND,
-)
-
-
+ACTS = (*PROMPT, *MACHINE, *CONNECTIONS, *AUTOMATION, *FILES, *HAND)
+"""Those of any step, each as often as it weighs."""
 AFTER_CREWS = (*LAST_CREWS, FAILING, FAILING)
 """The last of all, each once in its place."""
 MEETING = 0.3

@@ -6,17 +6,17 @@ from collections.abc import Iterator
 from itertools import groupby
 
 from multidrop.base.text import visible
-from soak.simulation.history import Command, Executed
-from soak.simulation.world import World
+from soak.simulation.records.commands import Command
+from soak.simulation.records.history import Executed, History
 
 WIDTH = 40
 """Characters of text beside which the hex stands."""
 BYTES = "<>"
 
 
-def readable(world: World) -> Iterator[str]:
+def readable(history: History) -> Iterator[str]:
     """The rows of a trace that was kept: what happened in its order, then each command with both records of it."""
-    for kind, rows in groupby(world.history.lines, key=lambda row: row[1]):
+    for kind, rows in groupby(history.lines, key=lambda row: row[1]):
         if kind != "key" and kind[0] not in BYTES:
             yield from (_row(at, kind, text) for at, _, text in rows)
             continue
@@ -26,17 +26,17 @@ def readable(world: World) -> Iterator[str]:
             continue
         yield _row(at, kind, f"{repr(data)[1:]:{WIDTH}} {data.hex(' ')}")
     yield ""
-    yield from _beliefs(world)
+    yield from _beliefs(history)
 
 
 def _row(at: float, kind: str, text: str) -> str:
     return f"{at:12.6f} {kind:9} {visible(text)}"
 
 
-def _beliefs(world: World) -> Iterator[str]:
+def _beliefs(history: History) -> Iterator[str]:
     """The host's word about each command, and the drive's own record."""
-    for each in world.history.commands.values():
-        executed = [f"{done.at:.6f}" for done in world.history.executed if _same(done, each)]
+    for each in history.commands.values():
+        executed = [f"{done.at:.6f}" for done in history.executed if _same(done, each)]
         drive = f"executed at {', '.join(executed)}" if executed else "did not execute it"
         host = f"the host: {each.outcome.value}" + f" ({each.said})" * bool(each.said and each.said != "()")
         yield f"{each.line}:{each.drive} {each.text!r}, typed at {each.typed:.6f}; {host}; the drive {drive}"

@@ -9,10 +9,11 @@ from random import Random
 import pytest
 
 from multidrop.transports.pipe import DescriptorPipe
-from soak.simulation.cut_ins import UP, Aim, CutIns, points
-from soak.simulation.judge import broken
+from soak.simulation.acts.prompt import stop_cuts_in
+from soak.simulation.judges.judge import broken
 from soak.simulation.living import lived
-from soak.simulation.story import ACTS, stop_cuts_in
+from soak.simulation.story import ACTS
+from soak.simulation.system.cut_ins import UP, Aim, CutIns, points
 from tests.support.paths import ROOT
 
 pytestmark = pytest.mark.fork

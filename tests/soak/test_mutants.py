@@ -11,7 +11,7 @@ import pytest
 
 from soak.simulation import mutants
 from soak.simulation.__main__ import main
-from soak.simulation.judge import RULES
+from soak.simulation.judges.judge import RULES
 from soak.simulation.mutants import Caught, applied, caught, head, names
 from tests.support.paths import ROOT
 

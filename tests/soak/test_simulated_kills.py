@@ -21,12 +21,12 @@ from multidrop.shell.configuration import Settings
 from multidrop.shell.log import files
 from multidrop.shell.prompt.line_queue import History
 from multidrop.shell.state.backups import write_backup
-from soak.simulation.climate import Climate
-from soak.simulation.clock import SimulatedLoop
-from soak.simulation.disk import Disk
-from soak.simulation.process import Killed, Process, operate
-from soak.simulation.threads import Scheduler
-from soak.simulation.wall import Wall
+from soak.simulation.records.climate import Climate
+from soak.simulation.system.clock import SimulatedLoop
+from soak.simulation.system.disk import Disk
+from soak.simulation.system.process import Killed, Process, operate
+from soak.simulation.system.threads import Scheduler
+from soak.simulation.system.wall import Wall
 
 CALM = Climate(1)
 

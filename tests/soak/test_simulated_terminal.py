@@ -6,10 +6,10 @@ from collections.abc import Callable
 
 import pytest
 
-from soak.simulation.climate import FAULTS, Climate
-from soak.simulation.history import Outcome
-from soak.simulation.judge import broken
+from soak.simulation.judges.judge import broken
 from soak.simulation.living import lived
+from soak.simulation.records.climate import FAULTS, Climate
+from soak.simulation.records.commands import Outcome
 from soak.simulation.story import ACTS
 from soak.simulation.world import World
 

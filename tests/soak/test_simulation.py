@@ -16,20 +16,21 @@ import pytest
 from soak.languages import LANGUAGES
 from soak.simulation import living, shrinking, story, world
 from soak.simulation.__main__ import main
-from soak.simulation.act import Act
-from soak.simulation.climate import FAULTS
-from soak.simulation.history import Command, Damage, Executed, Held, History, Outcome, Shown
-from soak.simulation.judge import RULES, Judgement, broken
+from soak.simulation.acts.act import Act
+from soak.simulation.judges.judge import RULES, Judgement, broken
+from soak.simulation.judges.outcomes import OUTCOMES
+from soak.simulation.judges.rule import Granted, Rule
 from soak.simulation.living import lived
-from soak.simulation.outcomes import OUTCOMES
-from soak.simulation.places import Place
-from soak.simulation.process import Killed
-from soak.simulation.rule import Granted, Rule
+from soak.simulation.records.climate import FAULTS
+from soak.simulation.records.commands import Command, Outcome
+from soak.simulation.records.history import Damage, Executed, Held, History, Shown
+from soak.simulation.records.places import Place
+from soak.simulation.records.told import Fact
 from soak.simulation.runs import STEPS, derived, lives, result, run
 from soak.simulation.seeds import DERIVED, FIXED
 from soak.simulation.shrinking import Life, shrunk
 from soak.simulation.story import AFTER, CREW, FIRST_JOB, WORKSHOP, whole
-from soak.simulation.told import Fact
+from soak.simulation.system.process import Killed
 from soak.simulation.trace import readable
 from tests.support.paths import ROOT
 from tests.support.until import PATIENCE
@@ -304,7 +305,7 @@ def test_a_failure_is_shrunk_to_the_steps_and_faults_that_it_needs(monkeypatch: 
 
 
 def test_a_trace_shows_keys_and_bytes_as_text_and_in_hex_and_both_records() -> None:
-    rows = "\n".join(readable(Life(1, tuple(range(10))).live(keep=True)))
+    rows = "\n".join(readable(Life(1, tuple(range(10))).live(keep=True).history))
     assert re.search(r"^ +\d+\.\d{6} key +'.*\\r' +[0-9a-f ]+$", rows, re.M)
     assert re.search(r"^ +\d+\.\d{6} > l\d +'.*' +[0-9a-f ]+$", rows, re.M)
     assert re.search(r"^l\d:.* '.*', typed at .*; the host: ok.*; the drive executed at \d", rows, re.M)

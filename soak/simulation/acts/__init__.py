@@ -1,1 +1,1 @@
-"""Everything that a person does at the prompt besides single lines: macros, files, questions, raw mode."""
+"""What can happen in a step of a story; `story` lists all of it."""

@@ -8,19 +8,17 @@ import json
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from random import Random
-from typing import TYPE_CHECKING
 
 from multidrop.shell.events import FAILURES
 from multidrop.shell.scripts.executor import run_script
 from multidrop.shell.scripts.reading import read_script
-from soak.simulation.act import Act
-from soak.simulation.acts.phrases import PHRASES, STOP, Phrases, drawn, number, target
-from soak.simulation.acts.watching import watched
-from soak.simulation.history import Command
-from soak.simulation.told import Guarded, Line, Run
-
-if TYPE_CHECKING:
-    from soak.simulation.world import World
+from soak.simulation.acts.act import Act
+from soak.simulation.acts.drawing import drawn, number, target
+from soak.simulation.records.commands import Command
+from soak.simulation.records.phrases import PHRASES, STOP, Phrases
+from soak.simulation.records.told import Guarded, Line, Run
+from soak.simulation.watching.path import watched
+from soak.simulation.world import World
 
 CTRL_C = b"\x03"
 ENDS: Sequence[tuple[float, bytes]] = ((5, b""), (2, STOP), (2, CTRL_C), (1, b"/play stop\r"), (1, b"/stop\r"))

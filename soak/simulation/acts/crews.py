@@ -12,23 +12,22 @@ from collections.abc import Mapping
 from contextvars import copy_context
 from dataclasses import replace
 from random import Random
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from multidrop.shell.events import FAILURES
-from soak.simulation.act import Act
+from soak.simulation.acts.act import Act
 from soak.simulation.acts.automation import Lines, later, motion, pause, refused, setting, tell
+from soak.simulation.acts.connections import another
+from soak.simulation.acts.drawing import number, target
 from soak.simulation.acts.files import download
 from soak.simulation.acts.guests import half_line
-from soak.simulation.acts.phrases import PHRASES, STOP, number, target
-from soak.simulation.acts_connections import another
-from soak.simulation.cut_ins import OWN_WORK, WRITING, Aim, points
-from soak.simulation.history import Command
-from soak.simulation.process import Killed
-from soak.simulation.told import Run
-
-if TYPE_CHECKING:
-    from soak.simulation.places import Place
-    from soak.simulation.world import World
+from soak.simulation.records.commands import Command
+from soak.simulation.records.phrases import PHRASES, STOP
+from soak.simulation.records.places import Place
+from soak.simulation.records.told import Run
+from soak.simulation.system.cut_ins import OWN_WORK, WRITING, Aim, points
+from soak.simulation.system.process import Killed
+from soak.simulation.world import World
 
 AT_ONCE = 0.002
 """The time in which a session writes down what it owes, s."""

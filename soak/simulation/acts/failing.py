@@ -9,19 +9,17 @@ from __future__ import annotations
 import asyncio
 import contextlib
 from random import Random
-from typing import TYPE_CHECKING
 
 from multidrop.shell.events import FAILURES
 from multidrop.shell.scripts.executor import run_script
 from multidrop.shell.scripts.reading import read_script
-from soak.simulation.act import Act
+from soak.simulation.acts.act import Act
 from soak.simulation.acts.automation import Lines, tell
-from soak.simulation.acts.phrases import PHRASES, number, target
-from soak.simulation.acts.watching import watched
-from soak.simulation.told import Awaited, Run
-
-if TYPE_CHECKING:
-    from soak.simulation.world import World
+from soak.simulation.acts.drawing import number, target
+from soak.simulation.records.phrases import PHRASES
+from soak.simulation.records.told import Awaited, Run
+from soak.simulation.watching.path import watched
+from soak.simulation.world import World
 
 LEXIUM = ("mcode", "modbus")
 CLOSED = ("LMDCM", "LMDCE")

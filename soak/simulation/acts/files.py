@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 from random import Random
-from typing import TYPE_CHECKING
 
-from soak.simulation.act import Act
+from soak.simulation.acts.act import Act
 from soak.simulation.acts.automation import end, later, tell
-from soak.simulation.acts.phrases import PHRASES, STOP, drawn, number, target
-from soak.simulation.told import Download, Guarded, Line, Run
-
-if TYPE_CHECKING:
-    from soak.simulation.world import World
+from soak.simulation.acts.drawing import drawn, number, target
+from soak.simulation.records.phrases import PHRASES, STOP
+from soak.simulation.records.told import Download, Guarded, Line, Run
+from soak.simulation.world import World
 
 ANSWERS = (b"y", b"y", b"y", b"n", b"\r", b"\x1b", b"\x03", STOP, b"")
 EARLY = 0.1

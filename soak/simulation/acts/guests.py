@@ -9,11 +9,11 @@ from multidrop.dialects.tmcl.host import codec
 from multidrop.dialects.tmcl.manual import commands
 from multidrop.features.sharing.writer_turns import SILENT
 from multidrop.simulator.lexium.ports.replies import checksum
+from soak.simulation.records.places import Place
+from soak.simulation.world import World
 
 if TYPE_CHECKING:
     from multidrop.features.sharing.server import SharedPort
-    from soak.simulation.places import Place
-    from soak.simulation.world import World
 
 QUIET = SILENT + 1.0
 """The time in which nobody writes, so that the guest may, s."""

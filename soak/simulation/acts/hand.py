@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 from random import Random
-from typing import TYPE_CHECKING
 
-from soak.simulation.act import Act
+from soak.simulation.acts.act import Act
 from soak.simulation.acts.automation import later
+from soak.simulation.acts.drawing import drawn, number, target
 from soak.simulation.acts.files import answered
-from soak.simulation.acts.phrases import PHRASES, STOP, drawn, number, target
-from soak.simulation.history import Command
-from soak.simulation.told import Line
-
-if TYPE_CHECKING:
-    from soak.simulation.world import World
+from soak.simulation.records.commands import Command
+from soak.simulation.records.phrases import PHRASES, STOP
+from soak.simulation.records.told import Line
+from soak.simulation.world import World
 
 VERBS = (
     "/drives",

@@ -7,20 +7,17 @@ One seed in three has them beside the others: see `story.tell`. One in five has 
 from __future__ import annotations
 
 from random import Random
-from typing import TYPE_CHECKING
 
 from soak.languages import LANGUAGES
-from soak.simulation.act import Act
+from soak.simulation.acts.act import Act
 from soak.simulation.acts.automation import later, macro, script
 from soak.simulation.acts.files import download
-from soak.simulation.acts.phrases import STOP
-from soak.simulation.bounds import sample
-from soak.simulation.history import Damage
-
-if TYPE_CHECKING:
-    from soak.simulation.places import Place
-    from soak.simulation.ports import Port
-    from soak.simulation.world import World
+from soak.simulation.records.history import Damage
+from soak.simulation.records.phrases import STOP
+from soak.simulation.records.places import Place
+from soak.simulation.system.ports import Port
+from soak.simulation.watching.bounds import sample
+from soak.simulation.world import World
 
 REPEAT = 1 / 30
 """The time between two keys of one that is held down, s."""

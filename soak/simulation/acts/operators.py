@@ -9,17 +9,16 @@ One seed in five has them: see `story.tell`.
 from __future__ import annotations
 
 from random import Random
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from soak.simulation.act import Act
+from soak.simulation.acts.act import Act
 from soak.simulation.acts.automation import later
+from soak.simulation.acts.drawing import target
 from soak.simulation.acts.meetings import prints
-from soak.simulation.acts.phrases import STOP, target
-from soak.simulation.history import Command
-
-if TYPE_CHECKING:
-    from soak.simulation.places import Place
-    from soak.simulation.world import World
+from soak.simulation.records.commands import Command
+from soak.simulation.records.phrases import STOP
+from soak.simulation.records.places import Place
+from soak.simulation.world import World
 
 GAPS = (0.02, 0.3, 0.6, 1.0)
 """The time between two lines, s: most exchanges that fail take less than the longest."""

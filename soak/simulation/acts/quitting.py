@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 from random import Random
-from typing import TYPE_CHECKING
 
-from soak.simulation.act import Act
+from soak.simulation.acts.act import Act
 from soak.simulation.acts.automation import later
-from soak.simulation.acts.phrases import STOP
-from soak.simulation.told import Quit
-
-if TYPE_CHECKING:
-    from soak.simulation.world import World
+from soak.simulation.records.phrases import STOP
+from soak.simulation.records.told import Quit
+from soak.simulation.world import World
 
 QUITS = ("/quit", "/exit")
 LONG = 12.0

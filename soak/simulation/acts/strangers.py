@@ -12,7 +12,6 @@ import contextlib
 from collections.abc import Awaitable, Callable
 from contextvars import copy_context
 from random import Random
-from typing import TYPE_CHECKING
 
 from multidrop.dialects.modbus.host.framing import READ_REGISTERS, WRITE_REGISTERS
 from multidrop.dialects.modbus.manual.registers import REGISTERS
@@ -20,12 +19,10 @@ from multidrop.shell.channel import Front
 from multidrop.shell.configuration import Settings
 from multidrop.shell.events import FAILURES, By
 from multidrop.shell.session import Session
-from soak.simulation.act import Act
-from soak.simulation.kernel import WHO
-from soak.simulation.told import Strange
-
-if TYPE_CHECKING:
-    from soak.simulation.world import World
+from soak.simulation.acts.act import Act
+from soak.simulation.records.told import Strange
+from soak.simulation.system.kernel import WHO
+from soak.simulation.world import World
 
 HOST = "stranger.plant"
 PORT = 502

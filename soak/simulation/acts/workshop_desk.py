@@ -7,17 +7,15 @@ import re
 from functools import partial
 from pathlib import Path
 from random import Random
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from multidrop.drives.events import Sample
 from multidrop.shell.events import OnBus, Printed
 from multidrop.simulator.cell.spec import Faults
-from soak.simulation.act import Act
-from soak.simulation.acts.phrases import PHRASES
-from soak.simulation.workshop import LINE, Workshop, at_work, workshop
-
-if TYPE_CHECKING:
-    from soak.simulation.world import World
+from soak.simulation.acts.act import Act
+from soak.simulation.acts.workshop import LINE, Workshop, at_work, workshop
+from soak.simulation.records.phrases import PHRASES
+from soak.simulation.world import World
 
 NAMES = {"mcode": ("a", "b"), "pmx": ("01", "02"), "tmcl": ("1", "2")}
 FIRST = 42_000_000

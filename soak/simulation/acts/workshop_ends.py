@@ -7,17 +7,15 @@ import json
 from collections.abc import Callable
 from random import Random
 from types import SimpleNamespace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 from unittest import mock
 
 from multidrop.simulator.cell.spec import Faults
-from soak.simulation.act import Act
-from soak.simulation.acts.watching import STOPPED_TOO
-from soak.simulation.told import NEAR, SHORT
-from soak.simulation.workshop import LINE, SETTLED, Workshop, at_work, workshop
-
-if TYPE_CHECKING:
-    from soak.simulation.world import World
+from soak.simulation.acts.act import Act
+from soak.simulation.acts.workshop import LINE, SETTLED, Workshop, at_work, workshop
+from soak.simulation.records.told import NEAR, SHORT
+from soak.simulation.watching.path import STOPPED_TOO
+from soak.simulation.world import World
 
 PARTY = ("a", "b", "c")
 BY_HAND = "SL 5000"
