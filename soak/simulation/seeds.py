@@ -1,4 +1,8 @@
-"""Seeds that every run lives: those that broke a rule once, each with what it found. A seed joins with the mend."""
+"""Seeds that the tests live: the first ones and some of the commit in every run, those that broke a rule at night.
+
+A seed that broke a rule joins with its mend. An act or a fault that joins later gives every seed another story: then an
+old one is a seed as any other, so an ordinary run lives only the last ones.
+"""
 
 from __future__ import annotations
 
@@ -143,5 +147,9 @@ FIXED = {
     300170: "a stop on a line that was lost again as it came back (of the simulation itself)",
     8002337: "a stop of which a loop that was held up sent the other controllers nothing for four seconds",
 }
+EVERY = range(1, 21)
+"""Seeds of every run. `make mutants` lives the same."""
+LAST = 15
+"""The number of those that joined last, which every run lives, too."""
 DERIVED = 12
 """The number of seeds that follow from the commit."""

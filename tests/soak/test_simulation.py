@@ -27,7 +27,7 @@ from soak.simulation.records.history import Damage, Executed, Held, History, Sho
 from soak.simulation.records.places import Place
 from soak.simulation.records.told import Fact
 from soak.simulation.runs import STEPS, derived, lives, result, run
-from soak.simulation.seeds import DERIVED, FIXED
+from soak.simulation.seeds import DERIVED, EVERY, FIXED, LAST
 from soak.simulation.shrinking import Life, shrunk
 from soak.simulation.story import AFTER, CREW, FIRST_JOB, WORKSHOP, whole
 from soak.simulation.system.process import Killed
@@ -40,11 +40,17 @@ pytestmark = pytest.mark.fork
 SAFETY = (ROOT / "docs" / "safety.md").read_text()
 
 
-@pytest.mark.parametrize("seed", [*FIXED, *derived(DERIVED)])
+@pytest.mark.parametrize("seed", sorted({*EVERY, *[*FIXED][-LAST:]}) + derived(DERIVED))
 def test_the_rules_hold(seed: int) -> None:
     world = lived(seed, whole(seed, STEPS))
     assert broken(world) == []
     assert world.history.commands
+
+
+@pytest.mark.nightly
+@pytest.mark.parametrize("seed", [*FIXED][:-LAST])
+def test_the_rules_hold_where_they_once_broke(seed: int) -> None:
+    assert broken(lived(seed, whole(seed, STEPS))) == []
 
 
 def test_the_acts_of_several_callers_follow_a_story_that_is_the_same_without_them() -> None:
