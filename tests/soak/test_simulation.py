@@ -132,7 +132,7 @@ def test_a_seed_gives_the_same_history_in_a_folder_with_a_longer_path(
 @pytest.mark.process
 @pytest.mark.nightly
 def test_a_seed_gives_the_same_history_in_another_process_with_other_hashes() -> None:
-    here = result(Life(3, tuple(range(20)))).line
+    here = result(Life(3, whole(3, 20))).line
     command = (sys.executable, "-m", "soak.simulation", "--seed", "3", "--steps", "20")
     there = subprocess.run(command, cwd=ROOT, env={"PYTHONHASHSEED": "77"}, capture_output=True, text=True, check=True)
     assert there.stdout.splitlines()[-1] == here
