@@ -12,6 +12,7 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Protocol
 
 from multidrop.base.errors import Diagnostic
+from multidrop.base.feature import Kinds
 from multidrop.base.text import whole
 
 if TYPE_CHECKING:
@@ -115,6 +116,14 @@ class Scheme:
     """It is opened by a login, of which each further failure costs more time."""
     turns = 0.0
     """The part of the time of an opening that a question and its reply take, at most; 0: of a port on this machine."""
+
+    def passes(self) -> Mapping[str, Kinds]:
+        """What its callers expect to be raised, besides what a person reads; see `base.foreign`."""
+        return {"open": (OSError,)}
+
+    def claims(self) -> tuple[str, ...]:
+        """What only one feature can add."""
+        return (f"{self.name}:",)
 
     # Text
 

@@ -229,18 +229,9 @@ def named(name: str) -> Scheme | None:
 
     One that multidrop does not have may be of others, who are loaded for it: a URL may be read before a session opens.
     """
-    from multidrop.shell.configuration import IGNORED
-
     if name in CORE:
         return CORE[name]
-    feature = registry.with_word(f"{name}:")
-    if feature is None:
-        registry.load_others(own=not IGNORED.get())
-    for each in (feature,) if feature is not None else registry.by_others():
-        for found in each.adds:
-            if isinstance(found, Scheme) and found.name == name:
-                return found
-    return None
+    return next((each for each in registry.answering(Scheme, f"{name}:") if each.name == name), None)
 
 
 def sentence() -> str:
@@ -258,4 +249,7 @@ def table() -> list[str]:
 def local_ports() -> Iterator[PortInfo]:
     """The ports of this machine, of all schemes. The search may be slow."""
     for each in schemes().values():
-        yield from each.ports()
+        try:
+            yield from each.ports()
+        except Diagnostic as problem:  # by others
+            registry.warn(str(problem))
