@@ -9,17 +9,18 @@ import argparse
 from collections.abc import Awaitable, Callable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, ExitStack, contextmanager, nullcontext
 from itertools import takewhile
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from multidrop.base import registry
 from multidrop.base.feature import Kinds
 from multidrop.shell.operations.operation import TYPE_RAISES
 
-Session = Any
-"""`shell.session.Session`, which knows this module."""
+if TYPE_CHECKING:
+    from multidrop.shell.session import Session
+
 App = Any
-"""`tui.app.MultidropApp`, which knows this module."""
-Prepare = Callable[[Session], None]
+"""`tui.app.MultidropApp`, of a room above this one; a feature's function names it, and mypy checks its body."""
+Prepare = Callable[["Session"], None]
 """Takes a session before a URL is opened."""
 Around = Callable[[App], AbstractContextManager[object]]
 """What is entered before a screen runs, and left after that."""

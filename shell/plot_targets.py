@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from multidrop.shell.plots.batch import Batch
 
 Call = Any
-"""`shell.verbs.call.Call`: verbs know this module."""
+"""`shell.verbs.call.Call`: verbs know this module. A feature's function names it, and mypy checks its body."""
 _PLOT = "/plot "
 
 

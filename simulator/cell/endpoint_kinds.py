@@ -11,7 +11,7 @@ from multidrop.base.feature import Kinds
 from multidrop.simulator.cell.spec import Endpoint
 
 Floor = Any
-"""`simulator.serving.running.RunningFloor`, which has an event loop; this module has none."""
+"""`simulator.serving.running.RunningFloor`, which has an event loop; this module has none. A function names it."""
 
 
 class EndpointKind(NamedTuple):
