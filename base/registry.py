@@ -61,7 +61,7 @@ IN_WHEEL: dict[str, tuple[str, ...]] = {
     "lsp": ("lsp",),
     "notebook": ("Session.live",),
     "plot_files": ("plot", "/plot --to", "/plot --serve", "/plot --rate", "multidrop.read_rrd"),
-    "publishing": ("publish", "plant", "[mqtt]"),
+    "publishing": ("publish", "plant", "[mqtt]", "mqtt:", "mqtts:"),
     "shared_screen": ("relay screen:", "tui --join", "tui --share"),
     "sharing": ("share",),
     "sweeps": ("program sweep", "[sweep]"),

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 from multidrop.base import registry
 from multidrop.base.errors import Diagnostic
 from multidrop.base.text import whole
-from multidrop.shell.connect.scheme import Connection, Open, Scheme, last_part
+from multidrop.shell.connect.scheme import Connection, NoLine, Open, Scheme, last_part
 
 if TYPE_CHECKING:
     from multidrop.shell.connect.reconnect import Reopen
@@ -232,6 +232,11 @@ def named(name: str) -> Scheme | None:
     if name in CORE:
         return CORE[name]
     return next((each for each in registry.answering(Scheme, f"{name}:") if each.name == name), None)
+
+
+def no_line(name: str) -> NoLine | None:
+    """Find what is said of a kind of URL that leads to no drives; None: there is no such kind."""
+    return next((each for each in registry.answering(NoLine, f"{name}:") if name in each.names), None)
 
 
 def sentence() -> str:

@@ -25,7 +25,7 @@ from multidrop.base.foreign import guarded
 from multidrop.base.registry import Entry
 from multidrop.shell import configuration, hooks, plot_targets, relaying
 from multidrop.shell.configuration import Settings
-from multidrop.shell.connect.scheme import Scheme
+from multidrop.shell.connect.scheme import NoLine, Scheme
 from multidrop.shell.connect.schemes import local_ports
 from multidrop.shell.connect.urls import parse
 from multidrop.shell.hooks import AtSession, Options
@@ -71,6 +71,7 @@ PLAIN: Mapping[type, Any] = MappingProxyType(
         EndpointKind: EndpointKind("slow", _served),
         Forms: Forms("/plot", "--slow", "Plot."),
         Lent: Lent("slow:", "what is slow", lambda rest: None),
+        NoLine: NoLine(("slow",), "it leads to no drives", "try another one"),
         Operation: Operation(
             usage="/slow", help="Be slow.", work=_work, command="slow", meaning="be slow", run=lambda chosen: 0
         ),
