@@ -4,6 +4,9 @@ A feature adds records of the classes that the rooms read: `shell.operations.ope
 `shell.hooks.Options` (options of a command that is there), `shell.hooks.AtSession` (what is done when a session opens:
 subscribe to its events), and so on; docs/plugins.md lists them. The rooms ask `base.registry.added` for the records of
 their class, so they know no feature.
+
+A class of records may have two methods: `claims` gives what only one feature can add, in words, and `passes` the kinds
+of errors that the callers of its functions expect, by the names of these (`base.foreign`).
 """
 
 from __future__ import annotations
@@ -15,6 +18,8 @@ from types import MappingProxyType
 from typing import NamedTuple
 
 NAME = re.compile(r"[a-z][a-z0-9_]*")
+Kinds = tuple[type[BaseException], ...]
+"""Kinds of what a function may raise."""
 
 
 class Feature(NamedTuple):

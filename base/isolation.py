@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 from types import TracebackType
 
-from multidrop.base.errors import TransportLost
+from multidrop.base.errors import Diagnostic, TransportLost
 
 LOG = logging.getLogger("multidrop")
 
@@ -15,12 +15,15 @@ class isolated:  # noqa: N801
 
     This is the one place that takes any exception: after the step, other drives are still to be stopped. A class, not
     a generator: each event of a bus passes here, and this takes a third of the time.
+
+    With `exits`, an exit of the program is added to these, too: it waits until the other lines are stopped. Elsewhere
+    it passes, as the handler of a signal may have raised it.
     """
 
-    __slots__ = ("_failed", "_what")
+    __slots__ = ("_exits", "_failed", "_what")
 
-    def __init__(self, what: str, failed: list[str] | None = None) -> None:
-        self._what, self._failed = what, failed
+    def __init__(self, what: str, failed: list[str] | None = None, exits: list[SystemExit] | None = None) -> None:
+        self._what, self._failed, self._exits = what, failed, exits
 
     def __enter__(self) -> None:
         return None
@@ -28,11 +31,14 @@ class isolated:  # noqa: N801
     def __exit__(
         self, kind: type[BaseException] | None, failure: BaseException | None, _: TracebackType | None
     ) -> bool:
+        if self._exits is not None and isinstance(failure, SystemExit):
+            self._exits.append(failure)
+            return True
         if not isinstance(failure, Exception):
             return False
         text = str(failure)
         if not isinstance(failure, TransportLost | OSError):  # a defect, of whatever kind
-            text = f"a defect: {type(failure).__name__}"
+            text = str(failure) if isinstance(failure, Diagnostic) else f"a defect: {type(failure).__name__}"
             LOG.error("%s failed", self._what, exc_info=failure)
         if self._failed is not None:
             self._failed.append(text)

@@ -1,12 +1,26 @@
 """Where a user's files are: the configuration, the state that a run leaves for the next one, and the data.
 
-`MULTIDROP_CONFIG_DIR`, `MULTIDROP_STATE_DIR` and `MULTIDROP_DATA_DIR` move them.
+`MULTIDROP_CONFIG_DIR`, `MULTIDROP_STATE_DIR` and `MULTIDROP_DATA_DIR` move them. With `--no-config` the
+configuration file and a person's own features are ignored.
 """
 
 from __future__ import annotations
 
 import os
+from contextvars import ContextVar
 from pathlib import Path
+
+_ignored: ContextVar[bool] = ContextVar("ignored", default=False)
+
+
+def ignore_configuration() -> None:
+    """Ignore the configuration file and a person's own features from now on, in this context (`--no-config`)."""
+    _ignored.set(True)
+
+
+def configuration_ignored() -> bool:
+    """Whether the configuration file and a person's own features are ignored."""
+    return _ignored.get()
 
 
 def config_folder() -> Path:

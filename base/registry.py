@@ -5,8 +5,9 @@ one feature, and the word of a feature that was deleted is explained. Packages n
 `multidrop.features`; their names are kept until the environment changes, because reading them takes 40 ms. A person's
 own features are the files in the folder `features` of the configuration.
 
-A feature by others is imported when a session opens, or for a word that nothing else explains. One that cannot be
-loaded is a warning, and the rest works.
+A feature by others is imported when a session opens, or for a word that nothing else explains. Its functions are
+guarded (`base.foreign`). One that cannot be loaded, or adds what there is already, is a warning, and the rest works. So
+is one of the wheel whose module raises.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ from __future__ import annotations
 import importlib
 import os
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import suppress
 from functools import cache
 from types import TracebackType
@@ -60,7 +61,7 @@ IN_WHEEL: dict[str, tuple[str, ...]] = {
     "lsp": ("lsp",),
     "notebook": ("Session.live",),
     "plot_files": ("plot", "/plot --to", "/plot --serve", "/plot --rate", "multidrop.read_rrd"),
-    "publishing": ("publish", "plant", "[mqtt]"),
+    "publishing": ("publish", "plant", "[mqtt]", "mqtt:", "mqtts:"),
     "shared_screen": ("relay screen:", "tui --join", "tui --share"),
     "sharing": ("share",),
     "sweeps": ("program sweep", "[sweep]"),
@@ -75,8 +76,9 @@ Verbs and commands (`/twin`, `program sweep`), options (`tui --twin`), schemes (
 (`multidrop.read_rrd`).
 """
 _failed: dict[str, Failed] = {}
+"""The features that cannot be loaded, by their places."""
 _untold: list[str] = []
-"""The warnings that nobody was told yet."""
+"""The warnings that were not reported yet."""
 _others: dict[str, tuple[Entry, Feature]] = {}
 """The features by others that are loaded, by their places."""
 
@@ -104,15 +106,18 @@ class Attempt:
 
 
 def _wheel(name: str) -> Feature | None:
-    """A feature of the wheel; None where its folder was deleted. Raises what its module raises otherwise."""
-    module = f"{GROUP}.{name}"
-    try:
-        with importing():
-            found: Feature = getattr(importlib.import_module(module), RECORD)
-    except ModuleNotFoundError as missing:
-        if missing.name not in (module, GROUP):
-            raise
-        return None
+    """A feature of the wheel; None where its folder was deleted, or where its module raises: that is a warning."""
+    module, why = f"{GROUP}.{name}", list[str]()
+    found: Feature | None = None
+    with Attempt(why):
+        try:
+            with importing():
+                found = getattr(importlib.import_module(module), RECORD)
+        except ModuleNotFoundError as missing:
+            if missing.name not in (module, GROUP):
+                raise
+    if why:
+        _fail(Entry(name, WHEEL, "", module), why[0])
     return found
 
 
@@ -120,12 +125,17 @@ wheel = cache(_wheel)
 
 
 def with_word(word: str) -> Feature | None:
-    """The feature that answers to a word; None: no feature of the wheel does. Raises Diagnostic where it is gone."""
+    """The feature that answers to a word; None: no feature of the wheel does.
+
+    Raises Diagnostic where it is gone or cannot be loaded.
+    """
     for name, words in IN_WHEEL.items():
         if word in words:
             found = wheel(name)
             if found is None:
-                raise Diagnostic(f"the feature {name} is not there", word.rstrip(":"), "install multidrop again, whole")
+                failed = _failed.get(f"{GROUP}.{name}")
+                what = f"the feature {name} {'is not there' if failed is None else f'cannot be loaded: {failed.why}'}"
+                raise Diagnostic(what, word.rstrip(":"), "install multidrop again, whole")
             return found
     return None
 
@@ -150,9 +160,11 @@ def words() -> tuple[str, ...]:
 # By others
 
 
-def entries(own: bool = True) -> list[Entry]:
-    """The features by others: those of packages by their names, then, with `own`, a person's files."""
-    return [*_of_packages(), *(_own() if own else ())]
+def entries() -> list[Entry]:
+    """The features by others: those of packages by their names, then a person's files, unless they are ignored."""
+    from multidrop.base.places import configuration_ignored
+
+    return [*_of_packages(), *(() if configuration_ignored() else _own())]
 
 
 def _of_packages() -> Iterator[Entry]:
@@ -197,16 +209,15 @@ def _own() -> Iterator[Entry]:
             yield Entry(path.stem, str(path), "", str(path))
 
 
-def load_others(own: bool = True) -> None:
-    """Load the features by others that are not loaded yet; `warnings` tells which of them cannot be."""
-    for entry in entries(own):
+def load_others() -> None:
+    """Load the features by others that are not loaded yet; `warnings` has a text for each that cannot be."""
+    for entry in entries():
         if entry.place not in _others and entry.place not in _failed:
             why: list[str] = []
             with Attempt(why):
                 _others[entry.place] = entry, _loaded(entry)
             if why:
-                _failed[entry.place] = failed = Failed(entry, why[0])
-                _untold.append(str(failed))
+                _fail(entry, why[0])
 
 
 def warnings() -> list[str]:
@@ -216,16 +227,27 @@ def warnings() -> list[str]:
     return told
 
 
+def warn(text: str) -> None:
+    """Have a text reported with the next warnings."""
+    _untold.append(text)
+
+
 def refuse(name: str, why: str) -> None:
     """Take a feature by others out again, for what a room finds wrong in what it adds."""
     entry = next(entry for entry, feature in _others.values() if feature.name == name)
     del _others[entry.place]
-    _failed[entry.place] = failed = Failed(entry, why)
+    _fail(entry, why)
+
+
+def _fail(entry: Entry, why: str) -> None:
+    _failed[entry.place] = failed = Failed(entry, " ".join(why.split()))
     _untold.append(str(failed))
 
 
 def _loaded(entry: Entry) -> Feature:
-    """Import a feature by others. Raises anything."""
+    """Import a feature by others, and guard its functions. Raises anything."""
+    from multidrop.base.foreign import guarded
+
     if entry.name in IN_WHEEL or entry.name in (known.name for known, _ in _others.values()):
         raise Diagnostic("another feature has this name")
     found = _of_file(entry.place) if entry.place == entry.source else _of_place(entry.place)
@@ -233,7 +255,15 @@ def _loaded(entry: Entry) -> Feature:
         raise TypeError(f"{RECORD} is no multidrop.base.feature.Feature")
     if found.name != entry.name or not NAME.fullmatch(found.name):
         raise Diagnostic(f"its record has the name {found.name}; a name is a Python word in small letters")
-    return found
+    for each in found.adds:
+        if isinstance(each, type):
+            raise TypeError(f"adds has the class {each.__name__}, not an instance of it")
+    taken = {*words(), *(claim for each in features() for claim in claims(each))}
+    for claim in claims(found):
+        if claim in taken:
+            raise Diagnostic(f"{claim} is taken")
+        taken.add(claim)
+    return guarded(found)
 
 
 def _of_place(place: str) -> Any:
@@ -287,24 +317,50 @@ def place(after: Mapping[str, str], names: list[str]) -> None:
         names.insert(names.index(before) + 1 if before in names else len(names), name)
 
 
-def added(kind: type[T]) -> Iterator[T]:
-    """What the features add of one class."""
-    for feature in features():
+def records(those: Iterable[Feature], kind: type[T]) -> Iterator[T]:
+    """What some features add of one class."""
+    for feature in those:
         yield from (each for each in feature.adds if isinstance(each, kind))
 
 
-def states(version: str, own: bool = True) -> Iterator[tuple[Entry, str, str]]:
-    """Every feature with its meaning and its state, both in words. Loads those by others. `version`: the wheel's."""
-    load_others(own)
-    for name in IN_WHEEL:
-        yield Entry(name, WHEEL, version, ""), *_described(wheel(name), "not there")
-    for entry in entries(own):
-        _, found = _others.get(entry.place, (entry, None))
-        yield entry, *_described(found, f"cannot be loaded: {_failed[entry.place].why}" if found is None else "")
+def added(kind: type[T]) -> Iterator[T]:
+    """What the features add of one class."""
+    return records(features(), kind)
 
 
-def _described(feature: Feature | None, otherwise: str) -> tuple[str, str]:
+def answering(kind: type[T], word: str) -> Iterator[T]:
+    """What is added of one class by the feature of the wheel that answers to a word; where none does, by others.
+
+    These are loaded for that: a word may be read before a session opens. Raises Diagnostic: see `with_word`.
+    """
+    feature = with_word(word)
     if feature is None:
-        return "", otherwise
+        load_others()
+    return records(by_others() if feature is None else (feature,), kind)
+
+
+def claims(feature: Feature) -> Iterator[str]:
+    """What a feature adds that can be there only once, in words such as `/twin` and `[mqtt]`.
+
+    A class of records has them in a method `claims`.
+    """
+    for each in feature.adds:
+        if hasattr(each, "claims"):
+            yield from each.claims()
+
+
+def states(version: str) -> Iterator[tuple[Entry, str, str]]:
+    """Every feature with its meaning and its state, both in words. Loads those by others. `version`: the wheel's."""
+    load_others()
+    for name in IN_WHEEL:
+        yield Entry(name, WHEEL, version, ""), *_described(wheel(name), f"{GROUP}.{name}")
+    for entry in entries():
+        _, found = _others.get(entry.place, (entry, None))
+        yield entry, *_described(found, entry.place)
+
+
+def _described(feature: Feature | None, place: str) -> tuple[str, str]:
+    if feature is None:
+        return "", f"cannot be loaded: {_failed[place].why}" if place in _failed else "not there"
     missing = feature.missing()
     return feature.meaning, f"needs the extra {', '.join(missing)}" if missing else "ready"

@@ -155,11 +155,20 @@ def _unknown(given: Sequence[str], arguments: Mapping[str, Any]) -> bool:
 
 def _load_others(given: Sequence[str]) -> None:
     """Load the features by others, whose commands a line may mean; say of each that cannot be loaded why."""
+    from multidrop.base.places import ignore_configuration
     from multidrop.shell.operations.table import load_others
-    from multidrop.shell.streams.stdout import write
 
-    for warning in load_others(own="--no-config" not in given):
-        write(sys.stderr, f"warning: {warning}")
+    context = copy_context()
+    if "--no-config" in given:
+        context.run(ignore_configuration)
+    _warn(context.run(load_others))
+
+
+def _warn(warnings: Sequence[str]) -> None:
+    if warnings:
+        from multidrop.shell.streams.stdout import write
+
+        write(sys.stderr, *(f"warning: {each}" for each in warnings))
 
 
 def _the_one(name: str, commands: Mapping[str, Operation]) -> Mapping[str, Operation]:
@@ -198,6 +207,7 @@ def parse(given: Sequence[str]) -> argparse.Namespace:
 def run(chosen: argparse.Namespace) -> int:
     """Run a parsed command; return the exit code. A Diagnostic, or a loss, is one line on standard error."""
     command = chosen.run_by.command_work
+    from multidrop.base import registry
     from multidrop.base.errors import Diagnostic, TransportLost
     from multidrop.shell.streams.stdout import fail
 
@@ -209,6 +219,8 @@ def run(chosen: argparse.Namespace) -> int:
         return code
     except (Diagnostic, TransportLost) as problem:
         return fail(problem)
+    finally:
+        _warn(registry.warnings())  # of features that were loaded for a word of a file, without a session
 
 
 def extras() -> dict[str, str]:

@@ -258,12 +258,13 @@ class Automations:
             del due[drive], automation.started[drive]
         automation.stopped |= due
         written: list[Halt] = []
+        exits: list[SystemExit] = []
         for link, only in _by_link(due).items():
-            with isolated(f"the stop of {link.name}"):
+            with isolated(f"the stop of {link.name}", exits=exits):
                 written.append(self._halt(link, only))
         automation.halts += written
         for halt in written:
-            with isolated(f"the stop of {halt.link.name}"):
+            with isolated(f"the stop of {halt.link.name}", exits=exits):
                 if bus := self._open_bus(halt.link):
                     bus.halted(halt)
         for drive in strangers:
@@ -274,6 +275,8 @@ class Automations:
                 self._workspace.notify(f"{self._workspace.display_name(drive)}: {sent.why}", warning=True)
         for drive in (each for bus in self._workspace.buses.values() for each in bus.all_drives):
             drive.motions.close(automation)
+        if exits:
+            raise exits[0]
 
     def _halt(self, link: Link, only: dict[Drive, Sent]) -> Halt:
         started = {drive: sent.what for drive, sent in only.items()}

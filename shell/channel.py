@@ -13,6 +13,7 @@ from datetime import datetime, timedelta
 from functools import partial
 from typing import Any, TypeVar
 
+from multidrop.base import foreign
 from multidrop.base.errors import Diagnostic, Stopped
 from multidrop.dialects import Procedure
 from multidrop.drives.drive import Drive
@@ -89,6 +90,10 @@ class Channel(Publisher[SessionEvent]):
         super().__init__("a front end", kind_of)
         self.front = Front()
         """The front end, as far as it can be asked."""
+
+    def subscribe(self, callback: Callable[[Any], None], *kinds: type) -> Callable[[], None]:
+        """Call back with every event of these kinds; see `Publisher.subscribe`. What others wrote is guarded."""
+        return super().subscribe(foreign.callback(callback), *kinds)
 
     def output(self, text: str, *, columns: bool = False) -> None:
         """Publish a line of a verb's result. `columns`: a screen breaks it between words."""

@@ -33,7 +33,6 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Mapping, Sequence
-from contextvars import ContextVar
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -43,11 +42,11 @@ from multidrop.base.atomic import write_atomically
 from multidrop.base.errors import Diagnostic
 from multidrop.base.file_owners import other_writer, places
 from multidrop.base.files import toml_of, utf8_of, why
-from multidrop.base.places import config_file, config_folder, data_folder, state_folder
+from multidrop.base.places import config_file, config_folder, configuration_ignored, data_folder, state_folder
 from multidrop.base.text import NOT_FIRST, acts_first, visible
 from multidrop.shell.broken_configuration import WrongConfiguration, salvage
 from multidrop.shell.roles import TIMES
-from multidrop.shell.sections import sections, text_list, valid
+from multidrop.shell.sections import Section, sections, text_list, valid
 
 if TYPE_CHECKING:
     from multidrop.dialects import DriveState, Family
@@ -58,8 +57,6 @@ CHOICES = {"signs": ("auto", "full", "boxes", "ascii"), "times": tuple(TIMES)}
 """The settings that have one of a few words."""
 TRAVEL = "TRAVEL"
 """The guard on moves that leave the travel of their axis, which no family knows."""
-IGNORED: ContextVar[bool] = ContextVar("ignored", default=False)
-"""The configuration file does not count (`--no-config`)."""
 
 
 @dataclass(frozen=True)
@@ -172,7 +169,7 @@ def load(lenient: bool = False) -> Settings:
     `lenient`: what is right in a file with errors counts. Raises Diagnostic with file and key, and all `problems`.
     """
     path = config_file()
-    if IGNORED.get():
+    if configuration_ignored():
         return Settings()
     try:
         text = utf8_of(path)
@@ -203,7 +200,7 @@ def parse(text: str, where: str, lenient: bool = False) -> Settings:
 def _read(document: Mapping[str, Any], where: str) -> Settings:
     """Check a parsed file. Raises Diagnostic, whose message begins with the key."""
     if not document.keys() <= {*valid()}:  # a table of a feature by others
-        registry.load_others(own=not IGNORED.get())
+        registry.load_others()
     _table(document, "", valid(), where, "")
     tables = document.get("connections", {})
     if not isinstance(tables, dict):
@@ -215,10 +212,7 @@ def _read(document: Mapping[str, Any], where: str) -> Settings:
     hint = "write [simulator] with allow = [...]"
     simulator = _table(document.get("simulator", {}), "simulator", ("allow",), where, hint)
     allowed = text_list(simulator, "simulator", "allow", where)
-    read = {
-        name: each.read(_table(document.get(name, {}), name, each.keys, where, f"write {each.example}"), where)
-        for name, each in sections().items()
-    }
+    read = {name: _section(document[name], each, where) for name, each in sections().items() if name in document}
     return Settings(
         connections,
         guards=guards,
@@ -238,6 +232,17 @@ def _table(found: Any, name: str, keys: Sequence[str], where: str, hint: str) ->
         if key not in keys:
             raise Diagnostic(f"no key {f'{name}.' if name else ''}{key}", where, f"valid: {', '.join(keys)}")
     return found
+
+
+def _section(found: Any, section: Section, where: str) -> Any:
+    """What a feature reads of its table. Raises Diagnostic, whose message begins with the name of the table."""
+    table = _table(found, section.name, section.keys, where, f"write {section.example}")
+    try:
+        return section.read(table, where)
+    except Diagnostic as problem:
+        if re.match(rf"{re.escape(section.name)}(?![\w-])", problem.message):
+            raise
+        raise Diagnostic(f"{section.name}: {problem.message}", problem.where or where, problem.hint) from problem
 
 
 def _own_units(found: Any, where: str) -> tuple[str, ...]:

@@ -9,15 +9,18 @@ import argparse
 from collections.abc import Awaitable, Callable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, ExitStack, contextmanager, nullcontext
 from itertools import takewhile
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from multidrop.base import registry
+from multidrop.base.feature import Kinds
+from multidrop.shell.operations.operation import TYPE_RAISES
 
-Session = Any
-"""`shell.session.Session`, which knows this module."""
+if TYPE_CHECKING:
+    from multidrop.shell.session import Session
+
 App = Any
-"""`tui.app.MultidropApp`, which knows this module."""
-Prepare = Callable[[Session], None]
+"""`tui.app.MultidropApp`, of a room above this one; a feature's function names it, and mypy checks its body."""
+Prepare = Callable[["Session"], None]
 """Takes a session before a URL is opened."""
 Around = Callable[[App], AbstractContextManager[object]]
 """What is entered before a screen runs, and left after that."""
@@ -34,6 +37,10 @@ class AtSession(NamedTuple):
     """
 
     begin: Callable[[Session], None]
+
+    def passes(self) -> Mapping[str, Kinds]:
+        """See `base.foreign`: `begin` below takes whatever it raises."""
+        return {"begin": (Exception, SystemExit)}
 
 
 class Options(NamedTuple):
@@ -57,29 +64,36 @@ class Options(NamedTuple):
     examples: Sequence[str] = ()
     """Further examples of the command."""
 
+    def passes(self) -> Mapping[str, Kinds]:
+        """What its callers expect to be raised, besides what a person reads; see `base.foreign`."""
+        return {"type": TYPE_RAISES}
 
-def begin(session: Session, own: bool) -> list[str]:
-    """Load the features by others, with a person's `own`, and let every feature begin in a session.
+    def claims(self) -> tuple[str, ...]:
+        """What only one feature can add."""
+        return tuple(f"{self.command} {each.partition(' ')[0]}" for each in self.arguments)
+
+
+def begin(session: Session) -> list[str]:
+    """Load the features by others, and let every feature begin in a session.
 
     Return a warning for each that cannot be loaded or cannot begin; the others and the session go on.
     """
     from multidrop.shell.operations.table import load_others
 
-    warnings = load_others(own)
+    warnings = load_others()
     for feature in registry.features():
-        for each in feature.adds:
-            if isinstance(each, AtSession):
-                why: list[str] = []
-                with registry.Attempt(why):
-                    each.begin(session)
-                warnings += [f"the feature {feature.name} cannot begin: {text}" for text in why]
+        for each in registry.records((feature,), AtSession):
+            why: list[str] = []
+            with registry.Attempt(why):
+                each.begin(session)
+            warnings += [f"the feature {feature.name} cannot begin: {text}" for text in why]
     return warnings
 
 
 def options(command: str) -> Iterator[Options]:
     """The options that features add to a command; a feature of the wheel that adds none is not imported."""
-    for feature in (*registry.with_words(f"{command} -"), *registry.by_others()):
-        yield from (each for each in feature.adds if isinstance(each, Options) and each.command == command)
+    those = (*registry.with_words(f"{command} -"), *registry.by_others())
+    return (each for each in registry.records(those, Options) if each.command == command)
 
 
 def check(command: str, given: Sequence[str]) -> None:

@@ -13,20 +13,26 @@ if TYPE_CHECKING:
     from multidrop.shell.plots.batch import Batch
 
 Call = Any
-"""`shell.verbs.call.Call`: verbs know this module."""
-OPTIONS = ("--to", "--serve", "--rate")
-"""The options of a line of `/plot` with which a plot goes elsewhere; each has a value."""
+"""`shell.verbs.call.Call`: verbs know this module. A feature's function names it, and mypy checks its body."""
+_PLOT = "/plot "
 
 
 class PlotTargets(NamedTuple):
     """Files, and programs that show plots."""
 
+    options: tuple[str, ...]
+    """The options of a line of `/plot` with which a plot goes elsewhere; each has a value.
+
+    The first one takes a file or an address, and may be left out before these.
+    """
     endings: tuple[str, ...]
-    """The ends of the names of files: a word of `/plot` with one of them needs no `--to` before it."""
+    """The ends of the names of files."""
     valid: str
     """The options of `/plot` that are valid where there is no screen."""
     files: str
     """What a person types who saves what the page of plots shows."""
+    stream: str
+    """The end of the line of `/plot` that the page of plots types to show the same in a viewer."""
     begin: Callable[[Call, Mapping[str, str], Sequence[str]], Awaitable[None]]
     """Begin a plot from a line of `/plot`: its options, and the texts of what it plots. Raises what the verb raises."""
     save: Callable[[str], tuple[str, Callable[[Batch], Awaitable[None]]]]
@@ -34,12 +40,30 @@ class PlotTargets(NamedTuple):
     read: Callable[[str | Path, bool], Any]
     """`multidrop.read_rrd`, with its `twin`."""
 
+    def claims(self) -> tuple[str, ...]:
+        """What only one feature can add."""
+        return ("the place of plots outside the screen",)
+
 
 def offered() -> PlotTargets | None:
     """The targets; None where no feature adds any."""
     return next(registry.added(PlotTargets), None)
 
 
-def needed(word: str = "/plot --to") -> PlotTargets:
-    """The targets, for a word of the registry that needs them. Raises Diagnostic where their feature is gone."""
-    return registry.needed(PlotTargets, word)
+def options() -> tuple[str, ...]:
+    """The options of a line of `/plot` with which a plot goes elsewhere, also where their feature is gone."""
+    targets = offered()
+    return targets.options if targets is not None else tuple(each.removeprefix(_PLOT) for each in _words())
+
+
+def needed(word: str = "") -> PlotTargets:
+    """The targets, for a word of the registry that needs them: one of `/plot`, unless another one is given.
+
+    Raises Diagnostic where their feature is gone.
+    """
+    return registry.needed(PlotTargets, word or "".join(_words()[:1]))
+
+
+def _words() -> list[str]:
+    """The words of the registry that are options of `/plot`."""
+    return [each for each in registry.words() if each.startswith(f"{_PLOT}-")]

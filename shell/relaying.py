@@ -24,19 +24,17 @@ class Lent(NamedTuple):
     Raises Diagnostic, Unreachable.
     """
 
+    def claims(self) -> tuple[str, ...]:
+        """What only one feature can add."""
+        return (f"relay {self.name}",)
+
 
 def lender(port: str) -> Lent | None:
     """What is lent under a name; None: it is a serial port. Raises Diagnostic where its feature is not there."""
     named = _NAMED.match(port)
     if named is None:
         return None
-    feature = registry.with_word(f"relay {named[1]}")
-    if feature is None:
-        from multidrop.shell.configuration import IGNORED
-
-        registry.load_others(own=not IGNORED.get())
-    adds = (each for known in ([feature] if feature else registry.by_others()) for each in known.adds)
-    return next((each for each in adds if isinstance(each, Lent) and each.name == named[1]), None)
+    return next((each for each in registry.answering(Lent, f"relay {named[1]}") if each.name == named[1]), None)
 
 
 def ports() -> str:

@@ -63,6 +63,8 @@ class RunningPlot:
     """Its file or address, for a person."""
     desk: str
     """The line that a person types at another desk to see it; empty where that is not needed."""
+    viewer: str
+    """The line that then shows it there."""
     rate: str
     """The rate of its samples that was asked for, in words."""
     end: Callable[[], Awaitable[str]]

@@ -26,10 +26,14 @@ class Section(NamedTuple):
     unreadable: Callable[[Any], Iterable[str]] = lambda found: ()
     """What is wrong with the files that it names, each with the key at the beginning."""
 
+    def claims(self) -> tuple[str, ...]:
+        """What only one feature can add."""
+        return (f"[{self.name}]",)
+
 
 def sections() -> dict[str, Section]:
     """The tables of the features that are there, by name."""
-    return {each.name: each for each in registry.added(Section)}
+    return {each.name: each for each in registry.added(Section) if each.name not in CORE}
 
 
 def valid() -> tuple[str, ...]:

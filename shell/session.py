@@ -21,9 +21,9 @@ from multidrop.base.on_demand import imported
 from multidrop.drives.bus import Bus
 from multidrop.drives.drive import Drive
 from multidrop.drives.events import Restarted
-from multidrop.shell import hooks, motions
+from multidrop.shell import motions
 from multidrop.shell.automation import AGREED, ENDING, Automations, only_ends
-from multidrop.shell.configuration import IGNORED, Settings
+from multidrop.shell.configuration import Settings
 from multidrop.shell.connect.opening import Opener, open_buses
 from multidrop.shell.events import FAILURES, By, Entered, Failed, OnBus, Printed, SessionEvent
 from multidrop.shell.line_syntax import (
@@ -65,6 +65,7 @@ def bare(word: str) -> Diagnostic:
 
 
 CALL = "multidrop.shell.verbs.call:Call"
+BEGIN = "multidrop.shell.hooks:begin"
 """One use of a verb; it knows this class, so this module has only its name."""
 
 
@@ -111,7 +112,7 @@ class Session(Workspace):
         self._background: dict[asyncio.Task[Any], None] = {}
         self.on_opened.append(lambda bus: self.units.opened(bus))
         self.subscribe(partial(_forget_restarted, self), Restarted)
-        for text in hooks.begin(self, own=not IGNORED.get()):
+        for text in imported(BEGIN)(self):
             asyncio.get_running_loop().call_soon(partial(self.notify, text, warning=True))
 
     # Buses

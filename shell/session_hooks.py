@@ -28,7 +28,10 @@ class SessionHooks:
         """Call functions with a line; a defect of one keeps nothing else from being done."""
         for each in functions:
             with isolated(f"a hook on {bus.name}"):
-                each(bus)
+                try:
+                    each(bus)
+                except SystemExit as end:
+                    raise RuntimeError("a hook ends the program") from end
 
     def keep(self, part: object) -> None:
         """Keep an object for as long as the session lives; `part` finds it by its class."""

@@ -334,8 +334,9 @@ class Workspace(Channel):
 
     def stop_ahead(self) -> None:
         """Write the stop onto every wire, from any thread, whatever the loop does; `stop` must follow in the loop."""
+        exits: list[SystemExit] = []  # of a byte pipe by others; the thread of the key goes on
         for name, bus in list(self.buses.items()):
-            with isolated(f"the stop of {name}"):
+            with isolated(f"the stop of {name}", exits=exits):
                 bus.stop_ahead()
         self.doubted = ""  # the key comes
 
@@ -346,18 +347,19 @@ class Workspace(Channel):
         """
         self.stops, self.stopped_at = self.stops + 1, self.now()
         halts: list[Halt] = []
+        exits: list[SystemExit] = []
         for bus in list(self.buses.values()):  # each wire by itself
-            with isolated(f"the stop of {bus.name}"):
+            with isolated(f"the stop of {bus.name}", exits=exits):
                 halts.append(bus.halt(follows=follows))
         self.latched = True
         self.tasks.stop()
         self.questions.open.stop()
         for halt in halts:
-            with isolated(f"the stop of {halt.link.name}"):
+            with isolated(f"the stop of {halt.link.name}", exits=exits):
                 self.buses[halt.link.name].halted(halt)
         for drive in (each for bus in self.buses.values() for each in bus.all_drives):
             drive.motions.stopped(None)
-        with isolated("the notice of a stop"):
+        with isolated("the notice of a stop", exits=exits):
             unreached = stop_report.unreached(halts, self.now())
             opening = _still_opening(self.opening, self.stops)
             sent = "stop" if not (unreached or opening) and len(halts) == len(self.buses) else "stop not"
@@ -375,6 +377,8 @@ class Workspace(Channel):
                     text = f"{name}: the stop is the first to be sent when the line is back"
                     self.notify(text, bus=name, warning=True)
             self.changed()
+        if exits:
+            raise exits[0]
 
     def resume(self) -> None:
         """Let automation run again. A person who types it agrees to a stop key that did not come."""

@@ -463,7 +463,10 @@ def look_troubles(found: Settings, text: str, where: str) -> list[Diagnostic]:
     look = found.look
     troubles = [*keymap(bindings(), look.keys).troubles, *wrong_theme(look.theme)]
     for name, each in sections().items():
-        troubles += each.unreadable(found.section(name))
+        try:
+            troubles += each.unreadable(found.section(name))
+        except Diagnostic as problem:  # of a feature by others
+            troubles.append(f"{name}: {problem.message}")
     troubles += wrong_urls(found.connections.values())
     return [placed(trouble, text, where) for trouble in troubles]
 

@@ -20,6 +20,8 @@ if TYPE_CHECKING:
 TO = "--to FILE.rrd|FILE.csv|FILE.parquet|rerun+http://HOST:PORT/proxy"
 SERVE = "--serve [HOST:]PORT"
 RATE = "--rate N|max"
+VIEWERS = 9876
+"""The port at which viewers of rerun connect by default."""
 
 
 def _plot(chosen: argparse.Namespace) -> int:
@@ -107,9 +109,11 @@ running plots. A table (CSV, Parquet) has a row for each value, state and line.
             },
         ),
         PlotTargets(
+            options=("--to", "--serve", "--rate"),
             endings=(".rrd", ".csv", ".parquet"),
             valid="--to FILE.rrd|.csv|.parquet or --serve [HOST:]PORT",
             files="FILE.csv or FILE.rrd",
+            stream=f"--serve {VIEWERS}",
             begin=_begin,
             save=_save,
             read=_read,

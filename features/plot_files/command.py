@@ -35,7 +35,7 @@ async def _until_ended(workspace: Session, target: PlotTarget, drives: Sequence[
     running, plot = await begin(workspace, target, series, period)
     write(sys.stderr, f"plotting to {running.where}, {running.rate}; Ctrl+C ends it")
     if running.desk:
-        write(sys.stderr, f"at your desk: {running.desk}, then rerun {running.where}")
+        write(sys.stderr, f"at your desk: {running.desk}, then {running.viewer}")
     try:
         losing = runner.until(workspace, lambda: lost(workspace))
         waits: list[asyncio.Task[object]] = [asyncio.create_task(plot.ended.wait()), asyncio.create_task(losing)]

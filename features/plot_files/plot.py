@@ -285,7 +285,7 @@ async def begin(
         detach()
         return await plot.close()
 
-    running = RunningPlot(plot.target.text, plot.target.desk, shown(period), end)
+    running = RunningPlot(plot.target.text, plot.target.desk, f"rerun {plot.target.text}", shown(period), end)
     workspace.plots.append(running)
     if target.serves and exposed(target.host):
         workspace.notify(f"other computers can read the plot at {target.text}; they need no password", warning=True)

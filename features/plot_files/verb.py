@@ -26,7 +26,7 @@ async def begin_typed(call: Call, options: Mapping[str, str], texts: Sequence[st
     begun, _ = await begin(workspace, target, series, period)
     workspace.notify(f"plotting to {begun.where}, {begun.rate}")
     if begun.desk:
-        workspace.notify(f"at your desk: {begun.desk}, then rerun {begun.where}")
+        workspace.notify(f"at your desk: {begun.desk}, then {begun.viewer}")
 
 
 def save(text: str) -> tuple[str, Callable[[Batch], Awaitable[None]]]:

@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from multidrop.base.feature import Feature
+from multidrop.shell.connect.scheme import NoLine
 from multidrop.shell.operations.operation import Operation
 from multidrop.shell.sections import Section
 
@@ -107,6 +108,11 @@ FEATURE = Feature(
                 "--json": "print one JSON object a line",
             },
             after="publish",
+        ),
+        NoLine(
+            ("mqtt", "mqtts"),
+            "a broker is no line, and no drive can be reached through one",
+            "it only shows what was published; `multidrop plant URL` shows it",
         ),
         Section(
             "mqtt",

@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple, Protocol
 
 from multidrop.base import registry
+from multidrop.base.errors import Diagnostic
 
 Telemetry = Any
 """`api.blocking.Telemetry`, which knows this module."""
@@ -26,11 +27,23 @@ class Pictures(NamedTuple):
     live: Callable[[Telemetry], Live]
     """Begin a picture of what is read. Raises Diagnostic outside a notebook."""
 
+    def claims(self) -> tuple[str, ...]:
+        """What only one feature can add."""
+        return ("the live picture", *(f"the picture of {kind}" for kind in self.html))
+
 
 def picture(kind: str, found: object) -> str | None:
-    """The HTML of an object; None where no feature draws it: the notebook shows its text then."""
-    drawing = (each.html[kind] for each in registry.added(Pictures) if kind in each.html)
-    return next((draw(found) for draw in drawing), None)
+    """The HTML of an object; None where no feature draws it, or it cannot: the notebook shows its text then."""
+    import logging
+
+    for each in registry.added(Pictures):
+        if kind in each.html:
+            try:
+                return each.html[kind](found)
+            except Diagnostic as failure:
+                logging.getLogger("multidrop").warning("%s", failure)
+                return None
+    return None
 
 
 def live(readings: Telemetry) -> Live:

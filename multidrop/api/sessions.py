@@ -106,7 +106,7 @@ class AsyncSession(Fixed):
         """Write the stop of every line: the process ends, and the event loop does no more."""
         if self._calls.opened:
             for name, bus in list(self._shell.buses.items()):
-                with isolated(f"the stop of {name}"):
+                with isolated(f"the stop of {name}", exits=[]):
                     if not bus.roster.strange:  # nobody asks for this stop: only a known drive gets it
                         bus.stop_ahead()
             self._notice("a session was not closed; the stop of its lines was sent, and no drive was asked", True)

@@ -138,13 +138,12 @@ def _screen(
 def help_(chosen: argparse.Namespace) -> int:
     """Explain a word in the language that is named, or in the first that has it; name the others."""
     from multidrop.dialects.families import FAMILIES, languages
-    from multidrop.shell.configuration import IGNORED
     from multidrop.shell.operations.table import load_others
     from multidrop.shell.streams.stdout import write
     from multidrop.shell.verbs.session import explained, overview
 
     word, lines = chosen.word, []
-    write(sys.stderr, *(f"warning: {each}" for each in load_others(own=not IGNORED.get())))
+    write(sys.stderr, *(f"warning: {each}" for each in load_others()))
     if chosen.dialect:
         language = FAMILIES[chosen.dialect].language
         lines = language.describe_error(int(word[:9])) if _is_number(word) else language.describe(word)

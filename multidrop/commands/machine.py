@@ -35,7 +35,7 @@ def ignore() -> None:
     """Let the configuration file not count from now on, and say on standard error what is not in force."""
     if text := not_in_force(configuration.load(lenient=True)):
         write(sys.stderr, f"--no-config: not in force: {text}")
-    configuration.IGNORED.set(True)
+    places.ignore_configuration()
 
 
 def not_in_force(found: Settings) -> str:
@@ -276,9 +276,8 @@ def features(chosen: argparse.Namespace) -> int:
     """List every feature. One that cannot be loaded is listed with its error; the exit code is 0 all the same."""
     import json
 
-    own = not configuration.IGNORED.get()
-    load_others(own)  # their warnings are in the list
-    found = list(registry.states(multidrop.__version__, own=own))
+    load_others()  # their warnings are in the list
+    found = list(registry.states(multidrop.__version__))
     if chosen.json:
         for entry, meaning, state in found:
             facts = {"name": entry.name, "source": entry.source, "version": entry.version, "state": state}

@@ -20,7 +20,7 @@ from multidrop.shell import configuration
 from multidrop.shell.connect.reconnect import Absent, Reopen, simulated
 from multidrop.shell.connect.scheme import Connection
 from multidrop.shell.state.port_state import PortState
-from multidrop.transports import NotOpen
+from multidrop.transports import NotOpen, Unreachable
 
 if TYPE_CHECKING:
     from multidrop.dialects.units import Scale
@@ -151,8 +151,11 @@ def _bus(name: str, transport: Transport, connection: Connection, family: str, k
 
 
 async def _transport(connection: Connection, *, within: float | None = None, baud: int | None = None) -> Transport:
-    """Open a transport, at another baud rate than its URL has, or a host within a time, s."""
-    return await connection.scheme.open(connection, baud or connection.baud or _family(connection).baud, within)
+    """Open a transport, at another baud rate than its URL has, or a host within a time, s. Raises Unreachable."""
+    try:
+        return await connection.scheme.open(connection, baud or connection.baud or _family(connection).baud, within)
+    except OSError as failure:  # of a scheme by others, as that of a socket
+        raise Unreachable(f"{connection.scheme.shown(connection)}: {failure.strerror or failure}") from failure
 
 
 async def _connected(connection: Connection) -> tuple[Transport, Reopen | None]:

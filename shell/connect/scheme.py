@@ -9,9 +9,10 @@ from __future__ import annotations
 import re
 from collections.abc import Awaitable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 from multidrop.base.errors import Diagnostic
+from multidrop.base.feature import Kinds
 from multidrop.base.text import whole
 
 if TYPE_CHECKING:
@@ -116,6 +117,14 @@ class Scheme:
     turns = 0.0
     """The part of the time of an opening that a question and its reply take, at most; 0: of a port on this machine."""
 
+    def passes(self) -> Mapping[str, Kinds]:
+        """What its callers expect to be raised, besides what a person reads; see `base.foreign`."""
+        return {"open": (OSError,)}
+
+    def claims(self) -> tuple[str, ...]:
+        """What only one feature can add."""
+        return (f"{self.name}:",)
+
     # Text
 
     def parse(self, base: Connection, body: str) -> Connection:
@@ -184,6 +193,20 @@ class Scheme:
     def searched(self, text: str) -> Sequence[str]:
         """The URLs that a search for drives opens one after the other, where this is typed."""
         return [text]
+
+
+class NoLine(NamedTuple):
+    """Kinds of URLs that a feature takes elsewhere, and that lead to no drives."""
+
+    names: tuple[str, ...]
+    """What stands before the colon."""
+    what: str
+    """Why none can be opened, and what to do instead."""
+    hint: str
+
+    def claims(self) -> tuple[str, ...]:
+        """What only one feature can add."""
+        return tuple(f"{name}:" for name in self.names)
 
 
 def last_part(path: str) -> str:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 from multidrop.base import registry
 from multidrop.base.errors import Diagnostic
 from multidrop.base.text import whole
-from multidrop.shell.connect.scheme import Connection, Open, Scheme, last_part
+from multidrop.shell.connect.scheme import Connection, NoLine, Open, Scheme, last_part
 
 if TYPE_CHECKING:
     from multidrop.shell.connect.reconnect import Reopen
@@ -229,18 +229,14 @@ def named(name: str) -> Scheme | None:
 
     One that multidrop does not have may be of others, who are loaded for it: a URL may be read before a session opens.
     """
-    from multidrop.shell.configuration import IGNORED
-
     if name in CORE:
         return CORE[name]
-    feature = registry.with_word(f"{name}:")
-    if feature is None:
-        registry.load_others(own=not IGNORED.get())
-    for each in (feature,) if feature is not None else registry.by_others():
-        for found in each.adds:
-            if isinstance(found, Scheme) and found.name == name:
-                return found
-    return None
+    return next((each for each in registry.answering(Scheme, f"{name}:") if each.name == name), None)
+
+
+def no_line(name: str) -> NoLine | None:
+    """Find what is said of a kind of URL that leads to no drives; None: there is no such kind."""
+    return next((each for each in registry.answering(NoLine, f"{name}:") if name in each.names), None)
 
 
 def sentence() -> str:
@@ -258,4 +254,7 @@ def table() -> list[str]:
 def local_ports() -> Iterator[PortInfo]:
     """The ports of this machine, of all schemes. The search may be slow."""
     for each in schemes().values():
-        yield from each.ports()
+        try:
+            yield from each.ports()
+        except Diagnostic as problem:  # by others
+            registry.warn(str(problem))

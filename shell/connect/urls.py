@@ -17,7 +17,7 @@ from multidrop.dialects import Hints
 from multidrop.dialects.families import TABLE
 from multidrop.shell.configuration import SavedConnection
 from multidrop.shell.connect.scheme import Connection, Scheme
-from multidrop.shell.connect.schemes import CORE, named, sentence
+from multidrop.shell.connect.schemes import CORE, named, no_line, sentence
 from multidrop.shell.secrets import holds_password, url_without_secrets, without_secrets
 from multidrop.transports.ssh import WAYS
 
@@ -74,9 +74,8 @@ def _scheme(text: str) -> tuple[Scheme, str]:
     found = re.match(r"([A-Za-z][A-Za-z0-9+.-]+):", text)
     if found and (scheme := named(found[1].lower())) is not None:
         return scheme, text[found.end() :]
-    if found and found[1].lower() in ("mqtt", "mqtts"):
-        hint = "it only shows what was published; `multidrop plant URL` shows it"
-        raise Diagnostic("a broker is no line, and no drive can be reached through one", text, hint)
+    if found and (elsewhere := no_line(found[1].lower())) is not None:
+        raise Diagnostic(elsewhere.what, text, elsewhere.hint)
     if found and text[found.end() :].startswith("//"):
         raise Diagnostic(f"no kind of connection {found[1]}://", text, f"valid: {sentence()}")
     path = text.partition("?")[0]

@@ -11,6 +11,7 @@ from collections.abc import Callable, Coroutine, Mapping, Sequence
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from multidrop.base.feature import Kinds
 from multidrop.base.on_demand import imported
 
 if TYPE_CHECKING:
@@ -19,6 +20,8 @@ if TYPE_CHECKING:
 
 ACTIONS = "multidrop.shell.operations.arguments"
 NOTHING: Mapping[str, Any] = MappingProxyType({})
+TYPE_RAISES: Kinds = (ValueError, TypeError, argparse.ArgumentTypeError)
+"""What argparse expects of the `type` of an argument."""
 Arguments = Mapping[str, Any]
 """The arguments of a command by their notation; each has its help, a mapping with `help` and what else
 argparse takes for it, or a function that returns either.
@@ -74,6 +77,23 @@ class Operation(NamedTuple):
     """The title of `/help` under which a feature's verb is listed."""
     after: str = ""
     """The verb or command that a feature's is listed after, in `/help` and `--help`; empty: it comes last."""
+
+    def passes(self) -> Mapping[str, Kinds]:
+        """What its callers expect to be raised, besides what a person reads; see `base.foreign`."""
+        return {"run": (SystemExit,), "type": TYPE_RAISES}
+
+    def claims(self) -> tuple[str, ...]:
+        """What only one feature can add."""
+        return tuple(filter(None, (self.name, self.command)))
+
+    def offered(self, workspace: Workspace) -> bool:
+        """Whether the verb is offered; one whose condition fails is not."""
+        from multidrop.base.errors import Diagnostic
+
+        try:
+            return self.fits is None or self.fits(workspace)
+        except Diagnostic:  # by others
+            return False
 
     @property
     def name(self) -> str:
@@ -133,6 +153,10 @@ class Forms(NamedTuple):
     """The help on the verb with them, whole."""
     words: Mapping[str, str] = NOTHING
     """The meanings of their literal words; these are unlike those of the verb."""
+
+    def claims(self) -> tuple[str, ...]:
+        """What only one feature can add."""
+        return tuple(f"{self.verb} {word}" for word in self.words)
 
 
 def add_arguments(parser: argparse._ActionsContainer, arguments: Arguments) -> None:

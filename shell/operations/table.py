@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import os
 import re
+from argparse import ArgumentParser
 from ast import literal_eval
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import cache, reduce
@@ -17,10 +18,11 @@ from itertools import chain
 from typing import Any
 
 from multidrop.base import registry
+from multidrop.base.errors import Diagnostic
 from multidrop.base.feature import Feature
 from multidrop.base.on_demand import imported
 from multidrop.shell.operations import arguments, conditions
-from multidrop.shell.operations.operation import Forms, Operation
+from multidrop.shell.operations.operation import Forms, Operation, add_arguments
 
 VERB_GROUPS = {
     "Stop and end": "/stop /resume /quit /exit",
@@ -126,8 +128,7 @@ class Declared(Mapping[str, Operation]):
         return name in registry.words() and self._named.fullmatch(str(name)) is not None
 
     def _added(self, feature: Feature) -> dict[str, Operation]:
-        operations = (each for each in feature.adds if isinstance(each, Operation))
-        return {name: each for each in operations if (name := self._name_of(each))}
+        return {name: each for each in registry.records((feature,), Operation) if (name := self._name_of(each))}
 
     def parts(self, group: str) -> Parts:
         """The commands of a group by their last word; of "" all first words."""
@@ -156,8 +157,9 @@ class Parts(Mapping[str, Operation]):
 
 def _forms(verb: str) -> Iterator[Forms]:
     """The forms that features add to a verb; none of them is imported for another name."""
-    for feature in (*registry.with_words(f"{verb} "), *registry.by_others()) if verb.startswith("/") else ():
-        yield from (each for each in feature.adds if isinstance(each, Forms) and each.verb == verb)
+    if verb.startswith("/"):
+        those = (*registry.with_words(f"{verb} "), *registry.by_others())
+        yield from (each for each in registry.records(those, Forms) if each.verb == verb)
 
 
 @cache
@@ -245,29 +247,50 @@ def _is_name(word: str) -> bool:
     return bool(_VERB.fullmatch(word) or _COMMAND.fullmatch(word))
 
 
-def load_others(own: bool = True) -> list[str]:
-    """Load the features by others; return a warning, once, for each that cannot be or whose words are taken."""
-    _load_others(own)
+def load_others() -> list[str]:
+    """Load all features; return a warning, once, for each that cannot be loaded or whose words are taken."""
+    _load_others()
+    for _ in registry.wheels():
+        """One whose module raises is a warning."""
     return registry.warnings()
 
 
-def _load_others(own: bool) -> None:
-    from multidrop.shell.connect.scheme import Scheme
-    from multidrop.shell.connect.schemes import CORE
-
-    registry.load_others(own)
-    taken = {*VERBS._sections, *COMMANDS._sections, *registry.words(), *(f"{name}:" for name in CORE)}
+def _load_others() -> None:
+    """Load the features by others, and take out those that add what the core has, or what it cannot use."""
+    registry.load_others()
     for feature in registry.by_others():
-        adds = [each for each in feature.adds if isinstance(each, Operation)]
-        schemes = [f"{each.name}:" for each in feature.adds if isinstance(each, Scheme)]
-        words = [word for each in adds for word in (each.name, each.command) if word]
-        odd = [word for word in words if not _is_name(word)]
-        words += schemes
-        if wrong := next((word for word in words if word in taken or word in odd), ""):
-            why = f"{wrong} is taken" if wrong in taken else f"{wrong} is no name of a verb or a command"
-            registry.refuse(feature.name, why)
-        else:
-            taken.update(words)
+        if not any(each is feature for each in _checked):
+            why: list[str] = []
+            with registry.Attempt(why):
+                _check(feature)
+            if why:
+                registry.refuse(feature.name, why[0])
+            else:
+                _checked.append(feature)
+
+
+_checked: list[Feature] = []
+
+
+def _check(feature: Feature) -> None:
+    """Raise Diagnostic, or what argparse raises, if the core has a word of a feature, or cannot use what it adds."""
+    from multidrop.shell.connect.schemes import CORE
+    from multidrop.shell.sections import CORE as TABLES
+
+    core = {*VERBS._sections, *COMMANDS._sections, *(f"{each}:" for each in CORE), *(f"[{each}]" for each in TABLES)}
+    if taken := next((each for each in registry.claims(feature) if each in core), ""):
+        raise Diagnostic(f"{taken} is taken")
+    for each in registry.records((feature,), Operation):
+        if odd := next((word for word in each.claims() if not _is_name(word)), ""):
+            raise Diagnostic(f"{odd} is no name of a verb or a command")
+        if each.name and not each.help.strip():
+            raise Diagnostic(f"{each.name} has no help")
+    for record in feature.adds:
+        if (added := getattr(record, "arguments", None)) is not None:  # of a command, or more of one that is there
+            command = str(getattr(record, "command", ""))
+            parser = ArgumentParser()
+            add_arguments(parser, COMMANDS[command].arguments if command in COMMANDS._sections else {})
+            add_arguments(parser, added)
 
 
 def find(name: str) -> Operation:
@@ -275,15 +298,11 @@ def find(name: str) -> Operation:
 
     Raises Diagnostic with similar names.
     """
-    from multidrop.shell.configuration import IGNORED
-
     if name not in VERBS and name not in SCRIPT_WORDS:
-        _load_others(own=not IGNORED.get())
+        _load_others()
     if name in VERBS:
         return VERBS[name]
     import difflib
-
-    from multidrop.base.errors import Diagnostic
 
     if name in SCRIPT_WORDS:
         raise Diagnostic(f"{name} is a verb of scripts", hint="multidrop run SCRIPT, or run - for standard input")

@@ -142,7 +142,7 @@ def targets(workspace: Workspace) -> Found:
 
 
 def verbs(workspace: Workspace) -> Found:
-    return ((verb.name, verb.lines[0]) for verb in VERBS.values() if verb.fits is None or verb.fits(workspace))
+    return ((verb.name, verb.lines[0]) for verb in VERBS.values() if verb.offered(workspace))
 
 
 PLACEHOLDERS = (

@@ -116,18 +116,18 @@ async def _plot_on_screen(call: Call, texts: list[str]) -> None:
 
 
 def _plotted(call: Call, words: list[str]) -> tuple[dict[str, str], list[str]]:
-    """The options, and what to plot; a bare word that can only be a target counts as `--to`."""
+    """The options, and what to plot; a bare word that can only be a target has the first option."""
     options: dict[str, str] = {}
     addresses: list[str] = []
     targets = plot_targets.offered()
-    endings = targets.endings if targets is not None else ()
+    known, endings = plot_targets.options(), targets.endings if targets is not None else ()
     left = iter(words)
     for word in left:
         option = word
-        if word in (*plot_targets.OPTIONS, "--drive"):
+        if word in (*known, "--drive"):
             value = next(left, "")
         elif word.endswith(endings) or "://" in word:
-            option, value = "--to", word
+            option, value = known[0], word
         else:
             option, value = "--drive", word
         if not value or option in options:

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Awaitable, Callable, Iterator
+from collections.abc import Awaitable, Callable, Iterator, Mapping
 from contextlib import AsyncExitStack
 from typing import Any, NamedTuple
 
 from multidrop.base import registry
+from multidrop.base.feature import Kinds
 from multidrop.simulator.cell.spec import Endpoint
 
 Floor = Any
-"""`simulator.serving.running.RunningFloor`, which has an event loop; this module has none."""
+"""`simulator.serving.running.RunningFloor`, which has an event loop; this module has none. A function names it."""
 
 
 class EndpointKind(NamedTuple):
@@ -27,6 +28,14 @@ class EndpointKind(NamedTuple):
     remark: Callable[[str], str] | None = None
     """What is told to a person of an open endpoint."""
 
+    def passes(self) -> Mapping[str, Kinds]:
+        """What its callers expect to be raised, besides what a person reads; see `base.foreign`."""
+        return {"open": (OSError,)}
+
+    def claims(self) -> tuple[str, ...]:
+        """What only one feature can add."""
+        return (f"serve {self.scheme}:",)
+
 
 def kinds() -> Iterator[EndpointKind]:
     """All kinds that features add."""
@@ -35,9 +44,4 @@ def kinds() -> Iterator[EndpointKind]:
 
 def kind_of(scheme: str) -> EndpointKind | None:
     """Find the kind of a scheme; None: no feature adds it. Raises Diagnostic where its feature is not there."""
-    feature = registry.with_word(f"{scheme}:")
-    for each in (feature,) if feature is not None else registry.by_others():
-        for found in each.adds:
-            if isinstance(found, EndpointKind) and found.scheme == scheme:
-                return found
-    return None
+    return next((each for each in registry.answering(EndpointKind, f"{scheme}:") if each.scheme == scheme), None)

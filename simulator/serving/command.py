@@ -55,7 +55,10 @@ async def serve(
                 _print_endpoint(served, json, stdout)
                 kind = kind_of(served.endpoint.partition(":")[0])
                 if kind is not None and kind.remark is not None:
-                    _narrate(kind.remark(served.endpoint))
+                    try:
+                        _narrate(kind.remark(served.endpoint))
+                    except Diagnostic as failure:  # by others
+                        _warn(str(failure))
                 open_to_all += [f"{served.bus} {served.endpoint}"] if reachable(served.endpoint) else []
         if open_to_all:
             _warn(f"{', '.join(open_to_all)}: open to the network, not only to this computer; serve 127.0.0.1 for that")

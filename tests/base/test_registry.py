@@ -5,13 +5,15 @@ from __future__ import annotations
 import importlib.metadata
 import os
 from collections.abc import Iterator
+from contextvars import copy_context
+from functools import cache
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
 import pytest
 
-from multidrop.base import registry
+from multidrop.base import places, registry
 from multidrop.base.errors import Diagnostic
 from multidrop.base.feature import Feature
 
@@ -54,7 +56,9 @@ def test_a_file_in_the_folder_is_a_feature(own: Path) -> None:
 
 def test_without_the_configuration_a_persons_own_files_are_not_loaded(own: Path) -> None:
     write(own, "clamp")
-    registry.load_others(own=False)
+    context = copy_context()
+    context.run(places.ignore_configuration)
+    context.run(registry.load_others)
     assert registry.warnings() == [] and registry.by_others() == []
 
 
@@ -152,10 +156,50 @@ def test_the_word_of_a_feature_that_was_deleted_says_what_to_install(monkeypatch
     assert [(entry.name, said) for entry, _, said in registry.states("1.2")] == [("gone_away", "not there")]
 
 
-def test_a_defect_of_a_feature_of_the_wheel_is_not_taken_for_its_absence(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(registry.importlib, "import_module", lambda name: (_ for _ in ()).throw(ImportError("no")))
-    with pytest.raises(ImportError):
-        registry._wheel("twins")
+@pytest.mark.parametrize(
+    ("failure", "why"),
+    [
+        (ImportError("no scipy"), "ImportError: no scipy"),
+        (ModuleNotFoundError("no scipy", name="scipy"), "ModuleNotFoundError: no scipy"),
+        (SyntaxError("invalid"), "SyntaxError: invalid"),
+        (ValueError("two\nlines"), "ValueError: two lines"),
+        (SystemExit(3), "SystemExit: 3"),
+    ],
+)
+def test_a_feature_of_the_wheel_whose_module_raises_is_one_warning_and_its_word_says_why(
+    failure: BaseException, why: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def raising(name: str) -> None:
+        raise failure
+
+    monkeypatch.setattr(registry, "IN_WHEEL", {"twins": ("/twin",)})
+    monkeypatch.setattr(registry, "wheel", cache(registry._wheel))
+    monkeypatch.setattr(registry.importlib, "import_module", raising)
+    assert list(registry.wheels()) == [] == list(registry.wheels())
+    assert registry.warnings() == [f"the feature twins (multidrop) cannot be loaded: {why}"]
+    with pytest.raises(Diagnostic, match=f"^/twin: the feature twins cannot be loaded: {why}; install multidrop"):
+        registry.with_word("/twin")
+    assert [said for _, _, said in registry.states("1.2")] == [f"cannot be loaded: {why}"]
+
+
+SINGLE = """
+from multidrop.base.feature import Feature
+
+class One:
+    def claims(self):
+        return ("the only place",)
+
+FEATURE = Feature("{name}", "has it", adds=(One(),))
+"""
+
+
+def test_of_two_features_for_a_single_place_the_later_one_is_refused(own: Path) -> None:
+    write(own, "early", SINGLE)
+    path = write(own, "later", SINGLE)
+    write(own, "twice", SINGLE.replace("(One(),)", "(One(), One())"))
+    registry.load_others()
+    assert registry.warnings()[0] == f"the feature later ({path}) cannot be loaded: the only place is taken"
+    assert [each.name for each in registry.by_others()] == ["early"]
 
 
 def test_what_features_add_is_found_by_its_class(monkeypatch: pytest.MonkeyPatch) -> None:

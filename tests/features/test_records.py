@@ -9,7 +9,7 @@ import pytest
 from multidrop.api.notebooks import Pictures
 from multidrop.base import registry
 from multidrop.base.registry import IN_WHEEL
-from multidrop.shell.connect.scheme import Scheme
+from multidrop.shell.connect.scheme import NoLine, Scheme
 from multidrop.shell.hooks import AtSession, Options
 from multidrop.shell.operations.operation import Forms, Operation
 from multidrop.shell.operations.table import VERBS
@@ -19,7 +19,7 @@ from multidrop.shell.sections import Section
 from multidrop.simulator.cell.endpoint_kinds import EndpointKind
 from tests.support.paths import ROOT, THERE
 
-KINDS = (Operation, AtSession, Options, Forms, PlotTargets, Pictures, Section, Scheme, EndpointKind, Lent)
+KINDS = (Operation, AtSession, Options, Forms, PlotTargets, Pictures, Section, Scheme, NoLine, EndpointKind, Lent)
 FUNCTIONS: dict[type, tuple[str, ...]] = {PlotTargets: ("multidrop.read_rrd",), Pictures: ("Session.live",)}
 """The functions of the Python API that need a record of a kind."""
 
@@ -37,6 +37,7 @@ def test_the_table_has_the_words_that_the_record_answers_to(name: str) -> None:
     words = {word for each in operations for word in (each.name, each.command) if word}
     words |= {f"[{each.name}]" for each in record.adds if isinstance(each, Section)}
     words |= {f"{each.name}:" for each in record.adds if isinstance(each, Scheme)}
+    words |= {claim for each in record.adds if isinstance(each, NoLine) for claim in each.claims()}
     words |= {f"{each.scheme}:" for each in record.adds if isinstance(each, EndpointKind)}
     options = [each for each in record.adds if isinstance(each, Options)]
     words |= {f"{each.command} {notation.partition(' ')[0]}" for each in options for notation in each.arguments}

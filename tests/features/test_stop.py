@@ -1,4 +1,7 @@
-"""The stop never passes through a feature: its bytes leave while a hook of one raises, holds the loop up, or waits."""
+"""The stop never passes through a feature: its bytes leave while a hook of one raises, holds the loop up, or waits.
+
+A byte pipe by others is the exception: the stop of its own line passes through it, and that of no other line.
+"""
 
 from __future__ import annotations
 
@@ -26,7 +29,10 @@ from multidrop.simulator.cells import load
 from multidrop.simulator.floor import Floor
 from multidrop.simulator.serving.endpoints import serve_bus
 from multidrop.simulator.serving.running import RunningFloor
+from multidrop.transports import Transport
+from tests.support import foreign_features as foreign
 from tests.support.cell_session import TCP, CellSession, bus, party
+from tests.support.foreign_features import ASYNC, CALLS, NAMES
 
 PATIENCE = 10.0
 """s; far longer than a thread takes to write."""
@@ -63,17 +69,19 @@ def key_thread(session: Any, held: Held) -> tuple[threading.Thread, list[bytes]]
     """The thread of the stop key, which presses it once the hook has the loop; and what each line was told to write."""
     wrote: list[bytes] = []
     for each in session.buses.values():
-        preempt = each.link.transport.preempt
+        pipe = each.link.transport
+        preempt, follow = pipe.preempt, pipe.follow
 
-        def noted(whole: bool, make: Callable[[int], bytes], preempt: Any = preempt) -> bool:
+        def noted(make: Callable[[int], bytes]) -> Callable[[int], bytes]:
             def made(dropped: int) -> bytes:
                 wrote.append(make(dropped))
                 held.written.set()
                 return wrote[-1]
 
-            return bool(preempt(whole, made))
+            return made
 
-        each.link.transport.preempt = noted
+        pipe.preempt = lambda whole, make, write=preempt, noted=noted: write(whole, noted(make))
+        pipe.follow = lambda make, key=False, write=follow, noted=noted: write(noted(make), key)  # of a repeated press
 
     def press() -> None:
         assert held.inside.wait(PATIENCE)
@@ -224,3 +232,99 @@ async def test_options_that_hold_the_loop_up_delay_no_stop(tmp_path: Path, add: 
         await hooks.opened(session, Namespace(command="shell", twin=False))
         await asyncio.to_thread(thread.join, PATIENCE)
         assert held.was_written and wrote
+
+
+async def test_no_function_of_any_record_delays_the_stop_key(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """It holds the loop up until the key's thread has written, and then it raises."""
+    monkeypatch.setenv("MULTIDROP_CONFIG_DIR", str(tmp_path))
+    monkeypatch.setenv("MULTIDROP_STATE_DIR", str(tmp_path))
+    late = []
+    async with served(tmp_path) as session:
+        pipes = [each.link.transport for each in session.buses.values()]
+        for (kind, name), text in zip(CALLS, NAMES, strict=True):
+            held = Held()
+
+            def hook(*_: Any, held: Held = held, **__: Any) -> None:
+                held()
+                raise KeyError("a defect of a feature")
+
+            feature = foreign.add(monkeypatch, foreign.broken(kind, name, hook))
+            thread, _ = key_thread(session, held)
+            await foreign.outcome(session, kind, name, feature)
+            await asyncio.to_thread(thread.join, PATIENCE)
+            session.stop("Ctrl+X")
+            late += [] if held.was_written else [text]
+            for each in pipes:
+                vars(each).pop("preempt", None), vars(each).pop("follow", None)
+    assert not late
+
+
+@pytest.mark.virtual
+@pytest.mark.parametrize(("kind", "name"), ASYNC, ids=lambda each: getattr(each, "__name__", each))
+async def test_a_function_that_never_returns_keeps_no_drive_from_the_stop(
+    kind: type, name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    begun = asyncio.Event()
+
+    async def forever(*_: Any, **__: Any) -> None:
+        begun.set()
+        await asyncio.Event().wait()
+
+    feature = foreign.add(monkeypatch, foreign.broken(kind, name, forever))
+    async with CellSession(tmp_path, bus("press", party("a"))) as cell:
+        await cell.session.run("SL 1000")
+        call = asyncio.create_task(foreign.outcome(cell.session, kind, name, feature))
+        await begun.wait()
+        cell.session.stop("Ctrl+X")
+        await asyncio.sleep(5)
+        assert cell.moving() == set()
+        call.cancel()
+        await asyncio.wait([call])
+
+
+class Pipe(Transport):
+    """A byte pipe by others that goes wrong at a stop."""
+
+    name = "slow://h:1"
+    preemptible = True
+
+    def start(self, *_: Any) -> None:
+        """Deliver nothing."""
+
+    def write(self, data: bytes) -> bool:
+        return True
+
+    def discard(self, whole: bool = False) -> int:
+        raise SystemExit(3)
+
+    def preempt(self, whole: bool, make: Callable[[int], bytes]) -> bool:
+        raise SystemExit(3)
+
+    follow = preempt  # type: ignore[assignment]
+
+    async def close(self) -> None:
+        """Close nothing."""
+
+
+async def test_a_byte_pipe_that_goes_wrong_at_a_stop_keeps_it_from_no_other_line(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    async def opened(*_: Any) -> Transport:
+        return Pipe()
+
+    monkeypatch.setenv("MULTIDROP_CONFIG_DIR", str(tmp_path))
+    monkeypatch.setenv("MULTIDROP_STATE_DIR", str(tmp_path))
+    foreign.add(monkeypatch, type("Broken", (foreign.Slow,), {"open": opened})())
+    async with served(tmp_path) as session:
+        await session.open("slow://h:1", "first", raw=True)
+        for _ in range(2):
+            session.move_bus(session.buses["first"], -1)
+        assert [*session.buses][0] == "first"
+        held = Held()
+        thread, wrote = key_thread(session, held)
+        held.inside.set()
+        await asyncio.to_thread(thread.join, PATIENCE)
+        assert len(wrote) == 2, "the lines behind it got theirs from the thread of the key"
+        with pytest.raises(SystemExit):
+            session.stop("Ctrl+X")
+        assert session.latched

@@ -1,4 +1,4 @@
-"""The page of plots: the same charts as the panel in all the room, with cursors, trigger, pause, zoom, a way to rerun.
+"""The page of plots: the same charts as the panel in all the room, with cursors, trigger, pause, zoom, and viewers.
 
 A person sets a trigger, reads the cursors, and saves what is visible.
 """
@@ -21,8 +21,6 @@ from multidrop.tui.polling import plotted
 from multidrop.tui.screens.page import AskingPage, Host
 from multidrop.tui.widgets.lines import Row, Span, width_of
 
-PORT = 9876
-"""The port at which viewers of rerun connect by default."""
 EDGES = {"rise": True, "fall": False}
 USUAL = "20%"
 """The share of the picture before the edge."""
@@ -193,7 +191,7 @@ class PlotPage(AskingPage):
         self.lines("below").put_all([*cursor_rows(view, size.width, most), *said] or [self._below(view)])
 
     def _below(self, view: View) -> Row:
-        """The last failure, or how to see what rerun shows."""
+        """The last failure, or how to see what a viewer shows."""
         if self.host.model.trouble:
             return ((f" ✗ {self.host.model.trouble}", "error"),)
         served = [each for each in view.session.plots if each.desk]
@@ -202,7 +200,7 @@ class PlotPage(AskingPage):
                 (" at your desk: ", "dim"),
                 (served[0].desk, "strong"),
                 ("   c copies it; then: ", "dim"),
-                (f"rerun {served[0].where}", "strong"),
+                (served[0].viewer, "strong"),
             )
         others = [each.where for each in view.session.plots]
         return ((f" rerun: plotting to {others[0]}", "dim"),) if others else ()
@@ -339,7 +337,10 @@ class PlotPage(AskingPage):
             self._type("/plot off")
             return
         texts = " ".join(each.text for each in plotted(self.host.session))
-        self._type(f"/plot {texts} --serve {PORT}")
+        try:
+            self._type(f"/plot {texts} {plot_targets.needed().stream}")
+        except Diagnostic as failure:
+            self.say(f"✗ {failure}", "error")
 
     def action_copy(self) -> None:
         served = [each.desk for each in self.host.session.plots if each.desk]

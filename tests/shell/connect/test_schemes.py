@@ -78,7 +78,7 @@ def test_a_scheme_that_is_there_is_taken(monkeypatch: pytest.MonkeyPatch) -> Non
         name = "tcp"
 
     add(monkeypatch, Tcp())
-    monkeypatch.setattr(registry, "load_others", lambda own: None)
+    monkeypatch.setattr(registry, "load_others", lambda: None)
     [warning] = load_others()
     assert warning == "the feature gateway (elsewhere) cannot be loaded: tcp: is taken"
     assert schemes()["tcp"] is CORE["tcp"]

@@ -1,0 +1,156 @@
+"""Features by others where no session is open, in cell files, tables, commands; and one of the wheel that breaks."""
+
+from __future__ import annotations
+
+import json
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from multidrop.base import registry
+from multidrop.simulator import cells
+from tests.support.front_door import Command
+
+GATE = """
+from multidrop.base.feature import Feature
+from multidrop.simulator.cell.endpoint_kinds import EndpointKind
+
+async def serve(floor, bus, endpoint, stack):
+    return [endpoint.text]
+
+FEATURE = Feature("gate", "a gate", adds=(EndpointKind("gate", serve),))
+"""
+SHOP = """
+from multidrop.base.feature import Feature
+from multidrop.shell.sections import Section
+
+def read(table, where):
+    if "hall" in table:
+        raise {failure}
+    return table
+
+FEATURE = Feature("shop", "a shop", adds=(Section("shop", ("hall",), "[shop]", read, dict),))
+"""
+
+
+@pytest.fixture(autouse=True)
+def none_loaded(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in ("_others", "_failed"):
+        monkeypatch.setattr(registry, name, {})
+    monkeypatch.setattr(registry, "_untold", [])
+
+
+def write(folder: Path, name: str, text: str) -> Path:
+    path = folder / "conf" / "features" / f"{name}.py"
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(text)
+    return path
+
+
+def test_a_cell_file_that_is_read_without_a_session_may_have_endpoints_by_others(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    cell = '[[bus]]\nname = "b"\nserve = ["gate://127.0.0.1:0"]\n[[bus.drive]]\npersonality = "LMDCM"\n'
+    monkeypatch.setenv("MULTIDROP_CONFIG_DIR", str(tmp_path / "conf"))
+    monkeypatch.setenv("MULTIDROP_STATE_DIR", str(tmp_path / "state"))
+    write(tmp_path, "gate", GATE)
+    assert [each.scheme for each in cells.read(cell).buses[0].serve] == ["gate"]
+
+
+@pytest.mark.parametrize(
+    ("failure", "said"),
+    [
+        ("ValueError('no such hall')", "shop: the feature shop failed at shop.py:7: ValueError: no such hall"),
+        ("SystemExit(3)", "shop: the feature shop failed at shop.py:7: SystemExit: 3"),
+        ("__import__('multidrop').Diagnostic('no such hall', where)", "shop: no such hall"),
+        ("__import__('multidrop').Diagnostic('shop.hall is none', where)", "shop.hall is none"),
+    ],
+)
+def test_a_table_that_a_feature_cannot_read_is_one_line_with_its_place(
+    failure: str, said: str, tmp_path: Path, multidrop: Command
+) -> None:
+    write(tmp_path, "shop", SHOP.replace("{failure}", failure))
+    (tmp_path / "conf" / "multidrop.toml").write_text('[log]\nalways = true\n[shop]\nhall = "7"\n')
+    checked = multidrop("config", "check")
+    assert checked.returncode == 2
+    [line] = checked.stderr.splitlines()
+    assert line.startswith(f"{tmp_path}/conf/multidrop.toml:") and said in line
+
+
+def test_a_command_by_others_that_fails_is_one_line_and_exit_code_2(tmp_path: Path, multidrop: Command) -> None:
+    text = """
+from multidrop.base.feature import Feature
+from multidrop.shell.operations.operation import Operation
+
+FEATURE = Feature("gate", "a gate", adds=(Operation(command="gate", meaning="open it", run=lambda chosen: 1 / 0),))
+"""
+    write(tmp_path, "gate", text)
+    done = multidrop("gate")
+    assert (done.returncode, done.stdout) == (2, "")
+    assert done.stderr == "the feature gate failed at gate.py:5: ZeroDivisionError: division by zero\n"
+
+
+@pytest.mark.parametrize(
+    ("adds", "why"),
+    [
+        ('Options("shell", {"--yes": "say yes"})', "ArgumentError: argument --yes: conflicting option string: --yes"),
+        ('Options("shell", {"--twin": "run one"})', "shell --twin is taken"),
+        ('Section("keys", (), "[keys]", read, dict)', "[keys] is taken"),
+        ('Section("mqtt", (), "[mqtt]", read, dict)', "[mqtt] is taken"),
+        ('Operation(usage="/gate", work=read)', "/gate has no help"),
+        ('Operation(usage="/gate", help="Open.", work=read), Operation(usage="/gate", help="Open.", work=read)',
+         "/gate is taken"),
+        ('Lent("screen:", "a screen", read)', "relay screen: is taken"),
+        ('EndpointKind("usbip", read)', "serve usbip: is taken"),
+        ('Forms("/plot", "--to FILE", "Plot.", {"--to": "there"})', "/plot --to is taken"),
+        ('PlotTargets((), (), "", "", "", read, read, read)', "the place of plots outside the screen is taken"),
+        ('Pictures({"Session": read}, read)', "the live picture is taken"),
+        ("Options", "TypeError: adds has the class Options, not an instance of it"),
+    ],
+)  # fmt: skip
+def test_what_is_there_already_is_refused_and_said(adds: str, why: str, tmp_path: Path, multidrop: Command) -> None:
+    imports = """
+from multidrop.api.notebooks import Pictures
+from multidrop.base.feature import Feature
+from multidrop.shell.hooks import Options
+from multidrop.shell.operations.operation import Forms, Operation
+from multidrop.shell.plot_targets import PlotTargets
+from multidrop.shell.relaying import Lent
+from multidrop.shell.sections import Section
+from multidrop.simulator.cell.endpoint_kinds import EndpointKind
+
+def read(*given):
+    pass
+
+"""
+    path = write(tmp_path, "gate", f'{imports}FEATURE = Feature("gate", "a gate", adds=({adds},))\n')
+    done = multidrop("help", "MR")
+    assert done.stderr == f"warning: the feature gate ({path}) cannot be loaded: {why}\n" and done.returncode == 0
+
+
+def test_a_feature_of_the_wheel_that_cannot_be_imported_keeps_nothing_else_from_working(
+    multidrop: Command, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    real = registry.importlib.import_module
+
+    def broken(name: str, *given: Any) -> Any:
+        if name == "multidrop.features.sharing":
+            raise SyntaxError("invalid syntax")
+        return real(name, *given)
+
+    monkeypatch.setattr(registry.importlib, "import_module", broken)
+    monkeypatch.setattr(registry, "wheel", cache(registry._wheel))
+    used = multidrop("share", "sim:", "--rfc2217", "0")
+    why = "the feature sharing cannot be loaded: SyntaxError: invalid syntax; install multidrop again, whole"
+    assert (used.returncode, used.stdout, used.stderr) == (2, "", f"share: {why}\n")
+    registry.warnings()
+    monkeypatch.setattr(registry, "wheel", cache(registry._wheel))
+    warning = "the feature sharing (multidrop) cannot be loaded: SyntaxError: invalid syntax"
+    sent = multidrop("send", "sim:#press", "@a PR P")
+    assert (sent.returncode, sent.stdout) == (0, "0\n") and sent.stderr.count(warning) == 1
+    listed = [json.loads(line) for line in multidrop("features", "--json").stdout.splitlines()]
+    assert [each["state"] for each in listed if each["name"] == "sharing"] == [
+        "cannot be loaded: SyntaxError: invalid syntax"
+    ]

@@ -1,0 +1,229 @@
+"""Every kind of record of a feature, each function in it, and how the core comes to call it: for tests of failures.
+
+`CALLS` must have every function of every kind (`tests/features/test_kinds.py`).
+"""
+
+from __future__ import annotations
+
+import ast
+from argparse import Namespace
+from collections.abc import Awaitable, Callable, Iterator, Mapping
+from contextlib import AsyncExitStack
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any
+
+import pytest
+
+from multidrop.api import notebooks
+from multidrop.api.notebooks import Pictures
+from multidrop.api.telemetry import read_rrd
+from multidrop.base import registry
+from multidrop.base.errors import Diagnostic
+from multidrop.base.feature import Feature
+from multidrop.base.foreign import guarded
+from multidrop.base.registry import Entry
+from multidrop.shell import configuration, hooks, plot_targets, relaying
+from multidrop.shell.configuration import Settings
+from multidrop.shell.connect.scheme import NoLine, Scheme
+from multidrop.shell.connect.schemes import local_ports
+from multidrop.shell.connect.urls import parse
+from multidrop.shell.hooks import AtSession, Options
+from multidrop.shell.operations.operation import Forms, Operation
+from multidrop.shell.operations.table import COMMANDS, VERBS
+from multidrop.shell.plot_targets import PlotTargets
+from multidrop.shell.relaying import Lent
+from multidrop.shell.sections import Section, sections
+from multidrop.simulator import cells
+from multidrop.simulator.cell.endpoint_kinds import EndpointKind, kind_of
+from multidrop.simulator.floor import Floor
+from multidrop.simulator.serving.endpoints import serve_bus
+from multidrop.simulator.serving.running import RunningFloor
+from multidrop.transports import Unreachable
+from multidrop.tui.app import look_troubles
+from tests.support.cell_session import bus, party
+from tests.support.paths import ROOT
+
+CORE = ("base", "dialects", "drives", "macros", "multidrop", "shell", "simulator", "transports", "tui")
+ASKS = {"added", "answering", "needed", "records"}
+"""The functions of the registry with which a room asks for records of a class."""
+DATA = {"claims", "passes"}
+"""The methods that are read as a feature is loaded, where whatever they raise refuses it."""
+
+
+class Slow(Scheme):
+    """A scheme with a byte pipe that is never opened here."""
+
+    name, prefix, example, meaning, port = "slow", "slow://", "slow://HOST:1", "a slow gateway", 1
+
+
+async def _work(*_: Any) -> None:
+    """Do nothing."""
+
+
+async def _served(*_: Any) -> list[str]:
+    return []
+
+
+PLAIN: Mapping[type, Any] = MappingProxyType(
+    {
+        AtSession: AtSession(lambda session: None),
+        EndpointKind: EndpointKind("slow", _served),
+        Forms: Forms("/plot", "--slow", "Plot."),
+        Lent: Lent("slow:", "what is slow", lambda rest: None),
+        NoLine: NoLine(("slow",), "it leads to no drives", "try another one"),
+        Operation: Operation(
+            usage="/slow", help="Be slow.", work=_work, command="slow", meaning="be slow", run=lambda chosen: 0
+        ),
+        Options: Options("shell", {"--slow": "be slow"}),
+        Pictures: Pictures({}, lambda readings: None),  # type: ignore[arg-type,return-value]
+        PlotTargets: PlotTargets(
+            ("--to",),
+            (".slow",),
+            "--to FILE.slow",
+            "FILE.slow",
+            "--to slow://h",
+            _work,
+            lambda text: (text, _work),
+            max,
+        ),
+        Scheme: Slow(),
+        Section: Section("slow", ("key",), "[slow]", lambda table, where: table, lambda found: found),
+    }
+)
+"""A record of each kind that does no harm."""
+CHOSEN = Namespace(command="shell", slow=True)
+TABLE = "[slow]\nkey = 1\n"
+
+
+async def _serve(session: Any, record: EndpointKind) -> Any:
+    floor = RunningFloor(Floor(cells.read(bus("third", party("c"), serve=["slow://127.0.0.1:0"]))))
+    async with AsyncExitStack() as stack:
+        stack.callback(floor.close)
+        return await serve_bus(floor, floor.floor.cell.buses[0], stack)
+
+
+def _around(session: Any, record: Options) -> None:
+    with hooks.around(None, CHOSEN):
+        """The screen runs."""
+
+
+def _ports(session: Any, record: Scheme) -> list[str]:
+    return [*map(str, local_ports()), *registry.warnings()]
+
+
+def _of_scheme(name: str, *given: Any) -> Callable[[Any, Scheme], Any]:
+    return lambda session, record: getattr(record, name)(*given)
+
+
+CONNECTION = parse("tcp://127.0.0.1:1")
+Call = Callable[[Any, Any], Any]
+CALLS: Mapping[tuple[type, str], Call] = {
+    (AtSession, "begin"): lambda session, record: hooks.begin(session),
+    (EndpointKind, "open"): _serve,
+    (EndpointKind, "remark"): lambda session, record: kind_of("slow").remark("slow://h:1"),  # type: ignore[union-attr,misc]
+    (Lent, "lend"): lambda session, record: relaying.lender("slow:1").lend("1"),  # type: ignore[union-attr]
+    (Operation, "work"): lambda session, record: session.run("/slow"),
+    (Operation, "recorded"): lambda session, record: session.run("/slow"),
+    (Operation, "checked"): lambda session, record: VERBS["/slow"].check(""),
+    (Operation, "rows"): lambda session, record: VERBS["/slow"].described(),
+    (Operation, "fits"): lambda session, record: VERBS["/slow"].offered(session),
+    (Operation, "run"): lambda session, record: COMMANDS["slow"].command_work(CHOSEN),
+    (Options, "prepare"): lambda session, record: hooks.prepare(session, CHOSEN),
+    (Options, "opened"): lambda session, record: hooks.opened(session, CHOSEN),
+    (Options, "instead"): lambda session, record: hooks.instead(CHOSEN),
+    (Options, "around"): _around,
+    (Pictures, "html"): lambda session, record: notebooks.picture("Session", session),
+    (Pictures, "live"): lambda session, record: notebooks.live(None),
+    (PlotTargets, "begin"): lambda session, record: session.run("/plot x.slow"),
+    (PlotTargets, "save"): lambda session, record: plot_targets.needed().save("x.slow"),
+    (PlotTargets, "read"): lambda session, record: read_rrd("x.slow"),
+    (Scheme, "parse"): lambda session, record: parse("slow://h:1"),
+    (Scheme, "host_and_port"): lambda session, record: parse("slow://h:1"),
+    (Scheme, "open"): lambda session, record: session.open("slow://h:1"),
+    (Scheme, "ports"): _ports,
+    (Scheme, "in_folder"): _of_scheme("in_folder", CONNECTION, "."),
+    (Scheme, "short"): _of_scheme("short", CONNECTION),
+    (Scheme, "port_name"): _of_scheme("port_name", CONNECTION),
+    (Scheme, "shown"): _of_scheme("shown", CONNECTION),
+    (Scheme, "lasting"): _of_scheme("lasting", CONNECTION, ""),
+    (Scheme, "found"): _of_scheme("found", CONNECTION, ""),
+    (Scheme, "again"): _of_scheme("again", CONNECTION, None, 0.0),
+    (Scheme, "searched"): _of_scheme("searched", ""),
+    (Section, "read"): lambda session, record: configuration.parse(TABLE, "f.toml"),
+    (Section, "shown"): lambda session, record: sections()["slow"].shown({}),
+    (Section, "unreadable"): lambda session, record: look_troubles(Settings(sections={"slow": {}}), TABLE, "f.toml"),
+}
+"""How the core comes to call each function, of a record by others that was added, in the loop of a session."""
+ASYNC = {
+    (EndpointKind, "open"),
+    (Operation, "work"),
+    (Options, "opened"),
+    (PlotTargets, "begin"),
+    (Scheme, "open"),
+}
+"""Those that are awaited."""
+NAMES = [f"{kind.__name__}.{name}" for kind, name in CALLS]
+
+
+def broken(kind: type, name: str, function: Callable[..., Any]) -> Any:
+    """A record of a kind, one of whose functions is this one."""
+
+    async def awaited(*given: Any, **named: Any) -> Any:
+        found = function(*given, **named)
+        return await found if isinstance(found, Awaitable) else found
+
+    called = awaited if (kind, name) in ASYNC else function
+    if kind is Scheme:
+        return type("Broken", (Slow,), {name: lambda self, *given, **named: called(*given, **named)})()
+    if (kind, name) == (Pictures, "html"):
+        return PLAIN[kind]._replace(html={"Session": called})
+    return PLAIN[kind]._replace(**{name: called})
+
+
+def add(monkeypatch: pytest.MonkeyPatch, *adds: object) -> Feature:
+    """Let these records be all that any feature adds: those of `x`, which is by others."""
+    feature = guarded(Feature("x", "tries to be in the way", adds=adds))
+    monkeypatch.setattr(registry, "IN_WHEEL", {})
+    monkeypatch.setattr(registry, "_others", {"p": (Entry("x", "dist", "1", "p"), feature)})
+    return feature
+
+
+async def outcome(session: Any, kind: type, name: str, feature: Feature) -> str:
+    """What a person reads of a call: what is raised for them, or what comes back."""
+    try:
+        found = CALLS[kind, name](session, feature.adds[0])
+        return str(await found if isinstance(found, Awaitable) else found)
+    except (Diagnostic, Unreachable) as failure:
+        return str(failure)
+
+
+# What there is
+
+
+def kinds_asked_for() -> set[str]:
+    """The classes of records for which any room of the core asks the registry."""
+    found = set()
+    for room in CORE:
+        for path in (ROOT / room).rglob("*.py"):
+            if (
+                path.is_relative_to(ROOT / "base" / "registry.py")
+                or path.parts[len(ROOT.parts) :].count("multidrop") > 1
+            ):
+                continue
+            found |= {*_asked(path)}
+    return found
+
+
+def _asked(path: Path) -> Iterator[str]:
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        asks = isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute) and node.func.attr in ASKS
+        if asks and ast.unparse(node.func.value) == "registry":
+            yield ast.unparse(node.args[node.func.attr == "records"])
+
+
+def functions_of(kind: type) -> set[str]:
+    """The functions in a record of a class: fields that are callable or hold such, or the methods of an object."""
+    if hasattr(kind, "_fields"):
+        return {name for name, about in kind.__annotations__.items() if "Callable" in str(about)}
+    return {name for name, found in vars(kind).items() if callable(found) and not name.startswith("_")} - DATA
