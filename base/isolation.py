@@ -6,8 +6,20 @@ import logging
 from types import TracebackType
 
 from multidrop.base.errors import Diagnostic, TransportLost
+from multidrop.base.text import visible
 
 LOG = logging.getLogger("multidrop")
+MOST = 100
+_said: set[str] = set()
+"""The failures of features that were reported where no one keeps a log: an event comes ten times a second."""
+
+
+def _report(what: str, failure: Exception) -> None:
+    if not isinstance(failure, Diagnostic) or LOG.hasHandlers():
+        LOG.error("%s failed", what, exc_info=failure)
+    elif (text := str(failure)) not in _said and len(_said) < MOST:  # it is for a person, without a traceback
+        _said.add(text)
+        LOG.error("%s", visible(text))
 
 
 class isolated:  # noqa: N801
@@ -39,7 +51,7 @@ class isolated:  # noqa: N801
         text = str(failure)
         if not isinstance(failure, TransportLost | OSError):  # a defect, of whatever kind
             text = str(failure) if isinstance(failure, Diagnostic) else f"a defect: {type(failure).__name__}"
-            LOG.error("%s failed", self._what, exc_info=failure)
+            _report(self._what, failure)
         if self._failed is not None:
             self._failed.append(text)
         return True
