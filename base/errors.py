@@ -90,6 +90,10 @@ class Diagnostic(Exception):
         return f"{head}{self.message}{tail}"
 
 
+class FeatureFailed(Diagnostic):
+    """A function of a feature by others failed. If a log of defects is kept, its traceback is there already."""
+
+
 PUBLIC = (
     DriveError,
     Refused,

@@ -18,9 +18,9 @@ from os.path import basename
 from types import GeneratorType
 from typing import Any
 
-from multidrop.base.errors import Diagnostic, DriveError, TransportLost, kind_and_text
+from multidrop.base.errors import Diagnostic, DriveError, FeatureFailed, TransportLost, kind_and_text
 from multidrop.base.feature import Feature, Kinds
-from multidrop.base.isolation import LOG
+from multidrop.base.isolation import LOG, OTHERS
 
 READ: Kinds = (Diagnostic, DriveError, TransportLost, BrokenPipeError)
 """What passes as it is: the errors that a person reads, and the end of the reader of standard output."""
@@ -44,8 +44,10 @@ class Guard:
             raise
         except (Exception, SystemExit) as failure:
             if LOG.hasHandlers():  # a screen keeps it; elsewhere it would be a traceback
-                LOG.error("the feature %s failed", self._name, exc_info=failure)
-            raise Diagnostic(f"the feature {self._name} failed{_place(failure)}: {kind_and_text(failure)}") from failure
+                LOG.getChild(OTHERS).error("the feature %s", self._name, exc_info=failure)
+            raise FeatureFailed(
+                f"the feature {self._name} failed{_place(failure)}: {kind_and_text(failure)}"
+            ) from failure
         finally:
             _calling.set(before)  # not by a token: a task that is thrown away ends in another context
 
