@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
+
 
 class DriveError(Exception):
     """A request failed: refused, unanswered, damaged or stopped. One line, for a person."""
@@ -88,6 +90,10 @@ class Diagnostic(Exception):
         return f"{head}{self.message}{tail}"
 
 
+class FeatureFailed(Diagnostic):
+    """A function of a feature by others failed. If a log of defects is kept, its traceback is there already."""
+
+
 PUBLIC = (
     DriveError,
     Refused,
@@ -103,3 +109,11 @@ PUBLIC = (
 )
 for _each in PUBLIC:
     _each.__module__ = "multidrop"  # a traceback shows the name by which a program catches it
+
+
+def kind_and_text(failure: BaseException) -> str:
+    """The kind of an error and its text, in one line. A text that raises is left out: others may have written it."""
+    text = ""
+    with suppress(Exception):
+        text = " ".join(str(failure).split())
+    return f"{type(failure).__name__}: {text}" if text else type(failure).__name__

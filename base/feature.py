@@ -33,6 +33,16 @@ class Feature(NamedTuple):
     extras: Mapping[str, str] = MappingProxyType({})
     """The extras of the distribution that it uses: each with a module that is there once it is installed."""
 
+    def wrong(self) -> str:
+        """What is wrong in its form, in words; empty: nothing."""
+        if not (isinstance(self.name, str) and isinstance(self.meaning, str)):
+            return "name and meaning are texts"
+        if type(self.adds) not in (tuple, list):  # one record without a comma behind it is a tuple, too
+            return "adds is a tuple of records, as in (RECORD,)"
+        if not (isinstance(self.extras, Mapping) and all(isinstance(each, str) for each in self.extras.values())):
+            return "extras is a mapping of names to names of modules"
+        return ""
+
     def missing(self) -> list[str]:
         """The extras that are not installed."""
         return [extra for extra, module in self.extras.items() if PathFinder.find_spec(module) is None]

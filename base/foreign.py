@@ -18,9 +18,9 @@ from os.path import basename
 from types import GeneratorType
 from typing import Any
 
-from multidrop.base.errors import Diagnostic, DriveError, TransportLost
+from multidrop.base.errors import Diagnostic, DriveError, FeatureFailed, TransportLost, kind_and_text
 from multidrop.base.feature import Feature, Kinds
-from multidrop.base.isolation import LOG
+from multidrop.base.isolation import LOG, OTHERS
 
 READ: Kinds = (Diagnostic, DriveError, TransportLost, BrokenPipeError)
 """What passes as it is: the errors that a person reads, and the end of the reader of standard output."""
@@ -44,8 +44,10 @@ class Guard:
             raise
         except (Exception, SystemExit) as failure:
             if LOG.hasHandlers():  # a screen keeps it; elsewhere it would be a traceback
-                LOG.error("the feature %s failed", self._name, exc_info=failure)
-            raise Diagnostic(f"the feature {self._name} failed{_place(failure)}: {_words(failure)}") from failure
+                LOG.getChild(OTHERS).error("the feature %s", self._name, exc_info=failure)
+            raise FeatureFailed(
+                f"the feature {self._name} failed{_place(failure)}: {kind_and_text(failure)}"
+            ) from failure
         finally:
             _calling.set(before)  # not by a token: a task that is thrown away ends in another context
 
@@ -103,7 +105,10 @@ class Guard:
         return value
 
     def record(self, record: Any) -> Any:
-        """A record with all its functions guarded: the fields of a named tuple, else the methods of an object."""
+        """A record with all its functions guarded: the fields of a named tuple, else the methods of an object.
+
+        These are methods of the object itself, which calls its own ones as they are, and keeps its state.
+        """
         passes: Mapping[str, Kinds] = record.passes() if hasattr(record, "passes") else {}
         if isinstance(record, tuple) and hasattr(record, "_fields"):
             fields = zip(record._fields, record, strict=True)
@@ -112,7 +117,7 @@ class Guard:
             return record
         made = copy.copy(record)
         for name in dir(type(made)):
-            if not name.startswith("_") and _is_function(found := getattr(made, name)):
+            if not name.startswith("_") and _is_function(found := getattr(record, name)):
                 vars(made)[name] = self.function(found, passes.get(name, ()))
         return made
 
@@ -131,11 +136,6 @@ def callback(function: Callable[..., Any]) -> Callable[..., Any]:
 
 def _is_function(value: object) -> bool:
     return callable(value) and not isinstance(value, type)
-
-
-def _words(failure: BaseException) -> str:
-    text = " ".join(str(failure).split())
-    return f"{type(failure).__name__}: {text}" if text else type(failure).__name__
 
 
 def _place(failure: BaseException) -> str:

@@ -5,9 +5,25 @@ from __future__ import annotations
 import logging
 from types import TracebackType
 
-from multidrop.base.errors import Diagnostic, TransportLost
+from multidrop.base.errors import Diagnostic, FeatureFailed, TransportLost
+from multidrop.base.text import visible
 
 LOG = logging.getLogger("multidrop")
+OTHERS = "others"
+"""The part of the log for features by others: what is in it is no defect of multidrop."""
+MOST = 100
+_said: set[str] = set()
+"""The failures of features that were reported where no one keeps a log: an event comes ten times a second."""
+
+
+def _report(what: str, failure: Exception) -> None:
+    kept = LOG.hasHandlers()
+    if isinstance(failure, Diagnostic) and not kept:  # it is for a person, without a traceback
+        if (text := str(failure)) not in _said and len(_said) < MOST:
+            _said.add(text)
+            LOG.error("%s", visible(text))
+    elif not isinstance(failure, FeatureFailed):
+        LOG.error("%s failed", what, exc_info=failure)
 
 
 class isolated:  # noqa: N801
@@ -39,7 +55,7 @@ class isolated:  # noqa: N801
         text = str(failure)
         if not isinstance(failure, TransportLost | OSError):  # a defect, of whatever kind
             text = str(failure) if isinstance(failure, Diagnostic) else f"a defect: {type(failure).__name__}"
-            LOG.error("%s failed", self._what, exc_info=failure)
+            _report(self._what, failure)
         if self._failed is not None:
             self._failed.append(text)
         return True

@@ -16,12 +16,12 @@ import importlib
 import os
 import sys
 from collections.abc import Iterable, Iterator, Mapping
-from contextlib import suppress
+from contextlib import redirect_stdout, suppress
 from functools import cache
 from types import TracebackType
 from typing import Any, NamedTuple, TypeVar
 
-from multidrop.base.errors import Diagnostic
+from multidrop.base.errors import Diagnostic, kind_and_text
 from multidrop.base.feature import NAME, Feature
 from multidrop.base.on_demand import importing
 
@@ -95,10 +95,9 @@ class Attempt:
     def __exit__(
         self, kind: type[BaseException] | None, failure: BaseException | None, _: TracebackType | None
     ) -> bool:
-        if not isinstance(failure, Exception | SystemExit):
+        if failure is None or isinstance(failure, KeyboardInterrupt):
             return False
-        text = str(failure) if isinstance(failure, Diagnostic) else f"{type(failure).__name__}: {failure}"
-        self._failed.append(text)
+        self._failed.append(str(failure) if isinstance(failure, Diagnostic) else kind_and_text(failure))
         return True
 
 
@@ -250,9 +249,12 @@ def _loaded(entry: Entry) -> Feature:
 
     if entry.name in IN_WHEEL or entry.name in (known.name for known, _ in _others.values()):
         raise Diagnostic("another feature has this name")
-    found = _of_file(entry.place) if entry.place == entry.source else _of_place(entry.place)
+    with redirect_stdout(sys.stderr):  # what it prints is no reply of a drive
+        found = _of_file(entry.place) if entry.place == entry.source else _of_place(entry.place)
     if not isinstance(found, Feature):
         raise TypeError(f"{RECORD} is no multidrop.base.feature.Feature")
+    if wrong := found.wrong():
+        raise TypeError(wrong)
     if found.name != entry.name or not NAME.fullmatch(found.name):
         raise Diagnostic(f"its record has the name {found.name}; a name is a Python word in small letters")
     for each in found.adds:
@@ -280,6 +282,8 @@ def _of_file(place: str) -> Any:
     path = Path(place)
     if writer := other_writer(path):
         raise Diagnostic(f"can be changed by {writer}, so it is not used")
+    if not path.is_file():  # a pipe would be read until somebody writes
+        raise Diagnostic("it is not a file")
     spec = util.spec_from_file_location(f"multidrop_own_{path.stem}", path)
     if spec is None or spec.loader is None:
         raise ImportError("it is no module")

@@ -267,7 +267,9 @@ def _epilog(operation: Operation) -> str:
     from multidrop.shell.operations.table import COMMANDS
 
     own = COMMANDS.parts(operation.command)
-    given = [*operation.examples, *examples(operation.command)] or [each.examples[-1] for each in own.values()]
+    given = [*operation.examples, *examples(operation.command)] or [
+        each.examples[-1] for each in own.values() if each.examples
+    ]
     lines = ["examples:", *(f"  multidrop {each}" for each in given)]
     if own and operation.run:  # argparse does not list them
         lines = ["also:", *(f"  {each.command:<15} {each.meaning}" for each in own.values()), "", *lines]

@@ -22,8 +22,10 @@ import shtab
 from argparse_manpage.manpage import Manpage
 
 import multidrop
+from multidrop.base.registry import added
 from multidrop.cli import build, urls
 from multidrop.commands.serving import FILES
+from multidrop.shell.connect.scheme import NoLine
 from multidrop.shell.connect.schemes import schemes
 
 SHIPPED = ROOT / "multidrop" / "shipped"
@@ -49,6 +51,8 @@ BEGINNINGS = " ".join(
     + [form.prefix for scheme, form in schemes().items() if scheme not in ("sim", "serial")]
 )
 """The beginnings of URLs: of a serial port the path is enough."""
+BROKERS = [f"{name}://" for each in added(NoLine) for name in each.names]
+"""The beginnings of URLs that lead to no drives."""
 CONFIG = '"${MULTIDROP_CONFIG_DIR:-${XDG_CONFIG_HOME:-$HOME/.config}/multidrop}'
 LISTS = {
     "url": rf"""
@@ -57,7 +61,7 @@ LISTS = {
   file={CONFIG}/multidrop.toml"
   [ -r "$file" ] && sed -n 's/^ *\[connections\.\([A-Za-z0-9_][A-Za-z0-9_-]*\)\].*/\1/p' "$file"
 """,
-    "broker": "\n  printf '%s\\n' mqtt:// mqtts://\n",
+    "broker": f"\n  printf '%s\\n' {' '.join(BROKERS)}\n",
     "drive": rf"""
   printf '%s\n' all
   file={CONFIG}/multidrop.toml"
@@ -82,7 +86,7 @@ FISH_LISTS = {
   test -r "$folder/multidrop.toml"; or return
   sed -n 's/^ *\[connections\.\([A-Za-z0-9_][A-Za-z0-9_-]*\)\].*/\1/p' "$folder/multidrop.toml"
 """,
-    "broker": "\n  printf '%s\\n' mqtt:// mqtts://\n",
+    "broker": f"\n  printf '%s\\n' {' '.join(BROKERS)}\n",
     "drive": rf"""
   printf '%s\n' all{FISH_CONFIG}
   test -r "$folder/multidrop.toml"; or return
@@ -99,7 +103,7 @@ POWERSHELL_LISTS = {
   Select-String -Path (Join-Path (_multidrop_folder) 'multidrop.toml') -ErrorAction SilentlyContinue `
     -Pattern '^ *\[connections\.([A-Za-z0-9_][A-Za-z0-9_-]*)\]' | ForEach-Object {{ $_.Matches[0].Groups[1].Value }}
 """,
-    "broker": "\n  'mqtt://', 'mqtts://'\n",
+    "broker": f"\n  {', '.join(map(repr, BROKERS))}\n",
     "drive": r"""
   'all'
   Select-String -Path (Join-Path (_multidrop_folder) 'multidrop.toml') -ErrorAction SilentlyContinue `

@@ -36,7 +36,7 @@ def salvage(text: str, where: str, read: Callable[[dict[str, Any], str], T]) -> 
     """Read what is right, by `read`, which raises Diagnostic with the key at the beginning of its message.
 
     Also returns each error, and the errors of saved connections that lack names, units or guards by their names; an
-    empty name: every line.
+    empty name: every line. Raises what `read` raises of an empty document.
     """
     document, problems, lost = _sections(text, where)
     while True:
@@ -44,6 +44,8 @@ def salvage(text: str, where: str, read: Callable[[dict[str, Any], str], T]) -> 
             told = sorted(problems, key=lambda each: int(each.where.rpartition(":")[2]) if each.where != where else 0)
             return read(document, where), tuple(told), dict(reversed([*_doubts(lost)]))
         except Diagnostic as problem:
+            if not document:  # nothing is left that could be left out
+                raise
             # The longest path of the document with which a message begins; that of the file itself is empty.
             name = problem.message.removeprefix("no key ")
             found = [path for path in _paths(document) if re.match(rf"{re.escape('.'.join(path))}(?![\w-])", name)]

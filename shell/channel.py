@@ -39,7 +39,7 @@ class Tasks:
         return bool(self._running)
 
     async def run(self, work: Coroutine[Any, Any, T]) -> T:
-        """Await the work. Raises Stopped if a stop ended it."""
+        """Await the work. Raises Stopped if a stop ended it, and Diagnostic if it ended itself in that way."""
         task = asyncio.get_running_loop().create_task(work)
         self._running[task] = None
         self._changed()
@@ -48,7 +48,10 @@ class Tasks:
         except asyncio.CancelledError:
             if task in self._stopped:
                 raise Stopped("stopped before it was done") from None
-            raise
+            caller = asyncio.current_task()
+            if task.cancelling() or (caller is not None and caller.cancelling()):
+                raise
+            raise Diagnostic("cancelled before it was done") from None
         finally:
             del self._running[task]
             self._stopped.pop(task, None)

@@ -12,6 +12,7 @@ from itertools import takewhile
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from multidrop.base import registry
+from multidrop.base.errors import Diagnostic
 from multidrop.base.feature import Kinds
 from multidrop.shell.operations.operation import TYPE_RAISES
 
@@ -43,8 +44,12 @@ class AtSession(NamedTuple):
         return {"begin": (Exception, SystemExit)}
 
 
+COMMANDS = ("shell", "tui")
+"""The commands that take options of features."""
+
+
 class Options(NamedTuple):
-    """Options of a command that is there already.
+    """Options of a command that is there already, one of `COMMANDS`.
 
     `prepare` and `opened` take the session and the parsed arguments: `prepare` before a URL is opened, `opened` once
     all are, in a command that is not for a person. `instead` and `around` are of the options of `tui`.
@@ -69,7 +74,9 @@ class Options(NamedTuple):
         return {"type": TYPE_RAISES}
 
     def claims(self) -> tuple[str, ...]:
-        """What only one feature can add."""
+        """What only one feature can add. Raises Diagnostic for a command that takes no options of features."""
+        if self.command not in COMMANDS:
+            raise Diagnostic(f"{self.command} takes no options of features; {' and '.join(COMMANDS)} do")
         return tuple(f"{self.command} {each.partition(' ')[0]}" for each in self.arguments)
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import TypeVar
 
+from multidrop.base.foreign import callback
 from multidrop.base.isolation import isolated
 from multidrop.drives.bus import Bus
 
@@ -12,15 +13,23 @@ P = TypeVar("P")
 OnBus = Callable[[Bus], None]
 
 
+class Functions(list[OnBus]):
+    """Functions in the order of their calls. What others wrote is guarded."""
+
+    def append(self, function: OnBus) -> None:
+        """Add a function at the end."""
+        super().append(callback(function))
+
+
 class SessionHooks:
     """The functions that are called with a line, each isolated from the others; and the objects that features keep."""
 
     def __init__(self) -> None:
-        self.changed: list[OnBus] = []
+        self.changed = Functions()
         """Called with each line that has changed, once that is published."""
-        self.identified: list[OnBus] = []
+        self.identified = Functions()
         """Called with each line whose drives were found."""
-        self.forgotten: list[OnBus] = []
+        self.forgotten = Functions()
         """Called with each line that is about to be closed."""
         self._parts: dict[type, object] = {}
 

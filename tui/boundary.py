@@ -92,8 +92,8 @@ class Boundary:
             return work()
         return instead(attempt.trouble)
 
-    def caught(self, place: str, failure: BaseException) -> str:
-        """Take a defect: write it once, count it, say it once; return what its place shows."""
+    def caught(self, place: str, failure: BaseException, defect: str = "a defect of multidrop") -> str:
+        """Take a defect: write it once, count it, say it once; return what its place shows. `defect`: its name."""
         if isinstance(failure, WorkerFailed):
             failure = failure.error
         origin = _origin(failure)
@@ -104,7 +104,7 @@ class Boundary:
         if not known and len(self.counts) <= MOST:
             written = self._write(place, failure)
             details = f"details: {self.path}" if written else f"{self.path} could not be written"
-            self._say(f"a defect of multidrop in {place}: {type(failure).__name__}; {GOES_ON}; {details}")
+            self._say(f"{defect} in {place}: {type(failure).__name__}; {GOES_ON}; {details}")
         return text
 
     def end(self) -> None:
@@ -226,7 +226,8 @@ class _Handler(logging.Handler):
         failure = record.exc_info[1] if record.exc_info else None
         if failure is not None:
             with suppress(RuntimeError):  # the loop has ended
-                self._loop.call_soon_threadsafe(self._boundary.caught, record.getMessage(), failure)
+                whose = "a defect of multidrop" if record.name == LOG.name else "a defect"
+                self._loop.call_soon_threadsafe(self._boundary.caught, record.getMessage(), failure, whose)
 
 
 def _origin(failure: BaseException) -> str:

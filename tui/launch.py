@@ -57,9 +57,9 @@ async def _run(
         from multidrop.shell.session import Session
 
     session = Session(settings, reconnect=reconnect, raw=raw)
-    prepare(session)
     app: MultidropApp | None = None
     try:
+        prepare(session)
         with collected_at_rest(partial(at_rest, session)):
             app = MultidropApp(session, urls, Assist(session, settings), driver(), settings.look)
             app.stops_to_the_end = True

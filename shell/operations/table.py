@@ -243,8 +243,23 @@ def groups() -> dict[str, list[str]]:
     return found
 
 
-def _is_name(word: str) -> bool:
-    return bool(_VERB.fullmatch(word) or _COMMAND.fullmatch(word))
+def _wrong(added: Operation) -> str:
+    """What an operation by others lacks, in words; empty: nothing. Raises TypeError or ValueError for a wrong kind."""
+    dict(added.words), " ".join(added.examples)
+    if not added.name and not added.command:
+        return "an Operation has neither the usage of a verb nor a command"
+    for name, named in (added.name, _VERB), (added.command, _COMMAND):
+        if name and not named.fullmatch(name):
+            return f"{name} is no name of a verb or a command"
+    if added.name and not added.help.strip():
+        return f"{added.name} has no help"
+    if added.command and not added.meaning.strip():
+        return f"{added.command} has no meaning"
+    if added.name and not callable(added.work):
+        return f"{added.name} has no function"
+    if added.command and not callable(added.run) and not COMMANDS.parts(added.command):
+        return f"{added.command} has no function"
+    return ""
 
 
 def load_others() -> list[str]:
@@ -281,10 +296,8 @@ def _check(feature: Feature) -> None:
     if taken := next((each for each in registry.claims(feature) if each in core), ""):
         raise Diagnostic(f"{taken} is taken")
     for each in registry.records((feature,), Operation):
-        if odd := next((word for word in each.claims() if not _is_name(word)), ""):
-            raise Diagnostic(f"{odd} is no name of a verb or a command")
-        if each.name and not each.help.strip():
-            raise Diagnostic(f"{each.name} has no help")
+        if wrong := _wrong(each):
+            raise Diagnostic(wrong)
     for record in feature.adds:
         if (added := getattr(record, "arguments", None)) is not None:  # of a command, or more of one that is there
             command = str(getattr(record, "command", ""))

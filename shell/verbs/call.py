@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Coroutine, Mapping, Sequence
 from dataclasses import dataclass
+from inspect import iscoroutine
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -41,6 +42,8 @@ class Call:
 
     def work(self) -> Coroutine[Any, Any, None]:
         work: Coroutine[Any, Any, None] = self.verb.imported(self.verb.work)(self)
+        if not iscoroutine(work):  # by others
+            raise Diagnostic(f"{self.verb.name} has no async function")
         return work
 
     def recorded(self) -> str:

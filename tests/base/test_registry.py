@@ -71,6 +71,10 @@ def test_without_the_configuration_a_persons_own_files_are_not_loaded(own: Path)
         ("1 / 0", "ZeroDivisionError: division by zero"),
         ("x = 1", "AttributeError: "),
         ("FEATURE = 1", "TypeError: FEATURE is no multidrop.base.feature.Feature"),
+        ("class B(BaseException): pass\nraise B('x')", "B: x"),
+        (GOOD.replace('"does something"', "None"), "TypeError: name and meaning are texts"),
+        (GOOD.replace('something"', 'something", adds=Feature("a", "b")'), "TypeError: adds is a tuple of records"),
+        (GOOD.replace('something"', 'something", extras=["fit"]'), "TypeError: extras is a mapping of names to names"),
         (GOOD.replace("{name}", "other"), "its record has the name other"),
     ],
 )
@@ -92,6 +96,14 @@ def test_a_file_that_others_can_change_is_not_used(own: Path) -> None:
     registry.load_others()
     [warning] = registry.warnings()
     assert "can be changed by every account" in warning and registry.by_others() == []
+
+
+@pytest.mark.fork
+def test_a_pipe_in_the_folder_is_not_read(own: Path) -> None:
+    os.mkfifo(own / "pipe.py")
+    (own / "folder.py").mkdir()
+    registry.load_others()
+    assert [each.endswith("cannot be loaded: it is not a file") for each in registry.warnings()] == [True, True]
 
 
 def test_a_name_of_the_wheel_is_taken(own: Path, monkeypatch: pytest.MonkeyPatch) -> None:

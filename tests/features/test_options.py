@@ -6,18 +6,22 @@ import io
 import sys
 from argparse import Namespace
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 from multidrop.base import registry
+from multidrop.base.errors import Diagnostic
 from multidrop.base.feature import Feature
 from multidrop.base.registry import Entry
 from multidrop.shell import hooks
+from multidrop.shell.configuration import Settings
 from multidrop.shell.hooks import Options
 from multidrop.shell.relaying import Lent, lender, ports
+from multidrop.shell.session import Session
+from multidrop.tui import launch
 from tests.support.front_door import Called, Command, Done, at_terminal
 
 
@@ -110,3 +114,16 @@ def test_relay_lends_what_a_feature_adds(monkeypatch: pytest.MonkeyPatch, add: C
 
         monkeypatch.setattr(sys, "stdin", io.StringIO())
         assert main(["relay", "bell:x:y"]) == 0 and lend.calls == [("x:y",)]
+
+
+async def test_a_screen_whose_option_fails_closes_its_session(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setenv("MULTIDROP_STATE_DIR", str(tmp_path))
+    background = []
+
+    def prepare(session: Session) -> None:
+        background.append(session.start("/sleep 60"))
+        raise Diagnostic("cannot be done")
+
+    with pytest.raises(Diagnostic, match="^cannot be done$"):
+        await launch._run([], Settings(), False, False, prepare, nullcontext)
+    assert background[0].done()

@@ -100,6 +100,14 @@ FEATURE = Feature("gate", "a gate", adds=(Operation(command="gate", meaning="ope
         ('Section("keys", (), "[keys]", read, dict)', "[keys] is taken"),
         ('Section("mqtt", (), "[mqtt]", read, dict)', "[mqtt] is taken"),
         ('Operation(usage="/gate", work=read)', "/gate has no help"),
+        ('Operation(usage="/gate", help="Open.")', "/gate has no function"),
+        ('Operation(usage="gate", help="Open.", work=read)', "gate is no name of a verb or a command"),
+        ('Operation(usage=" ", work=read)', "an Operation has neither the usage of a verb nor a command"),
+        ('Operation(command="gate", run=read)', "gate has no meaning"),
+        ('Operation(command="gate", meaning="open it")', "gate has no function"),
+        ('Operation(command="gate", meaning="open it", run=read, examples=1)',
+         "TypeError: can only join an iterable"),
+        ('Options("send", {"--gate": "open it"})', "send takes no options of features; shell and tui do"),
         ('Operation(usage="/gate", help="Open.", work=read), Operation(usage="/gate", help="Open.", work=read)',
          "/gate is taken"),
         ('Lent("screen:", "a screen", read)', "relay screen: is taken"),
@@ -128,6 +136,40 @@ def read(*given):
     path = write(tmp_path, "gate", f'{imports}FEATURE = Feature("gate", "a gate", adds=({adds},))\n')
     done = multidrop("help", "MR")
     assert done.stderr == f"warning: the feature gate ({path}) cannot be loaded: {why}\n" and done.returncode == 0
+
+
+VERB = """
+from multidrop.base.feature import Feature
+from multidrop.shell.operations.operation import Operation
+
+print("imported")
+
+def gate(call):
+    pass
+
+FEATURE = Feature("gate", "a gate", adds=(
+    Operation(usage="/gate", help="Open it.", work=gate),
+    Operation(command="log gate", meaning="log it", run=lambda chosen: 0),
+))
+"""
+
+
+def test_a_verb_that_is_not_async_is_one_line(tmp_path: Path, multidrop: Command) -> None:
+    write(tmp_path, "gate", VERB)
+    done = multidrop("send", "sim:#press", "/gate")
+    assert (done.returncode, done.stderr) == (2, "imported\n/gate has no async function\n")
+
+
+def test_what_a_feature_prints_as_it_is_imported_is_no_reply(tmp_path: Path, multidrop: Command) -> None:
+    write(tmp_path, "gate", VERB)
+    done = multidrop("send", "sim:#press", "@a PR P")
+    assert (done.returncode, done.stdout, done.stderr) == (0, "0\n", "imported\n")
+
+
+def test_a_part_of_a_group_without_an_example_is_in_its_help(tmp_path: Path, multidrop: Command) -> None:
+    write(tmp_path, "gate", VERB)
+    done = multidrop("log", "--help")
+    assert done.returncode == 0 and "multidrop log show" in done.stdout
 
 
 def test_a_feature_of_the_wheel_that_cannot_be_imported_keeps_nothing_else_from_working(

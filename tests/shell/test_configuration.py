@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from multidrop.base import places
 from multidrop.base.errors import Diagnostic
 from multidrop.shell import configuration, line_syntax
+from multidrop.shell.broken_configuration import salvage
 
 
 @pytest.fixture
@@ -238,3 +239,11 @@ def test_lines_name_drives_only_where_every_one_does() -> None:
     for other in ("PR P", "@* PR P", "@a PR 'P"):
         found = line_syntax.targets(["@a PR P", other])
         assert found == (("a",) if other.startswith("@a") else ())
+
+
+def test_an_error_of_an_empty_document_ends_the_salvage():
+    def read(document: dict[str, object], where: str) -> None:
+        raise Diagnostic("never right")
+
+    with pytest.raises(Diagnostic, match="^never right$"):
+        salvage("[screen]\ntheme = 1\n", "f.toml", read)

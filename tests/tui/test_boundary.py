@@ -14,6 +14,7 @@ from textual.pilot import Pilot
 from textual.screen import Screen
 from textual.widget import Widget
 
+from multidrop.base.foreign import Guard
 from multidrop.drives.poller import Poller
 from multidrop.drives.stopping import Fate
 from multidrop.shell.channel import Field
@@ -267,6 +268,19 @@ async def test_a_defect_in_a_poll_a_timer_or_an_event_ends_nothing(
             await it.session.start("@b PR P")
             await it.until(lambda: it.file.exists() and "planted" in it.file.read_text())
             await it.holds(name)
+
+
+async def test_a_defect_of_a_feature_by_others_is_said_once_and_is_not_multidrops(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    async with machine(tmp_path, monkeypatch) as it:
+        await it.begin()
+        it.session.subscribe(Guard("gauge").function(boom))
+        await it.session.start("@b PR P")
+        await it.until(lambda: it.file.exists() and "the feature gauge" in it.file.read_text())
+        records = [each.text for each in it.app.main.page("press").records if "a defect" in each.text]  # type: ignore[attr-defined]
+        assert [each.partition(";")[0] for each in records] == ["a defect in the feature gauge: ZeroDivisionError"]
+        await it.holds("the feature gauge")
 
 
 async def test_a_defect_in_every_frame_is_written_once_and_counted(
