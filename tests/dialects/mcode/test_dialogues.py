@@ -5,8 +5,6 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
-import pytest
-
 from multidrop.dialects import Hints, Kind, Owed, Priority
 from multidrop.dialects.codec import Started
 from multidrop.dialects.exchange import Looking
@@ -43,9 +41,8 @@ from multidrop.dialects.program_files import Held, Stored
 from multidrop.dialects.scanning import Reach
 from multidrop.dialects.state import Remembered
 from multidrop.dialects.values import ORDINARY, Change, Permission, Plan, Readings
-from tests.support.dialogues import blocks, played
+from tests.support.dialogues import dialogue_tests
 
-FILES = sorted(Path(__file__).parent.glob("*.dialogues"))
 USED = (
     replace, Hints, Kind, Owed, Priority, Started, Looking, family, MCODE, before_request, classify, codec, debugging,
     download, exchange, framing, identify, identity, motions, operations, program_readout, programs, reply_parser,
@@ -124,15 +121,4 @@ def expected(place, last=None, stated=False, product="", **known):
     return state
 
 
-def dialogues_of(file):
-    """A test of the dialogues of one file: a test of all of them is too long to be among the first of a mutant."""
-    found = blocks(file.read_text(encoding="utf-8"))
-
-    @pytest.mark.parametrize("title", found)
-    def goes_as_it_is_written(title):
-        assert played(found[title], globals()) == found[title]
-
-    return goes_as_it_is_written
-
-
-globals().update({f"test_a_dialogue_of_{file.stem}_goes_as_it_is_written": dialogues_of(file) for file in FILES})
+globals().update(dialogue_tests(Path(__file__).parent, globals()))
