@@ -26,6 +26,8 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
+import pytest
+
 from multidrop.base.errors import Diagnostic, DriveError, Stopped
 from multidrop.dialects import End, Reply, Request
 from multidrop.dialects.codec import Codec, copy_with
@@ -217,6 +219,25 @@ def _given(block: Sequence[str]) -> Replies:
 def written(found: Mapping[str, Sequence[str]]) -> str:
     """The text of a file with these blocks."""
     return "\n".join("\n".join((f"== {title}", *lines, "")) for title, lines in found.items())
+
+
+def dialogue_tests(folder: Path, names: Mapping[str, Any]) -> dict[str, Callable[[str], None]]:
+    """Return a test for each file of dialogues in a folder, with a case for each block; `names`: what the calls use.
+
+    One test of all files would be too long to be among the first that are run on a mutant (`soak.drawn.trial`).
+    """
+    files = sorted(folder.glob("*.dialogues"))
+    return {f"test_a_dialogue_of_{file.stem}_goes_as_it_is_written": _test_of(file, names) for file in files}
+
+
+def _test_of(file: Path, names: Mapping[str, Any]) -> Callable[[str], None]:
+    found = blocks(file.read_text(encoding="utf-8"))
+
+    @pytest.mark.parametrize("title", found)
+    def goes_as_it_is_written(title: str) -> None:
+        assert played(found[title], names) == found[title]
+
+    return goes_as_it_is_written
 
 
 def main(module: str, file: str) -> None:

@@ -5,8 +5,6 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
-import pytest
-
 from multidrop.dialects import Hints, Kind, Owed, Priority
 from multidrop.dialects.codec import Started
 from multidrop.dialects.exchange import Looking
@@ -43,10 +41,8 @@ from multidrop.dialects.program_files import Held, Stored
 from multidrop.dialects.scanning import Reach
 from multidrop.dialects.state import Remembered
 from multidrop.dialects.values import ORDINARY, Change, Permission, Plan, Readings
-from tests.support.dialogues import blocks, played
+from tests.support.dialogues import dialogue_tests
 
-FILES = sorted(Path(__file__).parent.glob("*.dialogues"))
-BLOCKS = {title: lines for file in FILES for title, lines in blocks(file.read_text(encoding="utf-8")).items()}
 USED = (
     replace, Hints, Kind, Owed, Priority, Started, Looking, family, MCODE, before_request, classify, codec, debugging,
     download, exchange, framing, identify, identity, motions, operations, program_readout, programs, reply_parser,
@@ -125,6 +121,4 @@ def expected(place, last=None, stated=False, product="", **known):
     return state
 
 
-@pytest.mark.parametrize("title", BLOCKS)
-def test_a_dialogue_goes_as_it_is_written(title):
-    assert played(BLOCKS[title], globals()) == BLOCKS[title]
+globals().update(dialogue_tests(Path(__file__).parent, globals()))

@@ -164,3 +164,10 @@ def test_the_types_of_points_are_those_of_the_drive(product):
     for n, kinds in points.output_types.items():
         own = kinds if points.shared or product in ("LMDCM", "LMDCE") else kinds - {21, 24, 25}
         assert own <= types(f"{'S' if points.shared else 'OS'}{n}", product), n
+
+
+@pytest.mark.parametrize(("bd", "rate"), [(48, 4800), (96, 9600), (19, 19200), (38, 38400), (11, 115200)])
+def test_a_snapshot_says_the_rate_that_the_drive_is_set_to(bd, rate):
+    one = DirectDrive("LMDCM")
+    one.device.memory.values["BD"] = bd
+    assert one.run(MCODE.values.snapshot(one.state, nothing)).baud == rate
