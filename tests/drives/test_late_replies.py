@@ -273,7 +273,7 @@ def test_a_print_behind_a_nak_is_owed_no_sign_any_more(sign):
 
 @pytest.mark.parametrize(("first", "doubtful"), [(b"\x15", True), (b"\x06", False)])
 def test_an_acknowledgement_of_another_drive_may_be_the_late_one_of_a_drive_whose_nak_was_noise(first, doubtful):
-    """a replies NAK, which may be noise; the ACK in the time of b may be that of a. Repeating the command is no cure."""
+    """a replies NAK, which may be noise; the ACK in the time of b may be that of a."""
     mode = MCode(em=1, party=True, checksum=1, escape=1)
     line = Line(mode)
     at, ended = timed(line)
