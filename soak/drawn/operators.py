@@ -198,8 +198,9 @@ class _Finder(ast.NodeVisitor):
             for n, (op, right) in enumerate(zip(node.ops, node.comparators, strict=True)):
                 parts += [COMPARED[type(op)] if n == at else _sign(op), self._text(right)]
             self._change(node, " ".join(parts))
-        for each in (node.left, *node.comparators):
-            self._word(each)
+        if ast.unparse(node.left) != "sys.platform":  # which only another machine has
+            for each in (node.left, *node.comparators):
+                self._word(each)
         self.generic_visit(node)
 
     def visit_BinOp(self, node: ast.BinOp) -> None:

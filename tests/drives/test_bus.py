@@ -1,6 +1,7 @@
 """A bus over simulated drives, in virtual time: stops seen to work, lost pipes, polls, names, ends."""
 
 import asyncio
+from math import inf
 from typing import Any
 
 import pytest
@@ -264,9 +265,21 @@ async def test_closing_leaves_nothing_behind(desk):
     await desk.bus.close()
     assert isinstance((await asyncio.gather(loading, return_exceptions=True))[0], Stopped | TransportLost)
     assert asyncio.all_tasks() == {asyncio.current_task()}
+    assert desk.bus.telemetry.period("a") == inf
     desk.events.clear()
     await asyncio.sleep(5)
     assert desk.events == []
+
+
+async def test_closing_ends_a_reading_of_conditions_that_waits_for_prints_to_end(desk):
+    desk.bus.line.inbox.receive(b"tick\r\n", desk.bus.now())
+    desk.bus.link.advance()
+    desk.bus.telemetry.watch(["a"])
+    await asyncio.sleep(0.001)
+    assert len(asyncio.all_tasks()) == 2
+    await desk.bus.close()
+    await asyncio.sleep(0)
+    assert asyncio.all_tasks() == {asyncio.current_task()}
 
 
 @pytest.mark.parametrize("held_up", [0.6, 3.0])

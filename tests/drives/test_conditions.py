@@ -151,6 +151,17 @@ async def test_after_a_pause_everything_is_read_again():
     assert await a.for_(0.5) == [(0.0, "flags"), (0.0, "limits")]
 
 
+async def test_after_a_pause_a_drive_that_was_silent_before_it_is_read_at_once():
+    telemetry, link, [a], _ = watched("a")
+    a.fails["flags"] = NoAnswer("no reply")
+    telemetry.watch(["a"], 1.0)
+    await a.for_(7)
+    telemetry.pause()
+    a.fails.clear()
+    telemetry.resume()
+    assert await a.for_(0.5) == [(0.0, "flags"), (0.0, "limits")]
+
+
 async def test_after_a_restart_everything_is_read_again():
     telemetry, link, [a], roster = watched("a")
     telemetry.watch(["a"], 1.0)

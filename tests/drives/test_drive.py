@@ -181,6 +181,18 @@ async def test_a_drive_that_must_not_start_without_a_reference_says_why():
     shop.bus.drives["b"].check_start("MR 100")
 
 
+async def test_a_program_starts_where_nothing_holds_the_drive_or_its_position_is_referenced():
+    """A program moves no axis by name, so it is refused where any axis is without a reference."""
+    shop, drive = await drive_a()
+    drive.hold = "it was restarted (sign-on)"
+    drive.check_start("EX 100")
+    drive.state.reference_lost([""])
+    with pytest.raises(Unreferenced):
+        drive.check_start("EX 100")
+    drive.hold = ""
+    drive.check_start("EX 100")
+
+
 async def test_setting_the_position_gives_a_reference_unless_the_axis_is_anchored():
     shop, drive = await drive_a()
     drive.state.reference_lost([""])

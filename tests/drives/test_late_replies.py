@@ -271,6 +271,29 @@ def test_a_print_behind_a_nak_is_owed_no_sign_any_more(sign):
     assert not ended[-1].doubtful
 
 
+@pytest.mark.parametrize(("first", "doubtful"), [(b"\x15", True), (b"\x06", False)])
+def test_an_acknowledgement_of_another_drive_may_be_the_late_one_of_a_drive_whose_nak_was_noise(first, doubtful):
+    """a replies NAK, which may be noise; the ACK in the time of b may be that of a."""
+    mode = MCode(em=1, party=True, checksum=1, escape=1)
+    line = Line(mode)
+    at, ended = timed(line)
+
+    line.ask(replace(mode.request("a", "MR 5"), kind=Kind.QUIET))
+    at(0.0)
+    at(0.1, first)
+    at(2.0)
+    line.ask(replace(mode.request("b", "VM 5000"), kind=Kind.QUIET, expect=None))
+    at(2.5)
+    at(2.6, b"\x06")
+    at(2.7)
+    line.ask(replace(mode.request("a", "PR VR,DN"), kind=Kind.PRINT, expect='3\\.010"a"', signed=True))
+    at(3.0)
+    at(3.1, b"\x06" + sealed(b'3.010"a"') + b"\r\n")
+    at(4.0)
+    assert [each.end for each in ended] == [End.NAK if doubtful else End.DONE, End.DONE, End.DONE]
+    assert ended[-1].doubtful is doubtful
+
+
 # --- a language whose marks are asked for behind a doubtful answer
 
 

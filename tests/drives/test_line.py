@@ -168,6 +168,14 @@ def test_the_local_echo_of_a_two_wire_adapter_is_swallowed():
     assert run.ended == [(0.02, "PR P", End.DONE, ("5",))]
 
 
+def test_an_adapter_that_repeats_is_known_by_a_request_to_which_nothing_else_came():
+    line = Line(QUIETLY)
+    line.ask(request("PR P"))
+    run = LineRun(line, 2.0, {0.01: b"PR P\r"})
+    assert [(end, lines) for _, _, end, lines in run.ended] == [(End.TIMEOUT, ())]
+    assert line.inbox.echo is not None
+
+
 def test_a_withdrawn_request_is_not_sent():
     line = Line(QUIETLY)
     line.ask(request("PR P"))

@@ -4,7 +4,7 @@ import asyncio
 
 import pytest
 
-from multidrop.base.errors import Stopped, TransportLost
+from multidrop.base.errors import NoAnswer, Stopped, TransportLost
 from multidrop.dialects import Hints, Owed
 from multidrop.dialects.mcode.manual import program_file
 from multidrop.drives.port_journal import Keeper
@@ -147,6 +147,18 @@ async def test_an_orderly_end_leaves_nothing_behind(desk):
     await desk.bus.close()
     await asyncio.gather(moving, return_exceptions=True)
     assert desk.keeper.closed and desk.keeper.line == ""
+
+
+async def test_a_line_that_a_process_before_left_is_struck_out_once_the_drives_are_found(desk):
+    desk.keeper.line = "aMR 51200"
+    await desk.bus.identify(Hints(drives=("a", "b"), party=True))
+    assert desk.keeper.line == ""
+    desk.keeper.line = "aMR 51200"
+    desk.devices["a"].power(False, desk.floor.now())
+    desk.devices["b"].power(False, desk.floor.now())
+    with pytest.raises(NoAnswer):
+        await desk.bus.identify(Hints(drives=("a", "b"), party=True))
+    assert desk.keeper.line == "aMR 51200"
 
 
 async def test_the_drives_are_remembered_as_they_are_found_and_as_they_are_left(desk):

@@ -15,7 +15,7 @@ from multidrop.dialects.mcode.host.codec import MCode
 from multidrop.dialects.mcode.host.state import MCodeState
 from multidrop.drives.events import Restarted
 from multidrop.drives.motion_record import MotionRecord
-from multidrop.drives.roster import OPENING, OPENING_PLACE, PAUSE, REPAIRS, Restarts, Roster, _compare, _shown, _text
+from multidrop.drives.roster import PAUSE, Restarts, Roster, _compare, _shown, _text
 from multidrop.drives.roster import _ran_on as ran_on
 from tests.support.cell_session import party
 from tests.support.simulated_bus import SimulatedBus
@@ -521,14 +521,14 @@ async def test_a_print_is_no_sign_on():
 @pytest.mark.parametrize(
     ("baud", "timeout", "probing", "hints", "limit"),
     [
-        (9600, 1.0, (), Hints(), OPENING + OPENING_PLACE),
-        (0, 1.0, (), Hints(), OPENING + OPENING_PLACE),
-        (4800, 1.0, ("a",), Hints(), OPENING + OPENING_PLACE),
-        (2400, 1.0, ("a", "b"), Hints(), 2 * (OPENING + 2 * OPENING_PLACE)),
-        (9600, 3.0, ("a",), Hints(), 3 * (OPENING + OPENING_PLACE)),
-        (1200, 3.0, ("a",), Hints(), 4 * (OPENING + OPENING_PLACE)),
-        (9600, 0.5, ("a",), Hints(cut="aMR 1"), OPENING + OPENING_PLACE + REPAIRS),
-        (9600, 1.0, ("a",), Hints(owed=(Owed(1, "a", "x", "1", "p"),)), OPENING + OPENING_PLACE + REPAIRS),
+        (9600, 1.0, (), Hints(), 12.0),
+        (0, 1.0, (), Hints(), 12.0),
+        (4800, 1.0, ("a",), Hints(), 12.0),
+        (2400, 1.0, ("a", "b"), Hints(), 32.0),
+        (9600, 3.0, ("a",), Hints(), 36.0),
+        (1200, 3.0, ("a",), Hints(), 48.0),
+        (9600, 0.5, ("a",), Hints(cut="aMR 1"), 72.0),
+        (9600, 1.0, ("a",), Hints(owed=(Owed(1, "a", "x", "1", "p"),)), 72.0),
     ],
 )
 async def test_a_search_has_a_limit_for_itself_its_places_and_its_repairs(baud, timeout, probing, hints, limit):

@@ -233,6 +233,18 @@ def test_after_a_silence_it_ends_and_passes_on_only_a_stop(platform: str, monkey
                 assert (bench.port.dropped, bench.port.closed) == (len(passed), True)
 
 
+def test_a_port_that_is_lost_as_a_late_stop_comes_is_named_and_not_the_silence(bench: Bench) -> None:
+    def at_last() -> None:
+        bench.later(6.01)()
+        bench.port.fails = {"write": OSError(errno.EIO, "Input/output error")}
+        bench.here.sendall(DROP + STOP)
+
+    bench.steps = [at_last]
+    with pytest.raises(TransportLost, match=r"^the port is gone \(Input/output error\)$"):
+        bench.serve()
+    assert bench.hear()[-1] == (Kind.LOST, b"the port is gone (Input/output error)")
+
+
 def test_it_sleeps_until_something_can_be_done_and_looks_often_while_the_driver_holds_bytes(bench: Bench) -> None:
     bench.port.takes, bench.port.held = 3, 3
 

@@ -169,6 +169,18 @@ async def test_a_stop_is_followed_by_its_pieces_and_a_key_counts_as_one_more() -
         assert device.written == [b"ab", b"!1", b"!2"]
 
 
+async def test_what_follows_a_stop_leaves_though_the_writer_waits_for_nothing_else() -> None:
+    async with opened() as (pipe, device, _):
+        assert pipe.preempt(False, lambda dropped: b"!1")
+        device.begun()
+        device.may.release()
+        await until(lambda: device.written == [b"!1"] and pipe._idle(), 5.0)
+        assert pipe.follow(lambda waiting: b"!2")
+        assert device.taking.acquire(timeout=5.0)
+        device.may.release()
+        await until(lambda: device.written == [b"!1", b"!2"], 5.0)
+
+
 async def test_a_piece_waits_until_the_device_has_it_and_no_longer() -> None:
     async with opened() as (pipe, device, _):
 

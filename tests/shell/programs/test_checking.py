@@ -13,7 +13,7 @@ from multidrop.base import atomic
 from multidrop.base.errors import Diagnostic, Inexpressible
 from multidrop.shell.configuration import Settings
 from multidrop.shell.events import Notified, Output
-from multidrop.shell.programs.checking import examine, rewrite
+from multidrop.shell.programs.checking import ending_of, examine, rewrite
 from multidrop.shell.session import Session
 
 GOOD = "va q1=5\t' half a turn\r\nPG 1\r\n  lb ga      'start\r\n\tmr q1   ` go \r\n\tH\r\n e   \r\npg\r\n\r\ns"
@@ -121,3 +121,11 @@ def test_only_a_regular_file_is_replaced(tmp_path: Path) -> None:
     with pytest.raises(Diagnostic, match="is not a regular file"):
         rewrite(checked)
     assert stat.S_ISFIFO(os.stat(file).st_mode)
+
+
+@pytest.mark.parametrize(
+    ("product", "ending"),
+    [("", ".mxt"), ("LMDCE", ".mxt"), ("TMCM-1241", ".tmc"), ("PMX-4EX-SA", ".prg"), ("of another maker", ".mxt")],
+)
+def test_a_program_file_ends_as_the_language_of_its_drive_has_it(product: str, ending: str) -> None:
+    assert ending_of(product) == ending
