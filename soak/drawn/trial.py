@@ -30,7 +30,7 @@ BUDGET = 90.0
 SEEDS = "1-20"
 SLOWER = 4.0
 """Times that a trial may take longer than its tests were measured, before it counts as one that never ends."""
-START = 30.0
+START = 60.0
 """s; what a trial gets beside that, to start on a busy machine."""
 LEFT_OUT = shutil.ignore_patterns(".*", "__pycache__")
 FAILED = re.compile(r"^(?:FAILED|ERROR) (\S+?)(?:\[.*)?(?: - .*)?$", re.M)

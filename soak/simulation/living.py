@@ -58,7 +58,7 @@ def lived(seed: int, steps: Iterable[int], keep: bool = False, without: Collecti
         loops.append(SimulatedLoop(Random(f"{seed} loop")))
         return loops[0]
 
-    with place_of_state() as folder, asyncio.Runner(loop_factory=factory) as runner:
+    with place_of_state() as folder, _deadlocks(history), asyncio.Runner(loop_factory=factory) as runner:
         loop = runner.get_loop()
         assert isinstance(loop, SimulatedLoop)
         wall, scheduler = Wall(loop), Scheduler(loop, Random(f"{seed} threads"), climate["slow thread"])
@@ -88,13 +88,20 @@ def lived(seed: int, steps: Iterable[int], keep: bool = False, without: Collecti
                 stack.enter_context(_replaced(shared, "threading", locks))
             stack.callback(cut_ins.kill)
             stack.enter_context(_logged(history))
-            try:
+            with _deadlocks(history):
                 runner.run(life())
-            except Deadlock as defect:
-                history.defects.append(str(defect))
         history.defects += cut_ins.deadlocks
         history.defects += [str(each.get("exception") or each.get("message")) for each in loop.defects]
     return world
+
+
+@contextlib.contextmanager
+def _deadlocks(history: History) -> Iterator[None]:
+    """Note that the loop stands still, or never does, in a life and as its loop is closed."""
+    try:
+        yield
+    except Deadlock as defect:
+        history.defects.append(str(defect))
 
 
 def _kept(world: World) -> Callable[[Conversations, DriveState], Coroutine[None, None, None]]:
