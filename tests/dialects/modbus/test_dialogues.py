@@ -5,8 +5,6 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
-import pytest
-
 from multidrop.dialects import Hints, Kind, Priority, Request
 from multidrop.dialects.mcode.host import units as mcode_units
 from multidrop.dialects.mcode.manual.grammar import parse
@@ -19,10 +17,8 @@ from multidrop.dialects.modbus.host.values import PARAMETERS, UNITS, VALUES
 from multidrop.dialects.modbus.manual.registers import REGISTERS
 from multidrop.dialects.motions import Evidence, Move, MoveKind
 from multidrop.dialects.values import ORDINARY, Change, Permission, Readings
-from tests.support.dialogues import blocks, played
+from tests.support.dialogues import dialogue_tests
 
-FILES = sorted(Path(__file__).parent.glob("*.dialogues"))
-BLOCKS = {title: lines for file in FILES for title, lines in blocks(file.read_text(encoding="utf-8")).items()}
 USED = (
     replace, Hints, Kind, Priority, mcode_units, family, MODBUS, codec, framing, limits, mapping, motions, operations,
     pdu, values, MOTIONS, PARAMETERS, UNITS, VALUES, REGISTERS, Evidence, Move, MoveKind, ORDINARY, Change,
@@ -73,6 +69,4 @@ def parts_read(state, facts):
     return facts
 
 
-@pytest.mark.parametrize("title", BLOCKS)
-def test_a_dialogue_goes_as_it_is_written(title):
-    assert played(BLOCKS[title], globals()) == BLOCKS[title]
+globals().update(dialogue_tests(Path(__file__).parent, globals()))

@@ -5,8 +5,6 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
-import pytest
-
 from multidrop.dialects import Hints, Kind, Priority
 from multidrop.dialects.motions import Ending, Evidence, Move, MoveKind, Outcome
 from multidrop.dialects.pmx import family
@@ -21,10 +19,8 @@ from multidrop.dialects.pmx.manual import program_file
 from multidrop.dialects.program_files import Held, Stored
 from multidrop.dialects.scanning import Reach
 from multidrop.dialects.values import ORDINARY, Change, Permission, Plan, Readings
-from tests.support.dialogues import blocks, played
+from tests.support.dialogues import dialogue_tests
 
-FILES = sorted(Path(__file__).parent.glob("*.dialogues"))
-BLOCKS = {title: lines for file in FILES for title, lines in blocks(file.read_text(encoding="utf-8")).items()}
 USED = (
     replace, Hints, Kind, Priority, Ending, Evidence, Move, MoveKind, Outcome, family, PMX, codec, motions, operations,
     programs, units, values, MOTIONS, DEBUGGING, UNITS, ACTIONS, PARAMETERS, VALUES, Held, Stored, Reach, ORDINARY,
@@ -73,6 +69,4 @@ def searched(found, **reach):
     return outcome, len(steps)
 
 
-@pytest.mark.parametrize("title", BLOCKS)
-def test_a_dialogue_goes_as_it_is_written(title):
-    assert played(BLOCKS[title], globals()) == BLOCKS[title]
+globals().update(dialogue_tests(Path(__file__).parent, globals()))

@@ -5,8 +5,6 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
-import pytest
-
 from multidrop.dialects import Hints, Kind, Owed, Priority
 from multidrop.dialects.codec import Started
 from multidrop.dialects.motions import Ending, Evidence, Move, MoveKind, Outcome
@@ -24,10 +22,8 @@ from multidrop.dialects.tmcl.manual import commands, program_file
 from multidrop.dialects.tmcl.manual.commands import Call, Command
 from multidrop.dialects.tmcl.manual.modules import module_of
 from multidrop.dialects.values import ORDINARY, Change, Permission, Plan, Readings
-from tests.support.dialogues import blocks, played
+from tests.support.dialogues import dialogue_tests
 
-FILES = sorted(Path(__file__).parent.glob("*.dialogues"))
-BLOCKS = {title: lines for file in FILES for title, lines in blocks(file.read_text(encoding="utf-8")).items()}
 USED = (
     replace, Hints, Kind, Owed, Priority, Started, Ending, Evidence, Move, MoveKind, Outcome, Held, Stored, family,
     TMCL, codec, motions, operations, programs, units, values, MOTIONS, DEBUGGING, PROGRAM_FILES, UNITS, ACTIONS,
@@ -85,6 +81,4 @@ def searched(found, **reach):
     return outcome, len(steps)
 
 
-@pytest.mark.parametrize("title", BLOCKS)
-def test_a_dialogue_goes_as_it_is_written(title):
-    assert played(BLOCKS[title], globals()) == BLOCKS[title]
+globals().update(dialogue_tests(Path(__file__).parent, globals()))
