@@ -260,7 +260,7 @@ async def test_no_function_of_any_record_delays_the_stop_key(tmp_path: Path, mon
 
 
 @pytest.mark.virtual
-@pytest.mark.parametrize(("kind", "name"), ASYNC, ids=lambda each: getattr(each, "__name__", each))
+@pytest.mark.parametrize(("kind", "name"), sorted(ASYNC, key=str), ids=lambda each: getattr(each, "__name__", each))
 async def test_a_function_that_never_returns_keeps_no_drive_from_the_stop(
     kind: type, name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
