@@ -134,8 +134,13 @@ class Home:
 
     def end_all(self) -> None:
         """End the processes of a test."""
+        from tests.support.posix import pexpect
+
         for child in self.terminals:
-            child.close(force=True)
+            try:
+                child.close(force=True)
+            except pexpect.ExceptionPexpect:  # it is killed, and ends later than pexpect waits: the machine is busy
+                child.ptyproc.wait()
         self.terminals.clear()
         for process in self.started:
             process.kill()
