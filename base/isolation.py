@@ -29,7 +29,7 @@ def _report(what: str, failure: Exception) -> None:
 class isolated:  # noqa: N801
     """Isolate a step: add the text of what it raises to `failed`, and write a defect to the log.
 
-    This is the one place that takes any exception: after the step, other drives are still to be stopped. A class, not
+    It takes any exception, because other drives are still to be stopped after the step. A class, not
     a generator: each event of a bus passes here, and this takes a third of the time.
 
     With `exits`, an exit of the program is added to these, too: it waits until the other lines are stopped. Elsewhere
