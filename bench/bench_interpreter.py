@@ -17,8 +17,8 @@ sys.path.insert(0, str(Path(__file__).parent.parent))
 
 from report import Row, compared, main
 
+from multidrop.families.lexium.simulator.device import MCodeDevice
 from multidrop.simulator.cell.spec import DriveSpec
-from multidrop.simulator.lexium.device import MCodeDevice
 from multidrop.simulator.world import World
 
 AIM = 300_000

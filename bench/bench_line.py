@@ -24,10 +24,10 @@ from report import Row, compared, main
 
 from multidrop.base.errors import TransportLost
 from multidrop.dialects.codec import Request
-from multidrop.dialects.mcode.host.codec import MCode
 from multidrop.drives.bus import Bus
 from multidrop.drives.line import Transaction
 from multidrop.drives.link import Link
+from multidrop.families.lexium.host.mcode.codec import MCode
 from multidrop.transports import Transport
 from multidrop.transports.serial_port import open_serial
 from multidrop.transports.sockets import open_tcp

@@ -23,11 +23,11 @@ sys.path.insert(0, str(Path(__file__).parent.parent))
 from bench_line import transact
 from report import Row, absent, compared, main
 
-from multidrop.dialects.modbus.host import mapping
-from multidrop.dialects.modbus.host.codec import Modbus, ModbusState
-from multidrop.dialects.modbus.host.operations import request
-from multidrop.dialects.modbus.manual.registers import REGISTERS
 from multidrop.drives.bus import Bus
+from multidrop.families.lexium.host.modbus import mapping
+from multidrop.families.lexium.host.modbus.codec import Modbus, ModbusState
+from multidrop.families.lexium.host.modbus.operations import request
+from multidrop.families.lexium.manual.modbus.registers import REGISTERS
 from multidrop.transports.sockets import open_tcp
 
 ROUNDS = 7

@@ -22,8 +22,8 @@ import serial
 from report import Row, compared, main
 from sim_process import served
 
-from multidrop.dialects.mcode.host.framing import sealed
-from multidrop.dialects.mcode.manual.statements import NAMES
+from multidrop.families.lexium.host.mcode.framing import sealed
+from multidrop.families.lexium.manual.statements import NAMES
 from multidrop.shell.configuration import Settings
 from multidrop.shell.connect.opening import open_buses
 from multidrop.shell.connect.urls import parse

@@ -28,12 +28,12 @@ from report import Row, compared, main
 from sim_process import served
 
 from multidrop.dialects.family import Hints
-from multidrop.dialects.mcode.family import MCODE
-from multidrop.dialects.mcode.host.codec import MCode
-from multidrop.dialects.mcode.manual import program_file
 from multidrop.drives.bus import Bus
 from multidrop.drives.drive import Drive
 from multidrop.drives.events import BusEvent, Ended
+from multidrop.families.lexium.host.mcode.codec import MCode
+from multidrop.families.lexium.host.mcode.family import MCODE
+from multidrop.families.lexium.manual import program_file
 from multidrop.transports.serial_port import open_serial
 
 AIM = 1.2

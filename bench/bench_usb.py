@@ -20,8 +20,8 @@ sys.path.insert(0, str(Path(__file__).parent.parent))
 from bench_line import transact
 from report import Row, compared, main
 
-from multidrop.dialects.pmx.host.codec import Pmx
 from multidrop.drives.bus import Bus
+from multidrop.families.pmx.host.codec import Pmx
 from multidrop.features.usb.device import sides
 from multidrop.features.usb.pipe import open_usb
 from multidrop.simulator.cells import read

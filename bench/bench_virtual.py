@@ -15,9 +15,9 @@ sys.path.insert(0, str(Path(__file__).parent.parent))
 
 from report import Row, alone, main
 
-from multidrop.dialects.mcode.manual import program_file
+from multidrop.families.lexium.manual import program_file
+from multidrop.families.lexium.simulator.program_run import ProgramRun
 from multidrop.simulator.cell.spec import DriveSpec, WorldSpec
-from multidrop.simulator.lexium.program_run import ProgramRun
 from multidrop.simulator.program_run import Summary
 
 AIM = 1.0

@@ -31,35 +31,35 @@ class Row(NamedTuple):
 
 TABLE: Mapping[str, Row] = {
     "mcode": Row(
-        "multidrop.dialects.mcode.family:MCODE",
+        "multidrop.families.lexium.host.mcode.family:MCODE",
         files=ProgramFiles(
             "MCode",
             (".mxt", ".txt"),
-            "multidrop.dialects.mcode.manual.program_checker",
-            "multidrop.dialects.mcode.manual.editing",
+            "multidrop.families.lexium.manual.program_checker",
+            "multidrop.families.lexium.manual.editing",
             ("mcode", "mxt"),
-            {"lexium": "multidrop.dialects.mcode.manual.conversion"},
-            "multidrop.dialects.mcode.manual.supported:unsupported",
+            {"lexium": "multidrop.families.lexium.manual.conversion"},
+            "multidrop.families.lexium.manual.supported:unsupported",
         ),
     ),
-    "modbus": Row("multidrop.dialects.modbus.family:MODBUS", scheme="modbus"),
+    "modbus": Row("multidrop.families.lexium.host.modbus.family:MODBUS", scheme="modbus"),
     "pmx": Row(
-        "multidrop.dialects.pmx.family:PMX",
+        "multidrop.families.pmx.host.family:PMX",
         files=ProgramFiles(
             "A-SCRIPT",
             (".prg", ".asc"),
-            "multidrop.dialects.pmx.manual.program_file",
-            "multidrop.dialects.pmx.manual.editing",
+            "multidrop.families.pmx.manual.program_file",
+            "multidrop.families.pmx.manual.editing",
             ("ascript", "a-script", "pmx"),
         ),
     ),
     "tmcl": Row(
-        "multidrop.dialects.tmcl.family:TMCL",
+        "multidrop.families.tmcl.host.family:TMCL",
         files=ProgramFiles(
             "TMCL",
             (".tmc", ".tmcl"),
-            "multidrop.dialects.tmcl.manual.program_file",
-            "multidrop.dialects.tmcl.manual.editing",
+            "multidrop.families.tmcl.manual.program_file",
+            "multidrop.families.tmcl.manual.editing",
             ("tmcl",),
         ),
     ),

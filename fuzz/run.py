@@ -15,7 +15,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
 import atheris
 
-with atheris.instrument_imports(include=["dialects", "drives", "simulator", "macros", "shell"]):
+with atheris.instrument_imports(include=["dialects", "families", "drives", "simulator", "macros", "shell"]):
     from fuzz.targets import TARGETS, seeds
 
 LONGEST = 2048

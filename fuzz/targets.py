@@ -17,10 +17,10 @@ from multidrop.base.errors import Diagnostic, DriveError
 from multidrop.dialects import Request
 from multidrop.dialects.codec import Codec
 from multidrop.dialects.families import FAMILIES, program_languages
-from multidrop.dialects.mcode.host.codec import MCode
-from multidrop.dialects.pmx.host.codec import Pmx
-from multidrop.dialects.tmcl.host.codec import Tmcl
 from multidrop.drives.line import Line
+from multidrop.families.lexium.host.mcode.codec import MCode
+from multidrop.families.pmx.host.codec import Pmx
+from multidrop.families.tmcl.host.codec import Tmcl
 from multidrop.macros.model import Macro
 from multidrop.macros.toml_format import format_macro, parse_macro, with_values
 from multidrop.macros.vendor import exported, imported

@@ -9,7 +9,7 @@ from typing import Any
 
 from hatchling.builders.hooks.plugin.interface import BuildHookInterface
 
-ROOMS = ("tui", "shell", "macros", "drives", "simulator", "dialects", "transports", "base", "features")
+ROOMS = ("tui", "shell", "macros", "drives", "simulator", "dialects", "transports", "base", "families", "features")
 
 
 class Rooms(BuildHookInterface[Any]):

@@ -27,13 +27,15 @@ class Row(NamedTuple):
 
 TABLE: Mapping[str, Row] = {
     "mcode": Row(
-        "multidrop.simulator.lexium.family:MCODE",
+        "multidrop.families.lexium.simulator.family:MCODE",
         ("LMDOM", "LMDCM", "LMDOE", "LMDCE", "LMM", "MDI", "MDIE", "MDIX"),
-        "multidrop.simulator.lexium.program_run:RUNS",
+        "multidrop.families.lexium.simulator.program_run:RUNS",
     ),
-    "pmx": Row("multidrop.simulator.pmx.family:PMX", ("PMX",), "multidrop.simulator.pmx.program_run:RUNS"),
+    "pmx": Row(
+        "multidrop.families.pmx.simulator.family:PMX", ("PMX",), "multidrop.families.pmx.simulator.program_run:RUNS"
+    ),
     "tmcl": Row(
-        "multidrop.simulator.tmcl.family:TMCL",
+        "multidrop.families.tmcl.simulator.family:TMCL",
         (
             "TMCM",
             "TMCM-1140",
@@ -47,7 +49,7 @@ TABLE: Mapping[str, Row] = {
             "TMCM-6110",
             "TMCM-6214",
         ),
-        "multidrop.simulator.tmcl.program_run:RUNS",
+        "multidrop.families.tmcl.simulator.program_run:RUNS",
     ),
 }
 FAMILIES: Mapping[str, Family] = OnDemand({name: row.record for name, row in TABLE.items()})

@@ -15,7 +15,7 @@ from enum import Enum
 from typing import Any
 
 from multidrop.base.errors import Refused
-from multidrop.simulator.lexium.device import MCodeDevice
+from multidrop.families.lexium.simulator.device import MCodeDevice
 
 
 class Word(Enum):

@@ -8,8 +8,8 @@ from random import Random
 from struct import pack
 from typing import Any, Protocol
 
-from multidrop.dialects.modbus.manual.registers import REGISTERS
-from multidrop.dialects.tmcl.manual.commands import Call, Status
+from multidrop.families.lexium.manual.modbus.registers import REGISTERS
+from multidrop.families.tmcl.manual.commands import Call, Status
 
 VALUES = (60_000_000, 100_000_000)
 TICKS = 50_000_000

@@ -16,9 +16,9 @@ from hypothesis import HealthCheck, settings
 from multidrop.base.errors import Stopped
 from multidrop.dialects import DriveState, End, Procedure, Reply
 from multidrop.dialects.families import family_of
-from multidrop.dialects.mcode.host.codec import MCode
 from multidrop.drives.events import Unsolicited
 from multidrop.drives.line import Finished, Line, Write
+from multidrop.families.lexium.host.mcode.codec import MCode
 from multidrop.simulator.cell.spec import Faults
 from multidrop.simulator.cells import read
 from multidrop.simulator.floor import Floor

@@ -11,9 +11,9 @@ from collections import deque
 from dataclasses import dataclass, field
 from weakref import WeakKeyDictionary
 
+from multidrop.families.pmx.simulator.device import PmxDevice
 from multidrop.features.usb.performax import IN, OUT, PACKET, PRODUCT, REQUEST, REQUEST_TYPE, STALLED, VENDOR, Control
 from multidrop.simulator.floor import Floor
-from multidrop.simulator.pmx.device import PmxDevice
 
 HELD = 16
 """Replies that the controller holds; older ones are lost."""

@@ -1,8 +1,8 @@
 """Programs under observation: trace, single step, break point, watched variables, the listing around a line.
 
 A `Debugger` belongs to one drive. It keeps the listing of the program, the last executed line, and the watched names.
-The drive's state holds the proof that the drive waits for a key (`dialects.mcode.host.debugging`). A debugger adds the
-times of holds, and forgets them at a stop.
+The drive's state holds the proof that the drive waits for a key. A debugger adds the times of holds, and forgets them
+at a stop.
 """
 
 from __future__ import annotations

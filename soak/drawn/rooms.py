@@ -15,7 +15,7 @@ EQUIVALENT = Path(__file__).with_name("equivalent.csv")
 ROOMS = {
     "drives": ("drives/**/*.py",),
     "transports": ("transports/**/*.py",),
-    "families": ("dialects/*/host/**/*.py",),
+    "families": ("families/*/host/**/*.py",),
     "shell": ("shell/**/*.py",),
     "macros": ("macros/**/*.py",),
     "base": ("base/**/*.py",),

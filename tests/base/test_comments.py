@@ -11,10 +11,10 @@ from hypothesis import strategies as st
 from multidrop.base.comments import grouped_at, uncommented, unsent
 from multidrop.base.errors import Diagnostic
 from multidrop.base.files import toml_of
-from multidrop.dialects.mcode.manual import program_checker, program_file
-from multidrop.dialects.pmx.manual import program_file as pmx_file
 from multidrop.dialects.program_files import Problem
-from multidrop.dialects.tmcl.manual import program_file as tmcl_file
+from multidrop.families.lexium.manual import program_checker, program_file
+from multidrop.families.pmx.manual import program_file as pmx_file
+from multidrop.families.tmcl.manual import program_file as tmcl_file
 from tests.support.cases import for_each
 
 

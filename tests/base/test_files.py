@@ -25,8 +25,8 @@ from multidrop.base.files import (
     toml_of,
 )
 from multidrop.base.text import visible
-from multidrop.dialects.mcode.manual import program_file
-from multidrop.dialects.pmx.manual import program_file as pmx_file
+from multidrop.families.lexium.manual import program_file
+from multidrop.families.pmx.manual import program_file as pmx_file
 from multidrop.macros import MacroStore
 from multidrop.macros.toml_format import parse_macro
 from multidrop.macros.vendor import imported

@@ -7,8 +7,8 @@ from dataclasses import replace
 import pytest
 
 from multidrop.base.errors import Refused
-from multidrop.dialects.pmx.family import PMX
-from multidrop.dialects.pmx.host.codec import Pmx, PmxState
+from multidrop.families.pmx.host.codec import Pmx, PmxState
+from multidrop.families.pmx.host.family import PMX
 from tests.support.dialogues import blocks, played, shown, written
 
 TEXT = """\

@@ -9,8 +9,8 @@ import pytest
 from multidrop.base.errors import NoAnswer, Refused
 from multidrop.dialects import DriveState
 from multidrop.dialects.certifying import Occupied
-from multidrop.dialects.mcode.host.codec import MCode
 from multidrop.dialects.owed_settings import owed, repaired
+from multidrop.families.lexium.host.mcode.codec import MCode
 
 LINES = ("EM=1", "CK=0")
 

@@ -4,18 +4,18 @@ import pytest
 
 from multidrop.base.errors import Diagnostic
 from multidrop.dialects.families import family_of
-from multidrop.dialects.mcode.manual import parameters as mcode
-from multidrop.dialects.modbus.family import MODBUS
-from multidrop.dialects.modbus.host.codec import Modbus, ModbusState
-from multidrop.dialects.modbus.manual.registers import REGISTERS
-from multidrop.dialects.pmx.host import values as pmx
-from multidrop.dialects.pmx.host.codec import Pmx, PmxState
-from multidrop.dialects.tmcl.host import values as tmcl
-from multidrop.dialects.tmcl.host.codec import Tmcl, TmclState
-from multidrop.dialects.tmcl.manual.modules import module_of
 from multidrop.dialects.values import COMMUNICATION, Permission, Reading, Readings, same
-from multidrop.simulator.pmx.settings import REGISTERS as PMX_REGISTERS
-from tests.dialects.modbus.test_exchange import Far
+from multidrop.families.lexium.host.modbus.codec import Modbus, ModbusState
+from multidrop.families.lexium.host.modbus.family import MODBUS
+from multidrop.families.lexium.manual import parameters as mcode
+from multidrop.families.lexium.manual.modbus.registers import REGISTERS
+from multidrop.families.pmx.host import values as pmx
+from multidrop.families.pmx.host.codec import Pmx, PmxState
+from multidrop.families.pmx.simulator.settings import REGISTERS as PMX_REGISTERS
+from multidrop.families.tmcl.host import values as tmcl
+from multidrop.families.tmcl.host.codec import Tmcl, TmclState
+from multidrop.families.tmcl.manual.modules import module_of
+from tests.families.lexium.host.modbus.test_exchange import Far
 from tests.support.procedure import ProcedureRunner
 
 UNIT = PmxState(Pmx(), "00")

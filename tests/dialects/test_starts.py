@@ -6,12 +6,12 @@ from hypothesis import strategies as st
 
 from multidrop.dialects import Started
 from multidrop.dialects.families import FAMILIES
-from multidrop.dialects.mcode.host.codec import MCode
-from multidrop.dialects.mcode.manual.table import MDRIVE, MNEMONICS
-from multidrop.dialects.modbus.host.codec import Modbus
-from multidrop.dialects.pmx.host.codec import Pmx
-from multidrop.dialects.pmx.manual.table import ROWS
-from multidrop.dialects.tmcl.host.codec import Tmcl
+from multidrop.families.lexium.host.mcode.codec import MCode
+from multidrop.families.lexium.host.modbus.codec import Modbus
+from multidrop.families.lexium.manual.table import MDRIVE, MNEMONICS
+from multidrop.families.pmx.host.codec import Pmx
+from multidrop.families.pmx.manual.table import ROWS
+from multidrop.families.tmcl.host.codec import Tmcl
 from tests.support.cases import for_each
 
 STARTS = {

@@ -8,13 +8,13 @@ from dataclasses import fields
 
 import pytest
 
-from multidrop.dialects.mcode.host.state import MCodeState
-from multidrop.dialects.modbus.host.codec import ModbusState
-from multidrop.dialects.pmx.host.codec import PmxState
+from multidrop.families.lexium.host.mcode.state import MCodeState
+from multidrop.families.lexium.host.modbus.codec import ModbusState
+from multidrop.families.pmx.host.codec import PmxState
 from tests.support.paths import sources
 
-ROOMS = ("dialects", "drives", "shell", "tui", "macros", "multidrop")
-STATE_FILES = {"dialects/state.py", "dialects/mcode/host/state.py"} | {
+ROOMS = ("dialects", "families", "drives", "shell", "tui", "macros", "multidrop")
+STATE_FILES = {"dialects/state.py", "families/lexium/host/mcode/state.py"} | {
     f"dialects/{family}/host/codec.py" for family in ("modbus", "pmx", "tmcl")
 }
 FIELDS = {each.name for cls in (MCodeState, ModbusState, PmxState) for each in fields(cls)} - {"label"}  # a person's

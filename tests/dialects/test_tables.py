@@ -7,7 +7,7 @@ import pytest
 from multidrop.base.files import rows
 from tests.support.paths import ROOT
 
-TABLES = sorted(each for room in ("dialects", "simulator") for each in (ROOT / room).rglob("*.csv"))
+TABLES = sorted(each for room in ("dialects", "families", "simulator") for each in (ROOT / room).rglob("*.csv"))
 PAIRS = (
     ["group", "number"],
     ["name", "each"],

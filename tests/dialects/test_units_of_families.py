@@ -3,10 +3,10 @@
 import pytest
 
 from multidrop.dialects.families import FAMILIES
-from multidrop.dialects.mcode.host.units import counted, disturbs, rests_on
-from multidrop.dialects.mcode.manual.mnemonic import EVERY
-from multidrop.dialects.tmcl.host.codec import Tmcl, TmclState
 from multidrop.dialects.units import Takes
+from multidrop.families.lexium.host.mcode.units import counted, disturbs, rests_on
+from multidrop.families.lexium.manual.mnemonic import EVERY
+from multidrop.families.tmcl.host.codec import Tmcl, TmclState
 
 
 @pytest.mark.parametrize(

@@ -8,9 +8,9 @@ import pytest
 
 from multidrop.base.errors import Stopped, TransportLost
 from multidrop.dialects import End
-from multidrop.dialects.mcode.host.framing import sealed
-from multidrop.dialects.mcode.manual import program_file
 from multidrop.drives.events import Changed, Ended, Lost, Notice, Sample
+from multidrop.families.lexium.host.mcode.framing import sealed
+from multidrop.families.lexium.manual import program_file
 from multidrop.simulator.serving.in_process import SimPipe
 from tests.support.cell_session import party
 from tests.support.simulated_bus import SimulatedBus

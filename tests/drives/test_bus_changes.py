@@ -5,13 +5,13 @@ from typing import Any
 import pytest
 
 from multidrop.dialects import DriveState, Hints, StopPiece
-from multidrop.dialects.mcode.host.codec import MCode
-from multidrop.dialects.mcode.host.state import MCodeState
 from multidrop.drives.events import Changed
 from multidrop.drives.link import Reserved
 from multidrop.drives.stop_ahead import Begun
 from multidrop.drives.stop_forms import StopForms
 from multidrop.drives.stopping import _hears, _ran
+from multidrop.families.lexium.host.mcode.codec import MCode
+from multidrop.families.lexium.host.mcode.state import MCodeState
 from tests.support.cell_session import party
 from tests.support.simulated_bus import SimulatedBus
 

@@ -6,13 +6,13 @@ import pytest
 
 from multidrop.base.errors import Stopped, TransportLost
 from multidrop.dialects import DriveState, Priority, Procedure, Reply, Request
-from multidrop.dialects.mcode.host.codec import MCode
 from multidrop.dialects.state import Owed
 from multidrop.drives.conversations import Conversations
 from multidrop.drives.events import Notice, Sent
 from multidrop.drives.line import Line
 from multidrop.drives.link import Link
 from multidrop.drives.port_journal import Keeper
+from multidrop.families.lexium.host.mcode.codec import MCode
 from multidrop.transports import Transport
 
 pytestmark = pytest.mark.virtual

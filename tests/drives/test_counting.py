@@ -8,10 +8,10 @@ import pytest
 
 from multidrop.dialects import DriveState, Kind
 from multidrop.dialects.families import FAMILIES
-from multidrop.dialects.mcode.host.codec import MCode
-from multidrop.dialects.mcode.host.state import MCodeState
-from multidrop.dialects.modbus.host.codec import Modbus, ModbusState
 from multidrop.drives.counting import Counting
+from multidrop.families.lexium.host.mcode.codec import MCode
+from multidrop.families.lexium.host.mcode.state import MCodeState
+from multidrop.families.lexium.host.modbus.codec import Modbus, ModbusState
 
 ACCEPTED = (("MS", "256"), ("EE", "0"))
 UNITS = FAMILIES["mcode"].units

@@ -6,10 +6,10 @@ import pytest
 
 from multidrop.base.errors import NoAnswer
 from multidrop.dialects import Decoded, DriveState, End, Kind, Reply, Request, StopPiece
-from multidrop.dialects.mcode.host.codec import MCode
 from multidrop.drives.events import Unsolicited
 from multidrop.drives.inbox import TAIL
 from multidrop.drives.line import QUIET, Finished, Line, Write
+from multidrop.families.lexium.host.mcode.codec import MCode
 from tests.support.procedure import ProcedureRunner
 
 

@@ -7,7 +7,6 @@ from typing import Any
 import pytest
 
 from multidrop.dialects import Decoded, End, Kind, Reply, Request
-from multidrop.dialects.mcode.host.codec import MCode
 from multidrop.drives.echoes import LONGEST_TAIL
 from multidrop.drives.inbox import (
     CERTAIN,
@@ -22,6 +21,7 @@ from multidrop.drives.inbox import (
     Leftovers,
     Weight,
 )
+from multidrop.families.lexium.host.mcode.codec import MCode
 
 DOUBTFUL = Weight(doubtful=True)
 MARK = Weight(ends_wait=True)

@@ -11,13 +11,13 @@ from hypothesis import strategies as st
 
 from multidrop.base.errors import NoAnswer
 from multidrop.dialects import End, Kind, Reply, Request
-from multidrop.dialects.mcode.family import MCODE
-from multidrop.dialects.mcode.host.codec import MCode
-from multidrop.dialects.mcode.host.framing import sealed
-from multidrop.dialects.mcode.host.state import MCodeState
-from multidrop.dialects.pmx.host.codec import Pmx
 from multidrop.drives.events import Unsolicited
 from multidrop.drives.line import Finished, Line, Write
+from multidrop.families.lexium.host.mcode.codec import MCode
+from multidrop.families.lexium.host.mcode.family import MCODE
+from multidrop.families.lexium.host.mcode.framing import sealed
+from multidrop.families.lexium.host.mcode.state import MCodeState
+from multidrop.families.pmx.host.codec import Pmx
 from tests.support.cases import for_each
 from tests.support.procedure import ProcedureRunner
 

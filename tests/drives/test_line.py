@@ -5,10 +5,10 @@ from dataclasses import replace
 import pytest
 
 from multidrop.dialects import End, Kind, Priority, Request, StopPiece
-from multidrop.dialects.mcode.host.codec import MCode
-from multidrop.dialects.mcode.host.framing import sealed
 from multidrop.drives.events import Unsolicited
 from multidrop.drives.line import QUIET, Finished, Line, Write
+from multidrop.families.lexium.host.mcode.codec import MCode
+from multidrop.families.lexium.host.mcode.framing import sealed
 from tests.support.line_run import LineRun
 
 ECHO = MCode(em=0)

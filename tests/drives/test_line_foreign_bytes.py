@@ -8,11 +8,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from multidrop.dialects import End, Kind, Priority, Request, StopPiece
-from multidrop.dialects.mcode.host.codec import MCode
 from multidrop.drives.echoes import LONGEST_TAIL
 from multidrop.drives.events import Unsolicited
 from multidrop.drives.inbox import LATE
 from multidrop.drives.line import LONGEST_LIST, NEVER_QUIET, Finished, Line, Write
+from multidrop.families.lexium.host.mcode.codec import MCode
 from tests.support.examples import examples
 from tests.support.line_run import LineRun
 

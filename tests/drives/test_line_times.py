@@ -6,7 +6,6 @@ from typing import Any
 import pytest
 
 from multidrop.dialects import Decoded, End, Kind, Priority, Reply, Request, StopPiece
-from multidrop.dialects.mcode.host.codec import MCode
 from multidrop.drives.events import Unsolicited
 from multidrop.drives.inbox import NEVER_QUIET, TAIL
 from multidrop.drives.line import (
@@ -23,6 +22,7 @@ from multidrop.drives.line import (
     divided,
     merged,
 )
+from multidrop.families.lexium.host.mcode.codec import MCode
 from tests.support.line_run import LineRun
 
 

@@ -7,12 +7,12 @@ import pytest
 
 from multidrop.base.errors import TransportLost
 from multidrop.dialects import End, Kind, Priority, Reply, Request, StopPiece
-from multidrop.dialects.mcode.host.codec import MCode
 from multidrop.drives.events import Changed, Ended, Lost, Notice, Sent, Traffic, Transaction, Unsolicited
 from multidrop.drives.inbox import LATE
 from multidrop.drives.line import Line
 from multidrop.drives.link import AS_GREETING, ECHO, GREETING, UNASKED, UNLIKE_A_DRIVE, Link, LostInFlight, Reserved
 from multidrop.drives.port_journal import Keeper
+from multidrop.families.lexium.host.mcode.codec import MCode
 from multidrop.transports import Transport
 
 pytestmark = pytest.mark.virtual

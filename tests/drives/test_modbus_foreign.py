@@ -14,13 +14,13 @@ from pymodbus.simulator import DataType, SimData, SimDevice
 from multidrop.base.errors import NoAnswer, Refused, TransportLost
 from multidrop.dialects import Hints, Priority
 from multidrop.dialects.families import family_of
-from multidrop.dialects.modbus.host import framing
-from multidrop.dialects.modbus.manual.registers import REGISTERS
 from multidrop.drives import stopping
 from multidrop.drives.bus import Bus
 from multidrop.drives.drive import still
 from multidrop.drives.events import Notice, Traffic, Unsolicited
 from multidrop.drives.stopping import Fate
+from multidrop.families.lexium.host.modbus import framing
+from multidrop.families.lexium.manual.modbus.registers import REGISTERS
 from multidrop.transports.sockets import open_tcp
 from tests.support.until import PATIENCE
 

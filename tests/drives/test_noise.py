@@ -7,7 +7,7 @@ or as a program's, and nothing is executed twice. Without a checksum a digit may
 import pytest
 
 from multidrop.base.errors import DriveError, NoAnswer
-from multidrop.dialects.mcode.family import MCODE
+from multidrop.families.lexium.host.mcode.family import MCODE
 from multidrop.simulator.cell.spec import Faults
 from tests.support.faults import disturb
 from tests.support.mcode_drives import Desk

@@ -7,12 +7,12 @@ import pytest
 
 from multidrop.base.errors import NoAnswer, Refused, Stopped
 from multidrop.dialects import End, Hints, Priority, StopPiece
-from multidrop.dialects.pmx.host.codec import GAP, Pmx
 from multidrop.drives.bus import Bus
 from multidrop.drives.events import Unsolicited
 from multidrop.drives.line import QUIET, Finished, Line, Write
 from multidrop.drives.stop_forms import stop_forms
 from multidrop.drives.stopping import Fate
+from multidrop.families.pmx.host.codec import GAP, Pmx
 from multidrop.transports import Transport
 from tests.support.virtual import in_virtual_time
 

@@ -9,11 +9,11 @@ import pytest
 from multidrop.base.errors import Inexpressible, NoAnswer, Refused, TransportLost
 from multidrop.dialects import Kind, Motion, Priority, Reply, Request
 from multidrop.dialects.codec import End
-from multidrop.dialects.mcode.host.codec import MCode
 from multidrop.drives.events import Outcome, Sample, Silent, Transaction, Valued
 from multidrop.drives.poller import AFTER_DEFECT, Due, Poller, Subscription
 from multidrop.drives.readings import Seen
 from multidrop.drives.telemetry import Value, _MotionPoller, _ValuePoller
+from multidrop.families.lexium.host.mcode.codec import MCode
 from tests.support.told_link import ToldLink
 
 pytestmark = pytest.mark.virtual

@@ -6,8 +6,8 @@ import pytest
 
 from multidrop.base.errors import NoAnswer, Stopped, TransportLost
 from multidrop.dialects import Hints, Owed
-from multidrop.dialects.mcode.manual import program_file
 from multidrop.drives.port_journal import Keeper
+from multidrop.families.lexium.manual import program_file
 from tests.drives.test_bus import LOOP
 from tests.drives.test_bus import opened as opened_with
 from tests.support.until import until

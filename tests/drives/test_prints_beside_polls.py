@@ -7,9 +7,9 @@ import pytest
 
 from multidrop.dialects import End, Priority
 from multidrop.dialects.families import family_of
-from multidrop.dialects.mcode.host.codec import MCode
-from multidrop.dialects.mcode.host.state import MCodeState
 from multidrop.drives.events import Sent, Traffic, Unsolicited
+from multidrop.families.lexium.host.mcode.codec import MCode
+from multidrop.families.lexium.host.mcode.state import MCodeState
 from multidrop.shell.events import OnBus
 from multidrop.simulator.cell.spec import Faults
 from tests.support.cell_session import CellSession, bus, party

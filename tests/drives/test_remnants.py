@@ -7,9 +7,9 @@ import pytest
 
 from multidrop.dialects import Owed, Request
 from multidrop.dialects.codec import Kind
-from multidrop.dialects.mcode.host.codec import MCode
 from multidrop.drives.events import Unsolicited
 from multidrop.drives.inbox import LASTS, Debris, Leftovers
+from multidrop.families.lexium.host.mcode.codec import MCode
 from multidrop.shell.configuration import Settings
 from multidrop.shell.connect.opening import open_buses
 from multidrop.shell.events import OnBus

@@ -11,12 +11,12 @@ import pytest
 from multidrop.base.errors import DriveError, NoAnswer
 from multidrop.dialects import Hints, Motion, Owed
 from multidrop.dialects.families import FAMILIES
-from multidrop.dialects.mcode.host.codec import MCode
-from multidrop.dialects.mcode.host.state import MCodeState
 from multidrop.drives.events import Restarted
 from multidrop.drives.motion_record import MotionRecord
 from multidrop.drives.roster import PAUSE, Restarts, Roster, _compare, _shown, _text
 from multidrop.drives.roster import _ran_on as ran_on
+from multidrop.families.lexium.host.mcode.codec import MCode
+from multidrop.families.lexium.host.mcode.state import MCodeState
 from tests.support.cell_session import party
 from tests.support.simulated_bus import SimulatedBus
 from tests.support.told_link import ToldLink

@@ -134,8 +134,8 @@ async def test_in_the_other_families_a_move_that_was_executed_is_never_called_re
         if family == "pmx":
             data = f"@{address}{text}\r".encode()
         else:
-            from multidrop.dialects.tmcl.host.codec import frame_of
-            from multidrop.dialects.tmcl.manual import commands
+            from multidrop.families.tmcl.host.codec import frame_of
+            from multidrop.families.tmcl.manual import commands
 
             call = commands.parsed(text)
             assert call is not None

@@ -7,10 +7,10 @@ import pytest
 from multidrop.base.errors import NoAnswer, Refused, Stopped
 from multidrop.dialects import DriveState, End, Kind, Priority, Reply, Request, StopPiece
 from multidrop.dialects.codec import copy_with
-from multidrop.dialects.mcode.manual import program_file
 from multidrop.drives.drive import confirmed_motion
 from multidrop.drives.events import Ended, Sample, Sent, Silent, Unsolicited
 from multidrop.drives.stopping import Fate
+from multidrop.families.lexium.manual import program_file
 from multidrop.simulator.serving.in_process import SimPipe
 from multidrop.transports.rfc2217 import Rfc2217Pipe
 from tests.support.cell_session import party
@@ -514,8 +514,8 @@ async def test_an_answer_that_was_under_way_when_a_stop_came_is_nobodys():
 
 
 def test_what_was_stopped_says_whether_it_was_sent():
-    from multidrop.dialects.mcode.host.codec import MCode
     from multidrop.drives.line import Finished, Line
+    from multidrop.families.lexium.host.mcode.codec import MCode
 
     line = Line(MCode(em=1))
     request = Request("", "MR 1", Kind.COMMAND, MCode(em=1), Priority.OPERATOR)

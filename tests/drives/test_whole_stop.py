@@ -12,14 +12,14 @@ from types import SimpleNamespace
 import pytest
 
 from multidrop.dialects import Hints, StopPiece
-from multidrop.dialects.mcode.host.codec import MCode
-from multidrop.dialects.pmx.host.codec import GAP, Pmx
 from multidrop.drives import pacing
 from multidrop.drives.bus import Bus
 from multidrop.drives.events import Traffic
 from multidrop.drives.line import PAUSE, Line, Write, merged
 from multidrop.drives.stop_ahead import StopAhead
 from multidrop.drives.stop_forms import StopForms, stop_forms
+from multidrop.families.lexium.host.mcode.codec import MCode
+from multidrop.families.pmx.host.codec import GAP, Pmx
 from multidrop.simulator.serving.in_process import SimPipe
 from tests.drives.test_pmx import BYTE, Wire
 from tests.support.cell_session import CellSession, bus, drive, party, pmx

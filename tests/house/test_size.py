@@ -8,7 +8,19 @@ from tests.support.paths import ROOT
 
 pytestmark = pytest.mark.slow
 
-ROOMS = ("multidrop", "tui", "shell", "macros", "drives", "simulator", "dialects", "transports", "base", "features")
+ROOMS = (
+    "multidrop",
+    "tui",
+    "shell",
+    "macros",
+    "drives",
+    "simulator",
+    "dialects",
+    "transports",
+    "base",
+    "families",
+    "features",
+)
 MOST = 40
 
 

@@ -99,7 +99,7 @@ def test_a_class_that_a_program_derives_has_names_of_its_own(session: Session) -
         setattr(stage, "position", 7)  # noqa: B010
 
 
-@pytest.mark.parametrize("room", ["multidrop", "dialects", "drives", "shell", "macros", "simulator", "tui"])
+@pytest.mark.parametrize("room", ["multidrop", "dialects", "drives", "families", "shell", "macros", "simulator", "tui"])
 def test_a_checker_of_types_sees_no_module_that_has_every_name(room: str) -> None:
     for path in (ROOT / room).rglob("*.py"):
         found = [each.name for each in ast.parse(path.read_bytes()).body if isinstance(each, ast.FunctionDef)]

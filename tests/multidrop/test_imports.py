@@ -23,7 +23,7 @@ HOSTS = {place.record.partition(":")[0] for place in FAMILIES.values()} | {
 }
 SIMULATORS = {place.record.partition(":")[0] for place in SIMULATED.values()} | {"multidrop.simulator.floor"}
 NO_LINE = HEAVY | LOOP | HOSTS | SIMULATORS | {"serial"}
-MCODE = {"multidrop.dialects.mcode.family"}
+MCODE = {"multidrop.families.lexium.host.mcode.family"}
 OTHERS = HOSTS - MCODE - {"multidrop.drives.bus", "multidrop.shell.session"}
 VERBS = {
     "multidrop.shell.verbs.call",
@@ -45,39 +45,46 @@ TABLE = {
         "pathlib",
         "tomllib",
         "platformdirs",
-        "multidrop.dialects.pmx",
-        "multidrop.dialects.tmcl",
-        "multidrop.dialects.modbus",
+        "multidrop.families.pmx.host",
+        "multidrop.families.tmcl.host",
+        "multidrop.families.lexium.host.modbus",
     }
     | {
-        "multidrop.dialects.mcode.host",
-        "multidrop.simulator.pmx",
-        "multidrop.simulator.tmcl",
-        "multidrop.simulator.lexium.ports",
+        "multidrop.families.lexium.host.mcode",
+        "multidrop.families.pmx.simulator",
+        "multidrop.families.tmcl.simulator",
+        "multidrop.families.lexium.simulator.ports",
         "multidrop.simulator.wire",
     },
     ("program", "check", "a.prg"): NO_LINE
-    | {"multidrop.simulator.lexium", "multidrop.dialects.mcode", "multidrop.dialects.pmx.host"},
+    | {"multidrop.families.lexium.simulator", "multidrop.families.lexium.host.mcode", "multidrop.families.pmx.host"},
     ("program", "test", "a.mxt"): NO_LINE
-    | {"platformdirs", "multidrop.dialects.pmx", "multidrop.dialects.mcode.host", "multidrop.simulator.pmx"},
+    | {
+        "platformdirs",
+        "multidrop.families.pmx.host",
+        "multidrop.families.lexium.host.mcode",
+        "multidrop.families.pmx.simulator",
+    },
     ("lsp", "--help"): NO_LINE,
     ("program", "sweep", "a.mxt"): HEAVY
-    | {"socket", "ssl", "asyncio", "serial", "multidrop.dialects.pmx", "multidrop.simulator.pmx"}
+    | {"socket", "ssl", "asyncio", "serial", "multidrop.families.pmx.host", "multidrop.families.pmx.simulator"}
     | {"concurrent.futures", "distributed", "dask"}
     | HOSTS,
     # libusb1 imports subprocess and json
-    ("ports",): NO_LINE - {"serial", "subprocess"} | {"platformdirs", "multidrop.dialects.mcode"},
-    ("completion", "bash"): NO_LINE | {"platformdirs", "multidrop.dialects.mcode"},
+    ("ports",): NO_LINE - {"serial", "subprocess"} | {"platformdirs", "multidrop.families.lexium.host.mcode"},
+    ("completion", "bash"): NO_LINE | {"platformdirs", "multidrop.families.lexium.host.mcode"},
     ("macro", "list"): HEAVY | LOOP | HOSTS | SIMULATORS | {"serial"},
     ("send", "tcp://127.0.0.1:1", "PR P"): HEAVY | OTHERS | SIMULATORS | VERBS | {"serial"},
     ("send", "/dev/does-not-exist", "PR P"): HEAVY | OTHERS | SIMULATORS | VERBS | {"serial.tools.list_ports"},
-    ("send", "sim:a.toml", "PR P"): HEAVY | OTHERS | {"serial", "multidrop.simulator.pmx", "multidrop.simulator.tmcl"},
+    ("send", "sim:a.toml", "PR P"): HEAVY
+    | OTHERS
+    | {"serial", "multidrop.families.pmx.simulator", "multidrop.families.tmcl.simulator"},
     ("relay", "/dev/does-not-exist"): HEAVY | LOOP | HOSTS | SIMULATORS | VERBS | {"json", "platformdirs"},
     ("publish", "sim:", "--to", "http://broker"): HEAVY | SIMULATORS | VERBS | {"serial", "paho"},
     ("share", "/dev/does-not-exist", "--rfc2217", "0"): HEAVY | OTHERS | SIMULATORS | {"multidrop.shell.session"},
     ("sim", "gone.toml"): HEAVY
     | HOSTS
-    | {"serial", "multidrop.simulator.pmx.family", "multidrop.simulator.lexium.family"},
+    | {"serial", "multidrop.families.pmx.simulator.family", "multidrop.families.lexium.simulator.family"},
 }
 """For each command the modules that it must not import."""
 CHILD = """

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from multidrop.dialects.mcode.family import MCODE
-from multidrop.dialects.mcode.manual.program_file import read
+from multidrop.families.lexium.host.mcode.family import MCODE
+from multidrop.families.lexium.manual.program_file import read
 from tests.conftest import Bench
 from tests.support.front_door import Home
 from tests.support.mcode_drives import Desk

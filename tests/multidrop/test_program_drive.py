@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from multidrop.dialects.pmx.manual.script_compiler import LINES
+from multidrop.families.pmx.manual.script_compiler import LINES
 from tests.support.cell_session import TCP, bus, drive, pmx
 from tests.support.front_door import Command, Home
 from tests.support.pmx_programs import STEP_PER_EDGE, TEN_TIMES, plain

@@ -10,10 +10,10 @@ from typing import Any
 
 import pytest
 
-from multidrop.dialects.pmx.manual import program_file
+from multidrop.families.pmx.manual import program_file
+from multidrop.families.pmx.simulator.program_run import ProgramRun
 from multidrop.simulator.cell.spec import DriveSpec
 from multidrop.simulator.cells import read
-from multidrop.simulator.pmx.program_run import ProgramRun
 from multidrop.simulator.program_run import Event, Summary
 from tests.support import pmx_programs as shapes
 from tests.support.cell_session import bus, drive, pmx

@@ -53,7 +53,7 @@ import sys
 
 
 def test_nothing_of_multidrop_is_loaded():
-    rooms = {"drives", "shell", "dialects", "simulator", "multidrop.api"}
+    rooms = {"drives", "shell", "dialects", "families", "simulator", "multidrop.api"}
     assert "multidrop.pytest_plugin" in sys.modules and not rooms & {*sys.modules}
 """
 
@@ -94,7 +94,7 @@ def test_folders_of_a_persons_own_and_a_fault_of_a_cell(
 ) -> None:
     for name, value in environment(pytester.path).items():
         monkeypatch.setenv(name, value)
-    for room in ("drives", "shell", "simulator", "dialects", "macros", "transports", "tui", "base"):
+    for room in ("drives", "shell", "simulator", "dialects", "families", "macros", "transports", "tui", "base"):
         pytester.mkpydir(room).joinpath("__init__.py").write_text("raise ImportError('of a person')")
     pytester.makepyfile(test_with_drives=TESTS, test_broken=BROKEN)
     monkeypatch.setenv("PYTEST_DISABLE_PLUGIN_AUTOLOAD", "1")

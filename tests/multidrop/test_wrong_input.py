@@ -22,10 +22,10 @@ from multidrop.base.text import whole
 from multidrop.dialects import End
 from multidrop.dialects.families import languages
 from multidrop.dialects.family import Language
-from multidrop.dialects.mcode.host.classify import INTEGER
-from multidrop.dialects.mcode.host.codec import MCode
-from multidrop.dialects.mcode.host.state import MCodeState
-from multidrop.dialects.pmx.host.operations import INTEGER as PMX_INTEGER
+from multidrop.families.lexium.host.mcode.classify import INTEGER
+from multidrop.families.lexium.host.mcode.codec import MCode
+from multidrop.families.lexium.host.mcode.state import MCodeState
+from multidrop.families.pmx.host.operations import INTEGER as PMX_INTEGER
 from multidrop.macros import parse_macro
 from multidrop.shell import configuration
 from multidrop.shell.configuration import Settings

@@ -11,7 +11,7 @@ import pytest
 from tests.support.paths import ROOT
 
 pytestmark = [pytest.mark.process, pytest.mark.nightly]
-ROOMS = {"tui", "shell", "macros", "drives", "simulator", "dialects", "transports", "base", "features"}
+ROOMS = {"tui", "shell", "macros", "drives", "simulator", "dialects", "transports", "base", "families", "features"}
 DATA = {
     "share/man/man1/multidrop.1",
     "share/bash-completion/completions/multidrop",

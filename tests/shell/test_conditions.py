@@ -9,10 +9,10 @@ from typing import Any
 import pytest
 
 from multidrop.dialects.families import FAMILIES
-from multidrop.dialects.mcode.host.motions import cause
-from multidrop.dialects.mcode.manual.points import CAUSE
 from multidrop.dialects.values import UNREAD, Conditions
 from multidrop.drives.events import Conditioned, Unsolicited
+from multidrop.families.lexium.host.mcode.motions import cause
+from multidrop.families.lexium.manual.points import CAUSE
 from multidrop.shell.events import OnBus
 from tests.support.cell_session import ETHERNET, CellSession, bus, party, pmx
 

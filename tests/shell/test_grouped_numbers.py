@@ -7,13 +7,13 @@ import asyncio
 import pytest
 
 from multidrop.base.errors import Diagnostic, DriveError, Inexpressible
-from multidrop.dialects.mcode.manual import program_checker, program_file
-from multidrop.dialects.mcode.manual.grammar import LineError, check_groups
-from multidrop.dialects.modbus.host.codec import Modbus, ModbusState
-from multidrop.dialects.modbus.host.operations import perform
-from multidrop.dialects.pmx.manual import program_file as pmx_file
-from multidrop.dialects.pmx.manual.table import grouped
-from multidrop.dialects.tmcl.manual import commands
+from multidrop.families.lexium.host.modbus.codec import Modbus, ModbusState
+from multidrop.families.lexium.host.modbus.operations import perform
+from multidrop.families.lexium.manual import program_checker, program_file
+from multidrop.families.lexium.manual.grammar import LineError, check_groups
+from multidrop.families.pmx.manual import program_file as pmx_file
+from multidrop.families.pmx.manual.table import grouped
+from multidrop.families.tmcl.manual import commands
 from multidrop.macros import Macro, Step
 from multidrop.shell.events import By
 from multidrop.shell.scripts.executor import play, run_script

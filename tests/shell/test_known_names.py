@@ -7,9 +7,9 @@ from prompt_toolkit.completion import CompleteEvent
 from prompt_toolkit.document import Document
 
 from multidrop.dialects import Priority
-from multidrop.dialects.mcode.host.program_readout import offered
 from multidrop.dialects.program_files import Held
 from multidrop.drives.events import Ended
+from multidrop.families.lexium.host.mcode.program_readout import offered
 from multidrop.shell.events import OnBus
 from multidrop.shell.prompt.complete import complete, names_of
 from multidrop.shell.prompt.view import SessionCompleter

@@ -8,10 +8,10 @@ from pathlib import Path
 import pytest
 
 from multidrop.dialects.motions import MoveKind
-from multidrop.dialects.tmcl.host.codec import Tmcl, TmclState
-from multidrop.dialects.tmcl.host.motions import effect
+from multidrop.families.lexium.simulator.device import MCodeDevice
+from multidrop.families.tmcl.host.codec import Tmcl, TmclState
+from multidrop.families.tmcl.host.motions import effect
 from multidrop.shell.session import Session
-from multidrop.simulator.lexium.device import MCodeDevice
 from tests.shell.test_outcomes import at_limit, noted, on, ran, value
 from tests.shell.test_outcomes_pmx_tmcl import SWITCHES, controller, module
 from tests.shell.test_outcomes_pmx_tmcl import value as asked
@@ -104,7 +104,7 @@ async def test_a_program_that_ran_before_a_move_may_end_it(tmp_path: Path, befor
 
 
 async def test_a_program_of_a_controller_that_ran_before_a_move_may_end_it(tmp_path: Path) -> None:
-    from multidrop.dialects.pmx.manual import program_file
+    from multidrop.families.pmx.manual import program_file
 
     text = "PRG 0\nDELAY=300\nSTOPX\nEND"
     async with controller(tmp_path, SWITCHES) as session:
@@ -400,7 +400,7 @@ async def test_bridges_that_are_switched_off_end_a_slew_and_are_the_reason(tmp_p
 
 @pytest.mark.parametrize("line", ["JX+", "X-2000"])
 async def test_a_program_of_a_controller_that_still_runs_may_have_ended_a_motion(tmp_path: Path, line: str) -> None:
-    from multidrop.dialects.pmx.manual import program_file
+    from multidrop.families.pmx.manual import program_file
 
     async with controller(tmp_path, SWITCHES) as session:
         await session.drive().download(program_file.read("PRG 0\nSTOPX\nDELAY=5000\nEND", "a.prg"))
@@ -416,7 +416,7 @@ async def test_a_program_of_a_controller_that_still_runs_may_have_ended_a_motion
 
 @pytest.mark.parametrize("line", ["ROR 0, 500", "MVP ABS, 0, 500000"])
 async def test_a_program_of_a_module_that_still_runs_may_have_ended_a_motion(tmp_path: Path, line: str) -> None:
-    from multidrop.dialects.tmcl.manual import program_file
+    from multidrop.families.tmcl.manual import program_file
 
     async with module(tmp_path, "TMCM-1241") as session:
         await session.drive().download(program_file.read("MST 0\nWAIT TICKS, 0, 900\nSTOP", "a.tmc"))

@@ -59,7 +59,7 @@ async def test_a_stop_stops_both_axes_of_every_controller(session):
 
 async def test_a_program_that_moves_is_stopped_for_good(session):
     lines = ["PRG 0", "WHILE 1=1", "X1000", "WAITX", "X0", "WAITX", "ENDWHILE", "END"]
-    from multidrop.dialects.pmx.manual import program_file
+    from multidrop.families.pmx.manual import program_file
 
     drive = session.buses["stages"].drives["00"]
     await drive.download(program_file.read("\n".join(lines), "shuttle.prg"))

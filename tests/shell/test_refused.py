@@ -268,7 +268,7 @@ SHUTTLE = ["PRG {0}", "WHILE 1=1", "{1}1000", "WAIT{1}", "{1}0", "WAIT{1}", "END
 
 async def programs(shop):
     """Both programs of a controller run, and each moves an axis."""
-    from multidrop.dialects.pmx.manual import program_file
+    from multidrop.families.pmx.manual import program_file
 
     text = "\n".join(line.format(n, axis) for n, axis in enumerate("XY") for line in SHUTTLE)
     await shop.session.buses["stages"].drives["00"].download(program_file.read(text, "two.prg"))

@@ -17,9 +17,9 @@ from hypothesis import strategies as st
 from multidrop.base.errors import Diagnostic, DriveError, Inexpressible
 from multidrop.dialects.codec import Procedure, Request
 from multidrop.dialects.families import FAMILIES
-from multidrop.dialects.mcode.manual.grammar import Number, parsed
-from multidrop.dialects.modbus.host.codec import Modbus, ModbusState
-from multidrop.dialects.tmcl.manual import commands
+from multidrop.families.lexium.host.modbus.codec import Modbus, ModbusState
+from multidrop.families.lexium.manual.grammar import Number, parsed
+from multidrop.families.tmcl.manual import commands
 from multidrop.macros import Macro, Step
 from multidrop.shell.events import By
 from multidrop.shell.line_syntax import DriveLine, parse

@@ -9,7 +9,7 @@ import pytest
 
 from multidrop.api.telemetry import AsyncTelemetry
 from multidrop.base.errors import DriveError
-from multidrop.dialects.tmcl.manual.commands import Axis, Call, Command
+from multidrop.families.tmcl.manual.commands import Axis, Call, Command
 from multidrop.shell import setting_units, snapshots
 from multidrop.shell.events import Notified, Output
 from multidrop.shell.waits import standings

@@ -8,12 +8,12 @@ from collections.abc import Iterator
 import pytest
 
 from multidrop.base.errors import Diagnostic
-from multidrop.dialects.mcode.manual.table import words
+from multidrop.families.lexium.manual.table import words
+from multidrop.families.lexium.simulator.family import KEY_OF
+from multidrop.families.lexium.simulator.state.models import MODELS
 from multidrop.shell import snapshots
 from multidrop.simulator import cells
 from multidrop.simulator.floor import Floor
-from multidrop.simulator.lexium.family import KEY_OF
-from multidrop.simulator.lexium.state.models import MODELS
 from tests.shell.test_snapshots import taken
 from tests.support.cell_session import CellSession, bus
 

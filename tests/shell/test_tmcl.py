@@ -9,9 +9,9 @@ import pytest
 
 from multidrop.base.errors import DriveError, Inexpressible, NoAnswer, Refused, Stopped
 from multidrop.dialects.families import TABLE
-from multidrop.dialects.tmcl.manual import instructions
 from multidrop.drives.events import Sample, Unsolicited
 from multidrop.drives.stop_forms import stop_forms
+from multidrop.families.tmcl.manual import instructions
 from multidrop.shell.connect.urls import parse as parse_url
 from multidrop.shell.events import By, Notified, OnBus, Output, Printed
 from multidrop.shell.prompt.complete import complete, hint

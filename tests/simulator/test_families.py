@@ -10,13 +10,13 @@ from struct import Struct
 import pytest
 
 from multidrop.base.errors import Diagnostic
+from multidrop.families.lexium.simulator.state.models import MODELS
 from multidrop.simulator.cell.drive_keys import WORLD_KEYS, common_keys, read_worlds
 from multidrop.simulator.cell.spec import DriveSpec, WorldSpec
 from multidrop.simulator.cell.table import Table
 from multidrop.simulator.cells import Reader
 from multidrop.simulator.families import BY_PERSONALITY, FAMILIES, PROGRAMS, TABLE, family_of
 from multidrop.simulator.family import Family, Place, Unit
-from multidrop.simulator.lexium.state.models import MODELS
 from multidrop.simulator.wire import Transmission, Wire
 from multidrop.simulator.world import World
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import pytest
 
 from multidrop.base.errors import Diagnostic
-from multidrop.dialects.mcode.manual import program_file
+from multidrop.families.lexium.manual import program_file
+from multidrop.families.lexium.simulator.program_run import ProgramRun
 from multidrop.simulator.cell.spec import DriveSpec, WorldSpec
-from multidrop.simulator.lexium.program_run import ProgramRun
 from multidrop.simulator.program_run import LONGEST, Event, Summary
 
 

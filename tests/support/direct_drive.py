@@ -6,8 +6,8 @@ import re
 from typing import Any
 
 from multidrop.dialects import End, Kind, Procedure, Reply
-from multidrop.dialects.mcode.host.codec import MCode
-from multidrop.dialects.mcode.host.state import MCodeState
+from multidrop.families.lexium.host.mcode.codec import MCode
+from multidrop.families.lexium.host.mcode.state import MCodeState
 from tests.support.lexium import drive
 from tests.support.procedure import ProcedureRunner
 

@@ -5,10 +5,10 @@ from dataclasses import dataclass, field
 
 from multidrop.dialects import Motion
 from multidrop.dialects.families import DEFAULT, FAMILIES
-from multidrop.dialects.mcode.host.codec import MCode
-from multidrop.dialects.mcode.host.state import MCodeState
 from multidrop.drives.motion_record import MotionRecord
 from multidrop.drives.stopping import Halt
+from multidrop.families.lexium.host.mcode.codec import MCode
+from multidrop.families.lexium.host.mcode.state import MCodeState
 
 
 @dataclass(eq=False)

@@ -44,7 +44,7 @@ from multidrop.tui.app import look_troubles
 from tests.support.cell_session import bus, party
 from tests.support.paths import ROOT
 
-CORE = ("base", "dialects", "drives", "macros", "multidrop", "shell", "simulator", "transports", "tui")
+CORE = ("base", "dialects", "drives", "families", "macros", "multidrop", "shell", "simulator", "transports", "tui")
 ASKS = {"added", "answering", "needed", "records"}
 """The functions of the registry with which a room asks for records of a class."""
 DATA = {"claims", "passes"}

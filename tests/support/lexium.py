@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
+from multidrop.families.lexium.simulator.device import MCodeDevice
 from multidrop.simulator.cell.spec import DriveSpec, WorldSpec
-from multidrop.simulator.lexium.device import MCodeDevice
 from multidrop.simulator.world import World
 
 

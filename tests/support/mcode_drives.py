@@ -1,7 +1,7 @@
 """Shared by the tests: simulated MCode drives that are their own witnesses, and what a host knows of them."""
 
-from multidrop.dialects.mcode.host.codec import MCode
-from multidrop.dialects.mcode.host.state import MCodeState
+from multidrop.families.lexium.host.mcode.codec import MCode
+from multidrop.families.lexium.host.mcode.state import MCodeState
 from tests.support.faults import disturb
 
 MODES = [(em, party, check) for em in range(4) for party in (False, True) for check in range(3)]

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
+from multidrop.families.lexium.simulator.device import MCodeDevice
+from multidrop.families.lexium.simulator.ports.mcode import MCodePort
 from multidrop.simulator.cell.spec import DriveSpec, WorldSpec
-from multidrop.simulator.lexium.device import MCodeDevice
-from multidrop.simulator.lexium.ports.mcode import MCodePort
 from multidrop.simulator.world import World
 
 

@@ -15,8 +15,8 @@ from typing import Any
 from multidrop.base.errors import DriveError
 from multidrop.dialects import DriveState, End, Priority
 from multidrop.dialects.families import family_of
-from multidrop.dialects.mcode.host.codec import MCode
-from multidrop.dialects.mcode.host.state import MCodeState
+from multidrop.families.lexium.host.mcode.codec import MCode
+from multidrop.families.lexium.host.mcode.state import MCodeState
 from multidrop.simulator.cell.spec import Faults
 from tests.support.faults import disturb
 from tests.support.mcode_drives import Witness

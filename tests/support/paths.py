@@ -9,7 +9,19 @@ from multidrop.base.registry import IN_WHEEL
 
 ROOT = Path(__file__).resolve().parents[2]
 SUPPORT = ROOT / "tests" / "support"
-ROOMS = ("multidrop", "tui", "shell", "macros", "drives", "simulator", "dialects", "transports", "base", "features")
+ROOMS = (
+    "multidrop",
+    "tui",
+    "shell",
+    "macros",
+    "drives",
+    "simulator",
+    "dialects",
+    "transports",
+    "base",
+    "families",
+    "features",
+)
 THERE = tuple(each for each in IN_WHEEL if (ROOT / "features" / each).is_dir())
 """The features of the tree: all of the wheel, or fewer in a copy of `make seams`."""
 FACTS = ROOT.parent / "shared" / "facts"

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+from multidrop.families.pmx.simulator.device import PmxDevice
 from multidrop.simulator.cells import read
 from multidrop.simulator.floor import Floor
-from multidrop.simulator.pmx.device import PmxDevice
 
 
 class Bench:

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from random import Random
 
-from multidrop.dialects.mcode.manual import parameter_plan as checks
-from multidrop.dialects.mcode.manual import parameters as manual
-from multidrop.dialects.mcode.manual.mnemonic import Mnemonic
+from multidrop.families.lexium.manual import parameter_plan as checks
+from multidrop.families.lexium.manual import parameters as manual
+from multidrop.families.lexium.manual.mnemonic import Mnemonic
 
 PROGRAM = "PG 1\nLB G1\nRT\nLB G2\nRT\nE\nPG"
 NAMES = ("TI=1,G1", "TP=100,G2", "TT=9,G1", "TM=G1", "TC=G1", "TR=50,G2,3", "TA=3,G1", "VA Q1=5", "VA Q2", "Q1=7")

@@ -1,7 +1,7 @@
 """Running a program file on a simulated drive, for the sample programs' tests."""
 
+from multidrop.families.lexium.simulator.device import MCodeDevice
 from multidrop.simulator.cell.spec import DriveSpec, WorldSpec
-from multidrop.simulator.lexium.device import MCodeDevice
 from multidrop.simulator.world import World
 
 REVOLUTION = 51200

@@ -10,8 +10,8 @@ import time
 
 import pytest
 
-from multidrop.dialects.mcode.host.codec import MCode
-from multidrop.dialects.mcode.host.framing import sealed
+from multidrop.families.lexium.host.mcode.codec import MCode
+from multidrop.families.lexium.host.mcode.framing import sealed
 from tests.support.cell_session import TCP, bus, party
 from tests.support.front_door import Home
 from tests.support.posix import fcntl, termios

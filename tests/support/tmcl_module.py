@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from multidrop.dialects.tmcl.host import codec
-from multidrop.dialects.tmcl.manual import commands
-from multidrop.dialects.tmcl.manual.modules import module_of
+from multidrop.families.tmcl.host import codec
+from multidrop.families.tmcl.manual import commands
+from multidrop.families.tmcl.manual.modules import module_of
+from multidrop.families.tmcl.simulator.family import TmclPort
+from multidrop.families.tmcl.simulator.module import TmclModule
 from multidrop.simulator.cell.spec import DriveSpec, WorldSpec
-from multidrop.simulator.tmcl.family import TmclPort
-from multidrop.simulator.tmcl.module import TmclModule
 from multidrop.simulator.world import World
 
 

@@ -59,12 +59,19 @@ LATER = {
         "multidrop.shell.prompt.complete",
     ),
     *(
-        "multidrop.dialects.mcode.family",
-        "multidrop.dialects.pmx.family",
-        "multidrop.dialects.tmcl.family",
-        "multidrop.dialects.modbus.family",
+        "multidrop.families.lexium.host.mcode.family",
+        "multidrop.families.pmx.host.family",
+        "multidrop.families.tmcl.host.family",
+        "multidrop.families.lexium.host.modbus.family",
     ),
-    *("multidrop.simulator.floor", "multidrop.simulator.lexium", "serial", "prompt_toolkit", "pymodbus", "tomlkit"),
+    *(
+        "multidrop.simulator.floor",
+        "multidrop.families.lexium.simulator",
+        "serial",
+        "prompt_toolkit",
+        "pymodbus",
+        "tomlkit",
+    ),
     *("rerun", "numpy", "pyarrow", "importlib.metadata"),
 }
 

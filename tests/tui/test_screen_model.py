@@ -7,9 +7,9 @@ from dataclasses import replace
 import pytest
 
 from multidrop.dialects import End, Priority, Reply
-from multidrop.dialects.mcode.host.codec import MCode
 from multidrop.dialects.values import Conditions
 from multidrop.drives.events import Conditioned, Ended, Sample, Sent, Silent, Traffic, Transaction, Unsolicited
+from multidrop.families.lexium.host.mcode.codec import MCode
 from multidrop.shell.events import (
     Agreed,
     By,

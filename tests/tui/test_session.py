@@ -12,7 +12,7 @@ from textual import events
 from textual.keys import _character_to_key
 from textual.pilot import Pilot
 
-from multidrop.dialects.mcode.host.framing import sealed
+from multidrop.families.lexium.host.mcode.framing import sealed
 from multidrop.shell.configuration import Settings
 from multidrop.shell.session import Session
 from multidrop.tui.app import MultidropApp

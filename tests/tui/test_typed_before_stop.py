@@ -10,9 +10,9 @@ from pathlib import Path
 import pytest
 
 from multidrop.drives.events import Traffic
+from multidrop.families.lexium.simulator.device import MCodeDevice
 from multidrop.shell.events import Entered, OnBus, SessionEvent
 from multidrop.shell.session import Session
-from multidrop.simulator.lexium.device import MCodeDevice
 from multidrop.tui.screens.dialogs import Confirm, Search
 from multidrop.tui.screens.start import Start
 from tests.support.fake_session import FakeSession, demo_session

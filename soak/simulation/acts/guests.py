@@ -5,10 +5,10 @@ from __future__ import annotations
 from random import Random
 from typing import TYPE_CHECKING
 
-from multidrop.dialects.tmcl.host import codec
-from multidrop.dialects.tmcl.manual import commands
+from multidrop.families.lexium.simulator.ports.replies import checksum
+from multidrop.families.tmcl.host import codec
+from multidrop.families.tmcl.manual import commands
 from multidrop.features.sharing.writer_turns import SILENT
-from multidrop.simulator.lexium.ports.replies import checksum
 from soak.simulation.records.places import Place
 from soak.simulation.world import World
 

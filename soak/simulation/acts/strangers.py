@@ -13,8 +13,8 @@ from collections.abc import Awaitable, Callable
 from contextvars import copy_context
 from random import Random
 
-from multidrop.dialects.modbus.host.framing import READ_REGISTERS, WRITE_REGISTERS
-from multidrop.dialects.modbus.manual.registers import REGISTERS
+from multidrop.families.lexium.host.modbus.framing import READ_REGISTERS, WRITE_REGISTERS
+from multidrop.families.lexium.manual.modbus.registers import REGISTERS
 from multidrop.shell.channel import Front
 from multidrop.shell.configuration import Settings
 from multidrop.shell.events import FAILURES, By

@@ -276,7 +276,7 @@ async def late(world: World, rng: Random) -> None:
 
 def _sets(shop: Workshop, drive: str, value: int) -> None:
     """Give a drive the value that it is asked for."""
-    from multidrop.dialects.tmcl.manual.commands import Call
+    from multidrop.families.tmcl.manual.commands import Call
 
     witness = shop.witnesses[drive]
     if shop.language == "mcode":

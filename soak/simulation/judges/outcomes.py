@@ -12,7 +12,7 @@ from collections.abc import Iterator
 from contextlib import suppress
 from math import inf
 
-from multidrop.dialects.mcode.manual.errors import BY_ITSELF as MACHINES
+from multidrop.families.lexium.manual.errors import BY_ITSELF as MACHINES
 from multidrop.transports.relay import Garbled
 from soak.languages import TICKS
 from soak.simulation.judges.departures import for_drives

@@ -19,9 +19,9 @@ from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any
 
 from multidrop.drives import pacing
+from multidrop.families.lexium.simulator import power
 from multidrop.features.usb import libusb
 from multidrop.shell.connect import reconnect
-from multidrop.simulator.lexium import power
 from multidrop.simulator.serving.running import Listener, RunningFloor
 from multidrop.transports import relay, serial_pipe, serial_port, serial_ports, sockets, ssh_session
 from soak.simulation.records.climate import Climate

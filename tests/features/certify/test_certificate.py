@@ -15,20 +15,20 @@ from multidrop.base.errors import Diagnostic, NoAnswer, Refused, Stopped, Transp
 from multidrop.dialects.certifying import BYTES, ERROR, FITS, MODE, MOVES, NOTHING
 from multidrop.dialects.families import FAMILIES
 from multidrop.dialects.owed_settings import owed
-from multidrop.dialects.tmcl.manual import commands
-from multidrop.dialects.tmcl.manual.commands import Status
+from multidrop.families.lexium.simulator.device import Answer
+from multidrop.families.lexium.simulator.ports import replies
+from multidrop.families.lexium.simulator.ports.modbus import ModbusPort
+from multidrop.families.tmcl.manual import commands
+from multidrop.families.tmcl.manual.commands import Status
+from multidrop.families.tmcl.simulator.module import Answer as TmclAnswer
 from multidrop.features.certify.certificate import SLEEP, WAIT, Asking, certify, compare, load
 from multidrop.shell.channel import Front
 from multidrop.shell.configuration import Guarding, Settings
 from multidrop.shell.session import Session
 from multidrop.simulator.cells import read
 from multidrop.simulator.floor import Floor
-from multidrop.simulator.lexium.device import Answer
-from multidrop.simulator.lexium.ports import replies
-from multidrop.simulator.lexium.ports.modbus import ModbusPort
 from multidrop.simulator.serving.endpoints import serve_bus
 from multidrop.simulator.serving.running import RunningFloor
-from multidrop.simulator.tmcl.module import Answer as TmclAnswer
 from tests.support.cell_session import CellSession, bus, drive, party, pmx
 
 ROUTINE = 'program_text = """\nPG 1\nLB Ga\nMR 5000\nRT\nPG\nOE Ga\n"""'

@@ -10,13 +10,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from multidrop.dialects.tmcl.host import codec
-from multidrop.dialects.tmcl.manual import commands
+from multidrop.families.lexium.simulator.ports.mcode import MCodePort
+from multidrop.families.lexium.simulator.ports.replies import checksum
+from multidrop.families.pmx.simulator.device import PmxPort
+from multidrop.families.tmcl.host import codec
+from multidrop.families.tmcl.manual import commands
 from multidrop.features.sharing.stop_bytes import stop_bytes
 from multidrop.features.sharing.writer_turns import SILENT, Exchange, Say, Write
-from multidrop.simulator.lexium.ports.mcode import MCodePort
-from multidrop.simulator.lexium.ports.replies import checksum
-from multidrop.simulator.pmx.device import PmxPort
 from tests.support.examples import examples
 from tests.support.lexium import drive
 from tests.support.pmx_controller import Bench

@@ -6,9 +6,9 @@ import pytest
 
 from multidrop.base.errors import Diagnostic
 from multidrop.dialects import Codec
-from multidrop.dialects.mcode.host.codec import MCode
-from multidrop.dialects.pmx.host.codec import Pmx
-from multidrop.dialects.tmcl.host.codec import Tmcl
+from multidrop.families.lexium.host.mcode.codec import MCode
+from multidrop.families.pmx.host.codec import Pmx
+from multidrop.families.tmcl.host.codec import Tmcl
 from multidrop.features.sharing.stop_bytes import CERTAIN, NOTICED, stop_bytes
 from multidrop.features.sharing.writer_turns import NEVER, NOT_REACHED, OWED
 from multidrop.transports import telnet

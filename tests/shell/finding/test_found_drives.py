@@ -8,7 +8,7 @@ import pytest
 
 from multidrop.base.errors import Diagnostic
 from multidrop.dialects.families import FAMILIES
-from multidrop.dialects.mcode.host.codec import MCode
+from multidrop.families.lexium.host.mcode.codec import MCode
 from multidrop.shell.connect.urls import parse
 from multidrop.shell.finding.scanning import FoundDrive, Scanning, url_of
 from tests.support.cases import for_each

@@ -5,8 +5,8 @@ import asyncio
 import pytest
 
 from multidrop.base.errors import Diagnostic, Stopped
-from multidrop.dialects.tmcl.host.codec import frame_of
-from multidrop.dialects.tmcl.manual.commands import Call
+from multidrop.families.tmcl.host.codec import frame_of
+from multidrop.families.tmcl.manual.commands import Call
 from multidrop.shell.connect.urls import parse
 from multidrop.shell.finding.rescuing import Rescue
 from multidrop.shell.finding.scanning import NothingFound, Scanning, url_of

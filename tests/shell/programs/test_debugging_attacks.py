@@ -10,8 +10,8 @@ from typing import Any
 import pytest
 
 from multidrop.base.errors import DriveError, Inexpressible, NoAnswer, Refused, Stopped
-from multidrop.dialects.mcode.host.debugging import traced
 from multidrop.drives.stopping import Fate
+from multidrop.families.lexium.host.mcode.debugging import traced
 from multidrop.shell.events import FAILURES, By
 from multidrop.simulator.cell.spec import Faults
 from tests.support.cell_session import CellSession, bus

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from multidrop.base.errors import Diagnostic, DriveError
-from multidrop.dialects.mcode.manual import program_checker
+from multidrop.families.lexium.manual import program_checker
 from multidrop.shell.events import By
 from tests.support.cases import for_each
 from tests.support.transfers import kept, load, shop_with

@@ -14,15 +14,15 @@ from hypothesis import strategies as st
 from multidrop.base.errors import Diagnostic
 from multidrop.base.files import split_lines
 from multidrop.dialects.families import program_languages
-from multidrop.dialects.mcode.manual.grammar import LineError, Statement, parse
-from multidrop.dialects.mcode.manual.program_file import scan
-from multidrop.dialects.mcode.manual.statements import canonical
-from multidrop.dialects.pmx.manual.program_file import compiled
-from multidrop.dialects.pmx.manual.program_file import read as read_script
 from multidrop.dialects.program_files import Block, replaced
+from multidrop.families.lexium.manual.grammar import LineError, Statement, parse
+from multidrop.families.lexium.manual.program_file import scan
+from multidrop.families.lexium.manual.statements import canonical
+from multidrop.families.lexium.simulator.device import MCodeDevice
+from multidrop.families.pmx.manual.program_file import compiled
+from multidrop.families.pmx.manual.program_file import read as read_script
 from multidrop.shell.programs.program_text import Edit, ProgramGrammar, ProgramText
 from multidrop.simulator.cell.spec import DriveSpec, WorldSpec
-from multidrop.simulator.lexium.device import MCodeDevice
 from multidrop.simulator.world import World
 from tests.support.program_texts import TEXTS
 from tests.support.sample_files import MCODE, PMX, product_of

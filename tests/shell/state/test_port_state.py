@@ -12,10 +12,10 @@ from hypothesis import strategies as st
 
 from multidrop.base import atomic
 from multidrop.dialects import Owed
-from multidrop.dialects.mcode.host.codec import MCode
-from multidrop.dialects.mcode.host.state import MCodeState
 from multidrop.dialects.state import Remembered
-from multidrop.dialects.tmcl.host.codec import Tmcl, TmclState
+from multidrop.families.lexium.host.mcode.codec import MCode
+from multidrop.families.lexium.host.mcode.state import MCodeState
+from multidrop.families.tmcl.host.codec import Tmcl, TmclState
 from multidrop.shell.state.port_state import MOST, MOST_REPLIED, PortMemory, PortState
 
 PORT = "/dev/serial/by-id/usb-FTDI/RS485: 1"

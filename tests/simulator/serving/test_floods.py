@@ -14,7 +14,7 @@ from collections.abc import Awaitable, Callable
 
 import pytest
 
-from multidrop.dialects.mcode.manual.errors import text as error_text
+from multidrop.families.lexium.manual.errors import text as error_text
 from multidrop.simulator.cell.spec import Faults
 from multidrop.simulator.cells import read
 from multidrop.simulator.floor import Floor

@@ -11,9 +11,9 @@ from typing import Any
 
 import pytest
 
+from multidrop.families.lexium.simulator.power import ETHERNET_BOOT
 from multidrop.simulator.cells import load, read
 from multidrop.simulator.floor import Floor
-from multidrop.simulator.lexium.power import ETHERNET_BOOT
 from multidrop.simulator.serving.endpoints import serve_bus
 from multidrop.simulator.serving.in_process import connect
 from multidrop.simulator.serving.running import RunningFloor

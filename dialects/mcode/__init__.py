@@ -1,1 +1,0 @@
-"""MCode: the language of Lexium MDrive, Lexium Motion Module and MDrivePlus."""

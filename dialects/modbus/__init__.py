@@ -1,1 +1,0 @@
-"""Modbus/TCP as the Lexium Ethernet drives speak it."""

@@ -1,0 +1,1 @@
+"""The host's side of Lexium drives, by the protocol that they speak."""

@@ -1,0 +1,298 @@
+"""The programs that an MCode drive holds: read, divided, ended, offered by name, and made a file."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from typing import TypeVar
+
+from multidrop.base.errors import Diagnostic, NoAnswer, Refused
+from multidrop.base.files import SourceLine, split_lines
+from multidrop.dialects.codec import Procedure
+from multidrop.dialects.family import Progress
+from multidrop.dialects.program_files import Held, Stored
+from multidrop.families.lexium.host.mcode import classify
+from multidrop.families.lexium.host.mcode.codec import EVERY_DRIVE
+from multidrop.families.lexium.host.mcode.exchange import REPEATS
+from multidrop.families.lexium.host.mcode.operations import flag, immediate, listing, perform
+from multidrop.families.lexium.host.mcode.settings import listed
+from multidrop.families.lexium.host.mcode.state import MCodeState, who
+from multidrop.families.lexium.manual import editing, help, program_file
+from multidrop.families.lexium.manual.grammar import Compare, Name, parsed
+from multidrop.families.lexium.manual.statements import size_of
+
+# The programs of a file and of a listing.
+#
+# Theory of operation. A listing shows lines with their addresses and no ends of programs. A line ends where the next
+# one begins, unless a program ends there. So a gap larger than the line is the end of a program. The sizes of lines
+# are known from few units (`statements.size_of`). A file is divided at every such gap: a PG too many changes nothing
+# in the drive. What counts as one program is divided at a gap only after an instruction that ends a program, or at a
+# large gap.
+
+
+GAP = 64
+"""Bytes between the addresses of two lines, more than one line takes: another program begins."""
+ENDS = {"E", "RT", "BR"}
+"""The words that a program ends with."""
+GLOBAL, LOCAL, LABEL = "G", "L", "label"
+"""Kinds of names in a drive: a variable of the two scopes that PR UV prints, or a label of the program."""
+_LISTED = re.compile(r"(\d+)\s+(\S.*)", re.ASCII)
+_NAMED = re.compile(r"(\w+)\s*=\s*(?:([GL])\s+)?(-?\d+(?:\.\d+)?)", re.ASCII)
+
+
+@dataclass(frozen=True)
+class Called:
+    """A name in a drive: its kind, and its value or its address."""
+
+    kind: str
+    value: str
+
+
+@dataclass(frozen=True)
+class Program:
+    """A program in a drive: its lines, and the address after the last one."""
+
+    lines: tuple[Stored, ...]
+    end: int
+
+    @property
+    def start(self) -> int:
+        return self.lines[0].at
+
+    def declared(self, word: str) -> set[str]:
+        found = [declared(line.text) for line in self.lines]
+        return {each[1] for each in found if each is not None and each[0] == word}
+
+
+@dataclass(frozen=True)
+class FileProgram:
+    """A program of a file: the address or label of its PG, and its lines between PG and PG."""
+
+    place: str
+    lines: tuple[SourceLine, ...]
+
+    def start(self, names: Mapping[str, Called]) -> int | None:
+        """The address at which it begins; None for an unknown label."""
+        if self.place.isdigit():
+            return int(self.place)
+        called = names.get(self.place.upper())
+        is_label = called is not None and called.kind == LABEL and called.value.isdecimal()
+        return int(called.value) if called is not None and is_label else None
+
+
+def stored(listed: Sequence[str]) -> tuple[Stored, ...]:
+    found = [row for line in listed if (row := _LISTED.fullmatch(line.strip()))]
+    return tuple(Stored(int(row[1]), row[2]) for row in found)
+
+
+def names_of(held: Held) -> dict[str, Called]:
+    found = [row for line in held.names if (row := _NAMED.fullmatch(line.strip()))]
+    return {row[1].upper(): Called(row[2] or LABEL, row[3]) for row in found}
+
+
+def programs(lines: Sequence[Stored], product: str = "", fine: bool = False) -> list[Program]:
+    """Divide a listing into programs; `fine`: at every gap."""
+    found: list[list[Stored]] = []
+    end = -1
+    for line in lines:
+        before = found[-1][-1] if found else None
+        ends = before is not None and (fine or classify.word_of(before.text)[0] in ENDS)
+        if before is None or line.at - before.at > GAP or (line.at > end and ends):
+            found.append([])
+        found[-1].append(line)
+        end = line.at + size(line.text, product)
+    return [Program(tuple(each), each[-1].at + size(each[-1].text, product)) for each in found]
+
+
+@lru_cache(maxsize=4096)
+def size(text: str, product: str) -> int:
+    """Return the bytes that a line takes; 0 for a line that this grammar does not parse."""
+    statement = parsed(text)
+    return size_of(statement, product) if statement is not None else 0
+
+
+def programs_of(lines: Sequence[SourceLine]) -> list[FileProgram]:
+    return list(_divided(tuple(lines))[0])
+
+
+def size_of_file(lines: Sequence[SourceLine]) -> int:
+    return sum(len(program.lines) for program in programs_of(lines))
+
+
+def immediate_lines(lines: Sequence[SourceLine]) -> list[SourceLine]:
+    """Return the lines of a file that the drive executes at once: all but its programs."""
+    return list(_divided(tuple(lines))[1])
+
+
+@lru_cache(maxsize=8)
+def _divided(lines: tuple[SourceLine, ...]) -> tuple[tuple[FileProgram, ...], tuple[SourceLine, ...]]:
+    """Divide a file into its programs and the lines outside of them; each step of a download asks for one or both."""
+    programs, outside = list[FileProgram](), list[SourceLine]()
+    place, inside = "", list[SourceLine]()
+    for line in lines:
+        if classify.enters_program(line.text):
+            place, inside = classify.word_of(line.text)[1], []
+        elif not place:
+            outside.append(line)
+        elif classify.leaves_program(line.text):
+            programs.append(FileProgram(place, tuple(inside)))
+            place = ""
+        else:
+            inside.append(line)
+    return tuple(programs), tuple(outside)
+
+
+@lru_cache(maxsize=4096)
+def declared(text: str) -> tuple[str, str] | None:
+    statement = parsed(text)
+    if statement is None or statement.word not in ("VA", "LB") or not statement.arguments:
+        return None
+    first = statement.arguments[0]
+    if isinstance(first, Compare):
+        first = first.left
+    return (statement.word, first.word) if isinstance(first, Name) else None
+
+
+# Reading the programs of an MCode drive, with its labels and variables, and ending them.
+#
+# A locked program is not listed: the drive refuses L with error 44, and an error runs a resident OE subroutine. So the
+# host reads LK first. (MCode reference 5.1.35, 5.1.75, 5.1.134.)
+
+
+T = TypeVar("T")
+
+
+def read(state: MCodeState, _: Sequence[SourceLine], progress: Progress) -> Procedure[Held]:
+    """Read the program as listed, and labels and variables; no lines from a drive that is locked."""
+    progress(0, 1)
+    locked = yield from _again(state, lambda: flag(state, "LK"))
+    listed = () if locked else (yield from _again(state, lambda: listing(state, "")))
+    names = yield from _again(state, lambda: perform(state, "PR UV"))
+    held = Held(stored(listed), tuple(name.strip() for name in names if name.strip()), locked)
+    labels = any(each.kind == LABEL for each in names_of(held).values())
+    if labels and not (held.lines or locked):  # the L was lost on the line
+        held = replace(held, lines=stored((yield from _again(state, lambda: listing(state, "")))))
+    return held
+
+
+def _again(state: MCodeState, ask: Callable[[], Procedure[T]]) -> Procedure[T]:
+    """Ask again after a damaged reply: these questions change nothing. A drive that is silent is not asked again."""
+    for _ in range(REPEATS):
+        try:
+            return (yield from ask())
+        except NoAnswer:
+            if state.settings_unknown or state.programming:
+                raise
+    return (yield from ask())
+
+
+def start_line(lines: Sequence[SourceLine], label: str) -> str:
+    """Return the line that executes a program of a file. Raises Diagnostic where the file has no such label."""
+    found = programs_of(lines)
+    inside = [declared(line.text) for program in found for line in program.lines]
+    labels = [name for word, name in filter(None, inside) if word == "LB"]
+    if label.upper() not in (*labels, *(program.place for program in found)):
+        hint = f"labels: {', '.join(labels)}" if labels else "the file has no labels"
+        raise Diagnostic(f"no label {label} in the file", "", hint)
+    return f"EX {label.upper()}"
+
+
+def end_program(state: MCodeState) -> Procedure[bool]:
+    """End the running program with E, and the motion that it has begun with SL 0; return whether one ran.
+
+    Both take a while. Raises Refused where the motor moves without a program.
+    """
+    if not (yield from _again(state, lambda: flag(state, "BY"))):
+        if (yield from _again(state, lambda: flag(state, "MV"))):
+            raise Refused(f"{who(state)} moves: stop it first (nothing was sent)")
+        return False
+    yield from immediate(state, state.codec.request(state.address, "E"))
+    if (yield from _again(state, lambda: flag(state, "MV"))):
+        yield from immediate(state, state.codec.request(state.address, "SL 0"))
+    return True
+
+
+# The program of an MCode drive as a file, with the remarks of the file that it came from.
+
+
+def file_of(state: MCodeState, held: Held, raw: bool) -> tuple[str, ...]:
+    """Return a file that reproduces what a drive holds: VA, PG, the lines, PG, S; none where that is nothing."""
+    made = [f"VA {name}={called.value}" for name, called in names_of(held).items() if called.kind == GLOBAL]
+    for program in programs(held.lines, state.product, fine=True):
+        made += [f"PG {program.start}", *(line.text for line in program.lines), "PG"]
+    return (*made, "S") if made else ()
+
+
+def readable(held: Held) -> tuple[str, ...]:
+    return tuple(f"{line.at}  {line.text}" for line in held.lines)
+
+
+def refreshed(text: str, held: Held) -> tuple[str, ...]:
+    """Return a file's lines with the present values of the variables that it declares, and those that it lacks."""
+    missing = {name: called.value for name, called in names_of(held).items() if called.kind == GLOBAL}
+    made: list[str] = []
+    at: int | None = None
+    for line, sent in _sent_lines(text):
+        if sent is not None and sent.section == "program":
+            at = len(made) if at is None else at
+        elif sent is not None and (found := declared(sent.text)) is not None and found[1] in missing:
+            value = missing.pop(found[1])
+            if (sent.text.partition("=")[2].strip() or "0") != value:
+                line = line.replace(sent.text, f"VA {found[1]}={value}", 1)
+        made.append(line)
+    more = [f"VA {name}={value}" for name, value in missing.items()]
+    return (*made[:at], *more, *made[at:]) if at is not None else (*made, *more)
+
+
+def annotated(text: str, held: Held) -> tuple[str, ...]:
+    addresses = iter(held.lines)
+    width = max((len(str(line.at)) for line in held.lines), default=0)
+    made: list[str] = []
+    rest: list[str] = []
+    for line, sent in _sent_lines(text):
+        if sent is None:
+            rest.append(f"{'':{width}}  {line}".rstrip())
+        elif sent.section == "program" and sent.mark is None:
+            at = next(addresses).at
+            made += [*(rest if made else []), f"{at:<{width}}  {line}"]
+            rest = []
+        else:
+            rest = []
+    return tuple(made)
+
+
+def _sent_lines(text: str) -> Iterator[tuple[str, program_file.ProgramLine | None]]:
+    sent: Sequence[program_file.ProgramLine] = program_file.scan(text)[0]
+    by_number = {line.number: line for line in sent}
+    for number, line in enumerate(split_lines(text.removesuffix("\x1a").removesuffix("\n")), 1):
+        yield line, by_number.get(number)
+
+
+# The user's labels and variables in a drive, for the completion of a line that is being typed.
+
+
+def read_names(state: MCodeState) -> Procedure[Held]:
+    """Read labels and variables. Raises Refused where that would be stored, or answered by several drives."""
+    if state.programming or state.address in EVERY_DRIVE:
+        raise Refused(f"{who(state)} does not print its names now")
+    names = yield from listed(state, "PR UV")
+    return Held(names=tuple(name.strip() for name in names if name.strip()))
+
+
+def offered(held: Held, line: str) -> list[tuple[str, str]]:
+    """The names that may end a line: labels where a line takes one, variables elsewhere, both after PR."""
+    word = help.typing(line)
+    head = line[: len(line) - len(word)]
+    in_text = head.count('"') % 2 == 1
+    begun = bool(word or (head.strip() and head.endswith((" ", ",", "="))))
+    if in_text or not begun:
+        return []
+    names = names_of(held)
+    return [
+        (name, f"label at {called.value}" if called.kind == LABEL else f"variable, {called.value} when it was read")
+        for labels in editing.LABELS_AT[editing.expected(head)]
+        for name, called in names.items()
+        if (called.kind == LABEL) is labels and name.startswith(word.upper())
+    ]

@@ -1,0 +1,47 @@
+"""How the motions of an Ethernet drive begin and end over Modbus: as in MCode, by registers of the same names.
+
+The program cannot be listed over Modbus, so an OE routine in it is not seen. A device that did not identify itself as a
+Lexium is asked for nothing: its registers may mean other things, and reading one may clear something.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from multidrop.base.errors import Refused
+from multidrop.base.files import split_lines
+from multidrop.dialects.codec import Procedure
+from multidrop.families.lexium.host.mcode.motions import Access, motions, starts_program
+from multidrop.families.lexium.host.modbus.codec import ModbusState
+from multidrop.families.lexium.host.modbus.operations import PRODUCT, error_number, printed, value
+from multidrop.families.lexium.manual.modbus.registers import REGISTERS
+
+
+def _values(state: ModbusState, words: Sequence[str]) -> Procedure[Mapping[str, int]]:
+    """Read each of these registers that the product has."""
+    found: dict[str, int] = {}
+    if not PRODUCT.fullmatch(state.product):
+        return found
+    for word in words:
+        register = REGISTERS.get(word)
+        if register is None or not register.readable or (register.only and state.product.startswith("LMDO")):
+            continue
+        try:
+            found[word] = yield from value(state, word)
+        except Refused:
+            continue  # this drive lacks the register
+    return found
+
+
+def _no_handler(state: ModbusState) -> Procedure[bool]:
+    return False
+    yield
+
+
+def _program_input(state: ModbusState) -> Procedure[bool]:
+    """Read the set-ups of the inputs, which function 65 prints as text."""
+    text = yield from printed(state, "IS")
+    return starts_program(split_lines(text))
+
+
+MOTIONS = motions(Access(_values, error_number, _no_handler, _program_input))

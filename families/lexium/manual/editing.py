@@ -1,0 +1,261 @@
+"""MCode program files in an editor: the `EditingLanguage` of the language."""
+
+from __future__ import annotations
+
+from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
+from functools import lru_cache
+from typing import NamedTuple
+
+from multidrop.base.errors import Diagnostic
+from multidrop.base.files import split_lines
+from multidrop.dialects.program_files import Block, Offer, Span, UserName, Word, replaced
+from multidrop.families.lexium.manual import help
+from multidrop.families.lexium.manual.grammar import NAME_FORM, Token, divided, is_name, statement_tokens, tokens
+from multidrop.families.lexium.manual.mnemonic import EVERY, Mnemonic
+from multidrop.families.lexium.manual.program_file import LONGEST, MOVES, ProgramLine, bare, remark_at, scan
+from multidrop.families.lexium.manual.program_flow import AT_POWER_UP, PLACES
+from multidrop.families.lexium.manual.table import lookup
+
+STATEMENT, NEW, LABEL, PRINTED, VALUE = "statement", "new", "label", "printed", "value"
+"""A head; a name that is not there yet; the label of a place; an item of PR; any other argument."""
+LABELS_AT: Mapping[str, tuple[bool, ...]] = {
+    STATEMENT: (False,),
+    NEW: (),
+    LABEL: (True,),
+    PRINTED: (False, True),
+    VALUE: (False,),
+}
+"""The kinds of names at each place, in order: True for labels, False for variables."""
+_TARGETS: Mapping[str, int] = {**PLACES, "EX": 0}
+"""Words that take a label, and the number of commas before it."""
+
+
+def expected(before: str) -> str:
+    """Return what may follow `before`: a begun line without its last word."""
+    found = tokens(before)
+    if not found or found[-1].kind == "remark":
+        return STATEMENT
+    head, commas = found[0].text.upper(), sum(each.kind == "comma" for each in found)
+    if head in ("LB", "VA"):
+        return VALUE if head == "VA" and len(found) > 2 else NEW
+    if commas == _TARGETS.get(head) and found[-1].text in (found[0].text, "=", ","):
+        return LABEL
+    return PRINTED if head == "PR" else VALUE
+
+
+# The labels and variables of an MCode program file: where each is, and the check of another name for one.
+#
+# A rename keeps the program: every line has the tokens that it had, but for that name. A drive may divide a line
+# differently once a name exists or is gone: `H5` is `H 5` unless H5 is a variable. So the check compares all lines.
+
+
+class _Line(NamedTuple):
+    """A line of a file: its text without remark, the column of that from 0, the name that it declares, its tokens."""
+
+    text: str
+    column: int
+    declares: str
+    tokens: list[Token]
+
+
+@lru_cache(maxsize=16384)
+def _read(source: str) -> _Line:
+    """Read a line; it is kept, as an editor asks for all lines again after every key."""
+    text = bare(source)
+    column = len(source) - len(source.lstrip(" \t"))
+    return _Line(text, column, ProgramLine(0, text, "").declares, tokens(text))
+
+
+def names(text: str) -> list[UserName]:
+    sources = split_lines(text)
+    lines = [_read(source) for source in sources]
+    words = _declared_names(lines)
+    labels = {line.declares for line in lines if line.text[:2].upper() == "LB"}
+    places: dict[str, list[Span]] = {}
+    declared: dict[str, list[Span]] = {}
+    for at, line in enumerate(lines):
+        for number, token in _uses(line, words):
+            word, start = token.text.upper(), line.column + token.start
+            place = Span(at, start, start + len(token.text))
+            places.setdefault(word, []).append(place)
+            if number <= 2 and word == line.declares:  # LB G1, LB=G1
+                declared.setdefault(word, []).append(place)
+
+    def named(word: str) -> UserName:
+        kind, there = "label" if word in labels else "variable", declared.get(word, [])
+        return UserName(word, kind, tuple(there), tuple(places[word]), remark(sources[there[0].line]) if there else "")
+
+    return [named(word) for word in places]
+
+
+def _declared_names(lines: Iterable[_Line]) -> frozenset[str]:
+    return frozenset(line.declares for line in lines if line.declares)
+
+
+def remark(line: str) -> str:
+    """Return the text of the remark of a line; empty if it has none."""
+    return line[remark_at(line) + 1 :].strip()
+
+
+def _uses(line: _Line, words: Container[str]) -> Iterator[tuple[int, Token]]:
+    """Yield the tokens of a line that are one of the words, each with its number; the letter after DN is none."""
+    found = divided(line.tokens, words)
+    names_device = bool(found) and found[0].text.upper() == "DN"
+    for number, token in enumerate(found):
+        if token.kind == "word" and token.text.upper() in words and not (names_device and number):
+            yield number, token
+
+
+def fixed(name: UserName) -> str:
+    if name.word == AT_POWER_UP:
+        return f"{AT_POWER_UP} is the label of the program that runs at power-up: by another name it would not run"
+    return ""
+
+
+def renamed(text: str, name: UserName, new: str, product: str) -> str:
+    """Return the new name as given. Raises Diagnostic for one that is not a name, is in use, or changes the program."""
+    if reason := fixed(name):
+        raise Diagnostic(reason)
+    word = new.upper()
+    if not is_name(new):
+        raise Diagnostic(f"{new!r} is not a name", "", NAME_FORM)
+    if word == name.word:
+        return new
+    if lookup(word) is not None:
+        raise Diagnostic(_taken(word, product), "", "choose another name")
+    sources = split_lines(text)
+    for number, source in enumerate(sources, 1):
+        if any(_uses(_read(source), (word,))):
+            raise Diagnostic(f"{word} is in use already, in line {number}", "", "choose another name")
+    # Raise Diagnostic for a line that a rename makes too long, or that the drive would divide differently.
+    lines = [_read(source) for source in sources]
+    words = _declared_names(lines)
+    others = words - {name.word} | {word}
+    for number, (line, other) in enumerate(zip(lines, map(_read, replaced(sources, name.places, new)), strict=True), 1):
+        if len(other.text) > LONGEST >= len(line.text):
+            what = f"line {number} would have {len(other.text)} characters; a drive takes {LONGEST}"
+            raise Diagnostic(what, "", "choose a shorter name, or split the line")
+        if _tokens(line, words, {name.word: word}) != _tokens(other, others, {}):
+            raise Diagnostic(f"line {number} would mean something else with {word}", "", "choose another name")
+    return new
+
+
+def _taken(word: str, product: str) -> str:
+    row = lookup(word, product)
+    if row is not None:
+        return f"{word} is a word of the drive: {row.title}"
+    return f"{word} is a word of {', '.join(sorted(each for each in EVERY if lookup(word, each)))}"
+
+
+def _tokens(line: _Line, words: frozenset[str], new: Mapping[str, str]) -> list[str]:
+    """Return the tokens of a line, its names in capitals and renamed."""
+    found = [token.text for token in divided(line.tokens, words)]
+    for number, token in _uses(line, words):
+        upper = token.text.upper()
+        found[number] = new.get(upper, upper)
+    return found
+
+
+_ACCESS = {"RW", "RO", "RC"}
+"""Of words that PR prints."""
+
+
+def words(line: str, names: Container[str]) -> list[Word]:
+    found = statement_tokens(line[: remark_at(line)], names)
+    return [Word(each.start, each.stop, each.text.upper()) for each in found if each.kind in ("word", "op")]
+
+
+def describe(word: str, product: str) -> list[str]:
+    try:
+        return help.describe(word, product)
+    except Diagnostic:
+        return []
+
+
+def typing(before: str) -> str:
+    """Return the word at the end of a begun line that may be completed; none in a text or a remark."""
+    return help.typing(before) if remark_at(before) == len(before) else ""
+
+
+def offers(before: str, names: Iterable[UserName], product: str) -> list[Offer]:
+    """Return labels after a jump, what has a value after PR and in expressions, and all else at the head of a line."""
+    if remark_at(before) < len(before) or before.count('"') % 2:
+        return []
+    word = typing(before)
+    place = expected(before[: len(before) - len(word)])
+    if place == NEW:
+        return []
+    folded = word.upper()
+    own = [
+        Offer(each.word, each.about, each.kind)
+        for each in names
+        if each.word.startswith(folded) and (each.kind == "label") in LABELS_AT[place]
+    ]
+    rows = [] if place == LABEL else [row for row in help.offered(word, product) if _fits(row, place)]
+    return [*own, *(Offer(row.name, row.meaning, "starts" if row.name in MOVES else "word") for row in rows)]
+
+
+def _fits(row: Mnemonic, place: str) -> bool:
+    if place == STATEMENT:
+        return row.kind != "math" and (row.kind == "instruction" or row.access in ("RW", "WO"))
+    if place == PRINTED:
+        return row.access in _ACCESS
+    return row.kind == "math" or (row.access in _ACCESS and row.kind != "keyword")
+
+
+def outline(text: str) -> list[Block]:
+    """Return programs with their labels and variables, and the variables declared outside of programs."""
+    sources = split_lines(text)
+    found: list[Block] = []
+    opened: list[ProgramLine] = []
+    for line in scan(text)[0]:
+        if line.section != "program":
+            found += _declared([line], sources, line.number - 1)
+            continue
+        if line.mark and opened:  # the PG before is never ended
+            found.append(_program(opened, sources))
+            opened = []
+        opened.append(line)
+        if line.mark == "" and len(opened) > 1:
+            found.append(_program(opened, sources))
+            opened = []
+    return [*found, _program(opened, sources)] if opened else found
+
+
+def _program(lines: Sequence[ProgramLine], sources: Sequence[str]) -> Block:
+    first, last = lines[0], lines[-1].number - 1
+    end = last - 1 if lines[-1].mark == "" and len(lines) > 1 else last
+    parts = tuple(_declared(lines, sources, end))
+    return Block(
+        "program",
+        first.text.upper(),
+        remark(sources[first.number - 1]),
+        Span(first.number - 1, first.column - 1, first.column - 1 + len(first.text)),
+        last,
+        parts,
+    )
+
+
+def _declared(lines: Sequence[ProgramLine], sources: Sequence[str], end: int) -> Iterator[Block]:
+    """Yield the labels and variables of lines; a label reaches to the line before the next one."""
+    labels = [line.number - 1 for line in lines if line.declares and _is_label(line)]
+    for line in lines:
+        if not line.declares:
+            continue
+        found = statement_tokens(line.text, (line.declares,))
+        name = next((each for each in found[1:] if each.text.upper() == line.declares), None)
+        if name is None:
+            continue
+        start = line.column - 1 + name.start
+        place = Span(line.number - 1, start, start + len(name.text))
+        about = remark(sources[line.number - 1])
+        if _is_label(line):
+            last = next((at - 1 for at in labels if at > line.number - 1), end)
+            yield Block("label", line.declares, about, place, max(last, place.line))
+        else:
+            value = line.text[name.stop :].strip()
+            yield Block("variable", line.declares, "  ".join(filter(None, (value, about))), place, place.line)
+
+
+def _is_label(line: ProgramLine) -> bool:
+    return line.text[:2].upper() == "LB"

@@ -1,0 +1,258 @@
+"""The settings of each MCode product: what S keeps, how PR prints it, and what cannot be read.
+
+Counters, armed trips and error flags are states of the moment and no settings: S does not keep them (MCode reference
+5.1.113). A product refuses a word that it lacks, and a refusal runs a resident OE subroutine, so the list of a product
+has the words of its table only, and those of firmware 6 only from that firmware on.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Collection, Mapping
+from enum import Enum
+from functools import lru_cache
+from math import isfinite
+
+from multidrop.base.errors import Diagnostic
+from multidrop.dialects.values import IO, PARAMETERS, VARIABLES, Reading, Scalar, Value, number
+from multidrop.families.lexium.manual.grammar import is_name
+from multidrop.families.lexium.manual.mnemonic import (
+    CLOSED_LOOP,
+    ENCODER,
+    EVERY,
+    FLOAT_HIGH,
+    INT_HIGH,
+    INT_LOW,
+    LEXIUM,
+    MDRIVE_ENCODER,
+    Mnemonic,
+)
+from multidrop.families.lexium.manual.supported import lacks
+from multidrop.families.lexium.manual.table import MNEMONICS, lookup, words
+
+WIRE = frozenset({"BD", "CE", "CK", "DG", "DN", "EM", "ES", "PY", "QD"})
+"""Communication settings."""
+STATES = frozenset({"C1", "C2", "ER", "IF", "P", "ST", "TE"})
+"""Words that can be written and are no settings."""
+LISTS = {"IS": (1, 2, 3, 4, 6), "OS": (1, 2, 3), "LS": (0, 1)}
+"""The words whose PR prints a line for each number, and those numbers."""
+COUNTED = frozenset({"A", "D", "VI", "VM", "MS"})
+"""Settings with another value while the unit of motion is the encoder count (7.3.7)."""
+TRIPS = frozenset({"TA", "TC", "TI", "TM", "TP", "TR", "TT"})
+UNIT = frozenset({"FS", "PW"})
+"""Settings of the motor unit itself, which FD keeps (5.1.45)."""
+ANALOG_UNREAD = ("IS5", "PR IS does not print it")
+HANDLER_UNREAD = ("OE", "no drive prints it")
+
+
+class Form(Enum):
+    """How PR prints a setting, as a regular expression."""
+
+    DIGIT = r"\d"
+    WHOLE = r"-?\d{1,10}"
+    FRACTION = r" *-?\d+(?:\.\d*)?(?:[Ee][+-]?\d+)? *"
+    FIELDS = r" *-?\d+(?: *, *-?\d+)+"
+    TRIP = r"-?[A-Z0-9]+(?: *, *-?[A-Z0-9]+)*"
+
+
+@lru_cache(maxsize=64)
+def settings(product: str, version: str = "", part: str = "") -> tuple[Mnemonic, ...]:
+    """The settings that a drive prints beside others, in the order of their forms."""
+    lacks, forms, known = _lacking(version, part) | STATES | {"DN"}, list(Form), product in EVERY
+    rows = [row for row in words(product).values() if row.access == "RW" and row.kind in ("variable", "flag")]
+    rows = [row for row in rows if (product in row.products if known else row.products >= LEXIUM)]
+    rows = [row for row in rows if not row.lines and row.name not in lacks]
+    return tuple(sorted(rows, key=lambda row: forms.index(form_of(row))))
+
+
+def lists(product: str, version: str = "") -> dict[str, tuple[int, ...]]:
+    """The words of a drive that print a line for each number; input 6 is the index mark of an encoder."""
+    if product not in LEXIUM and product in EVERY:
+        return {}
+    lacks = _lacking(version, "")
+    return {
+        word: tuple(n for n in numbers if (word, n) != ("IS", 6) or product in ENCODER)
+        for word, numbers in LISTS.items()
+        if word not in lacks
+    }
+
+
+def unread(product: str) -> tuple[tuple[str, str], ...]:
+    if product not in EVERY:
+        return (HANDLER_UNREAD, ("other words", f"the product '{product}' is not known: every Lexium has these words"))
+    return (HANDLER_UNREAD, *((ANALOG_UNREAD,) if product in LEXIUM - {"LMM"} else ()))
+
+
+def counting(values: Mapping[str, Value | None]) -> bool:
+    """Whether the unit of motion is the encoder count: EE=1, and no hMT (3.4.2)."""
+    return bool(values.get("EE")) and not values.get("AS")
+
+
+def locks_resolution(product: str) -> bool:
+    """Whether MS is locked while the unit of motion is the encoder count (7.3.7)."""
+    return product in CLOSED_LOOP | MDRIVE_ENCODER
+
+
+def fresh(name: str) -> Value | None:
+    """The default of a set-up; None for any other word."""
+    special: dict[str, Value] = {"S5": (9, 0), "S7": (33, 0), "S8": (33, 0), "S13": (60, 0, 0), "PF": (10, 6, 0, 0)}
+    if name in special:
+        return special[name]
+    if name in TRIPS:
+        return 0
+    if re.fullmatch(r"S\d+", name):
+        return (0, 0, 0)
+    found = re.fullmatch(r"(IS|OS|LS)\d", name)
+    return None if found is None else {"IS": (0, 0), "OS": (16, 0), "LS": (0, 0)}[found[1]]
+
+
+def section(name: str) -> str:
+    """The part of a drive's settings to which a word belongs."""
+    if re.fullmatch(r"[RF]\d", name):
+        return VARIABLES
+    return IO if name in TRIPS or re.fullmatch(r"(?:IS|OS|S)\d+", name) else PARAMETERS
+
+
+def reading_of(name: str, value: Value, row: Mnemonic | None, counts: bool) -> Reading:
+    """Put section, unit and default to a value. `counts`: the unit of motion is the encoder count."""
+    default, unit, value = fresh(name), "", whole_setup(name, value)
+    if row is not None:
+        unit = (counts and row.unit_encoder) or row.unit
+        if default is None:
+            default = row.default_encoder if counts and row.default_encoder is not None else row.default
+    return Reading(name, value, section(name), unit, default, name in WIRE | UNIT)
+
+
+def whole_setup(name: str, value: Value) -> Value:
+    """The three fields of S13, of which the manual prints two."""
+    return (*value, 0) if name == "S13" and isinstance(value, tuple) and len(value) == 2 else value
+
+
+def _lacking(version: str, part: str) -> frozenset[str]:
+    """The words that a Lexium of this firmware and size lacks."""
+    return frozenset(name for name, row in MNEMONICS.items() if lacks(row, version, part))
+
+
+def form_of(row: Mnemonic) -> Form:
+    if row.name in TRIPS:
+        return Form.TRIP
+    if row.low is None:
+        return Form.FIELDS
+    if isinstance(row.default, float):
+        return Form.FRACTION
+    small = isinstance(row.high, int) and row.low >= 0 and row.high <= 9
+    return Form.DIGIT if small else Form.WHOLE
+
+
+# The rules for writing one setting of an MCode drive: the line, its range, and what needs a person's word.
+#
+# A plain restore leaves alone what can move the motor or start a program by itself, what belongs to the motor unit,
+# and what sets up communication. `risk` of the plan gives the reason. (MCode reference, section 5; docs/rulings.md.)
+
+
+TORQUE = 3
+"""The hMT mode that turns the motor by itself."""
+GO, JOG_PLUS, JOG_MINUS, RESET = 4, 7, 8, 11
+"""Types of inputs that start a program, turn the motor, or restart the drive."""
+CLOCKS = frozenset({13, 14, 15, 33, 34, 35, 49, 50, 51})
+"""Types of points that are a clock; both points of a pair have one."""
+SHARED = frozenset({0, 16}) | CLOCKS
+"""Types that several points may have."""
+FIELDS = {"PF": 4, "PW": 4}
+PAIRED = frozenset({"S5", "S7", "S8"})
+"""Points of an MDrivePlus whose set-up has two fields; others have three."""
+PRINT_FORMAT = (16, 16, 1, 1)
+"""The highest fields of PF."""
+MOST_REPEATS = 65000
+LONGEST_NUMBER = 40
+_SETUP = re.compile(r"(IS|OS|LS)(\d)")
+POINT = re.compile(r"S\d+")
+
+
+def row_of(name: str, product: str) -> Mnemonic | None:
+    """The row of a setting's word; `IS1` is a setting of IS. None for a user's variable."""
+    found = _SETUP.fullmatch(name)
+    return lookup(found[1] if found else name, product if product in EVERY else "")
+
+
+def line(name: str, value: Value, new: bool = False) -> str:
+    """The line that gives a setting a value; `new`: a user's variable that the drive lacks."""
+    found = _SETUP.fullmatch(name)
+    if found is not None:
+        return f"{found[1]}={found[2]},{_fields(value)}"
+    if name == "DN":
+        return f'DN="{value}"'
+    return f"{'VA ' if new else ''}{name}={_fields(value)}"
+
+
+def _fields(value: Value) -> str:
+    return ",".join(map(_scalar, value if isinstance(value, tuple) else (value,)))
+
+
+def _scalar(value: Scalar) -> str:
+    if not isinstance(value, float):
+        return str(value)
+    text = repr(value)
+    return f"{value:.17f}".rstrip("0") if "e" in text and abs(value) < 1 else text
+
+
+def checked(name: str, value: Value, product: str, counts: bool, labels: Collection[str]) -> Value:
+    """Return the value as the drive takes it. Raises Diagnostic for a value out of range."""
+    row, value = row_of(name, product), whole_setup(name, value)
+    if isinstance(value, float) and value.is_integer() and not (row is not None and isinstance(row.default, float)):
+        value = int(value)
+    if row is None:
+        if not is_name(name):
+            raise Diagnostic(f"{name}: is neither a word of the drive nor a name for a variable")
+        if name in labels:
+            raise Diagnostic(f"{name}: is a label of the program in the drive, so no variable can have that name")
+        if not (isinstance(value, int) and INT_LOW <= value <= INT_HIGH):
+            raise Diagnostic(f"{name} = {value}: a variable takes a whole number from {INT_LOW} to {INT_HIGH}")
+        return value
+    if product in EVERY and product not in row.products:
+        raise Diagnostic(f"{name}: an {product} lacks it")
+    if name in TRIPS:
+        # A trip: a target alone, or a number, a target, and for TR the repeats.
+        fields = value if isinstance(value, tuple) else (value,)
+        alone, most = name in ("TC", "TM"), 3 if name == "TR" else 2
+        target = fields[0 if alone else 1 : 1 if alone else 2]
+        valid = len(fields) == 1 if alone else 2 <= len(fields) <= most or value == 0
+        valid = valid and all(isinstance(each, int) or (each in target and isinstance(each, str)) for each in fields)
+        first = fields[0]
+        if valid and not alone and value != 0:
+            valid = isinstance(first, int) and row.accepts(first) and not (name == "TR" and first == 0)
+        if not valid or any(not 0 <= number(each) <= MOST_REPEATS for each in fields[2:]):
+            raise Diagnostic(f"{name} = {value}: takes {row.syntax.partition(', PR')[0]}")
+        return value
+    if (count := _fields_of(name)) is not None:
+        if not (isinstance(value, tuple) and len(value) == count and all(isinstance(each, int) for each in value)):
+            raise Diagnostic(f"{name} = {value}: takes {count} whole numbers, as in {name} = {[0] * count}")
+        for each, most in zip(value, PRINT_FORMAT if name == "PF" else (), strict=False):
+            if not 0 <= number(each) <= most:
+                raise Diagnostic(f"{name} = {list(value)}: valid: up to {list(PRINT_FORMAT)}")
+        return value
+    if row.access != "RW" or row.kind not in ("variable", "flag"):
+        raise Diagnostic(f"{name}: is not a setting ({row.title})")
+    if name == "DN":
+        if not (isinstance(value, str) and len(value) == 1 and value.isascii() and value.isalnum()):
+            raise Diagnostic(f"DN = {value}: takes one letter or digit")
+    elif not (isinstance(value, (int, float)) and row.accepts(value, counts)):
+        low, high = row.bounds(counts)
+        valid_ones = ", ".join(map(str, row.values)) if row.values else f"{low} to {high}"
+        unit = " (with EE=1)" if counts and row.low_encoder else ""
+        raise Diagnostic(f"{name} = {value}: valid: {valid_ones}{unit}")
+    return value
+
+
+def _fields_of(name: str) -> int | None:
+    if _SETUP.fullmatch(name):
+        return 2
+    if name in FIELDS:
+        return FIELDS[name]
+    return (2 if name in PAIRED else 3) if POINT.fullmatch(name) else None
+
+
+def writable(value: Value) -> bool:
+    """Whether a drive's line can hold a number of this size."""
+    exact = value if isinstance(value, float) else 0.0
+    return isfinite(exact) and abs(exact) <= FLOAT_HIGH and len(_scalar(exact)) <= LONGEST_NUMBER

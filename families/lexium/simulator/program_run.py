@@ -1,0 +1,338 @@
+"""A program file run on one simulated drive, in virtual time: no clock, no wire, no event loop.
+
+The file is loaded as by a download: declarations are carried out at time 0, the program is stored; S is skipped, since
+nothing is to be kept. Then the drive's time goes from event to event, so that ten minutes of holding cost nothing, and
+up to `SLICE` further, so that a line of the program costs little. The run ends with the program, when nothing can ever
+happen any more, or when its time is over.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Container, Iterator, Sequence
+from contextlib import suppress
+from dataclasses import replace
+from math import inf
+
+from multidrop.base.errors import Diagnostic
+from multidrop.base.files import split_lines
+from multidrop.base.text import counted, whole
+from multidrop.dialects.program_files import Problem, errors
+from multidrop.families.lexium.manual import program_file
+from multidrop.families.lexium.manual.errors import ErrorNumber
+from multidrop.families.lexium.manual.errors import text as text_of_error
+from multidrop.families.lexium.manual.grammar import Name, Number, parsed, words
+from multidrop.families.lexium.manual.help import remedy
+from multidrop.families.lexium.manual.program_file import ProgramLine
+from multidrop.families.lexium.manual.statements import size_of
+from multidrop.families.lexium.simulator.device import MCodeDevice
+from multidrop.families.lexium.simulator.state.errors import CRLF, Failure, Fault
+from multidrop.families.lexium.simulator.state.expressions import Read
+from multidrop.families.lexium.simulator.state.models import MODELS
+from multidrop.families.lexium.simulator.state.program_memory import SPACE, Program
+from multidrop.families.lexium.simulator.stored_setups import refused_later
+from multidrop.simulator.cell.spec import DriveSpec
+from multidrop.simulator.program_run import (
+    NO_DEBUGGING,
+    BreakPoint,
+    Debugging,
+    Event,
+    Load,
+    Programs,
+    Recorder,
+    Summary,
+    Value,
+    Values,
+    break_point,
+    looks,
+)
+from multidrop.simulator.world import World
+
+FIRST_ADDRESS = 1
+LAST_ADDRESS = 99_999
+LAST_LINE = 999_999
+
+
+def printed(t: float, text: str) -> Event:
+    """A line that the drive has printed, and when it was complete; what would act on a terminal is escaped."""
+    shown = text
+    if not text.isprintable():
+        shown = "".join(each if each.isprintable() or each == "\t" else f"\\x{ord(each):02x}" for each in text)
+    return Event(t, {"print": text}, shown)
+
+
+class ProgramRun:
+    """One file on one drive. Raises Diagnostic for a drive that refuses its settings."""
+
+    def __init__(self, spec: DriveSpec, lines: Sequence[ProgramLine], name: str, source: Sequence[str] = ()) -> None:
+        if spec.personality not in MODELS:
+            raise Diagnostic(f"a {spec.personality} does not run MCode", name, f"valid: {', '.join(MODELS)}")
+        self._lines, self._name, self._personality = lines, name, spec.personality
+        self._source = source
+        self._recorder: Recorder | None = None
+        self._device = MCodeDevice(replace(spec, program="", program_name=""), World(spec.world))
+        self._interpreter, self._program = self._device.interpreter, self._device.program
+        self._failures: list[Failure] = []
+        self._last: Failure | None = None
+        self._device.errors.failures = self._failures
+        self._device.prints()
+        self._stored: dict[int, ProgramLine] = {}
+        self._executed: dict[int, ProgramLine] = {}
+        self._held, self._stuck = "", False
+        self._errors: list[int] = []
+        self._active: tuple[int, ...] = ()
+        self._switched: list[Event] = []
+
+    def run(self, label: str = "", until: float | None = None, debugging: Debugging = NO_DEBUGGING) -> Iterator[Event]:
+        """Load the file and run it from a label or an address (SU, else address 1), for `until` seconds at most.
+
+        The last event is a Summary. A file with a refused line is not run. Raises Diagnostic if there is nothing to
+        run.
+        """
+        yield from self._load()
+        if self._errors:
+            yield self._summary("error")
+            return
+        self._start(label)
+        if debugging.wanted:
+            self._recorder = self._recording(debugging)
+            self._interpreter.watch(self._before, self._after)
+        elif debugging.outputs:
+            self._interpreter.watch(None, self._outputs)
+        yield from self._execute(until)
+
+    def refusals(self) -> Iterator[Event]:
+        """Load the file without running it; return the refused lines. A refused PG counts as PG 1."""
+        return (each for each in self._load(anywhere=True) if each.problem)
+
+    @property
+    def program(self) -> Program:
+        """The program that was stored."""
+        return self._program
+
+    # Loading.
+
+    def _load(self, anywhere: bool = False) -> Iterator[Event]:
+        device = self._device
+        for line in self._lines:
+            if anywhere and device.programming is None and line.section == "program" and line.mark is None:
+                device.core.mode.address = FIRST_ADDRESS
+            address = device.programming
+            if address is None and line.text.upper() == "S":
+                continue
+            answer = device.execute(line.text, 0.0)
+            for text in answer.lines:
+                yield printed(0.0, text)
+            self._held += answer.tail
+            if answer.refused:
+                code = self._failures[-1].code
+                self._errors.append(code)
+                yield self._failed(Failure(0.0, code, 0), line, "refused")
+                if address is None and line.section == "program" and not anywhere:
+                    return
+            elif address is not None:
+                self._stored[address] = line
+        self._failures.clear()
+
+    def _start(self, label: str) -> None:
+        """Start the program. A download takes longer than a calibration that its header has begun (AS)."""
+        device = self._device
+        device.motor.hmt.settle(0.0)
+        if not device.running or label:
+            device.core.thread.finish()
+            labels, address = self._program.labels, whole(label, 0, LAST_ADDRESS)
+            default = Name("SU") if "SU" in labels else Number(FIRST_ADDRESS)
+            try:
+                named = Number(address) if address is not None else Name(label.upper())
+                self._interpreter.start(named if label else default, 0.0)
+            except Fault:
+                what = f"nothing to run at {label}" if label else "no SU, and nothing at address 1"
+                there = ", ".join(sorted(labels)) or "it has none"
+                hint = f"valid for --run: an address, or a label of the program ({there})"
+                raise Diagnostic(what, self._name, hint) from None
+        index = self._interpreter.linked.index
+        self._executed = {index[at]: line for at, line in sorted(self._stored.items()) if at in index}
+
+    # The trace, and break points.
+
+    def _recording(self, debugging: Debugging) -> Recorder:
+        """Look at the lines that a person follows. Raises Diagnostic for a place or a name that is not there."""
+        readers = {name.upper(): self._reader(name.upper()) for name in debugging.watch}
+        valid = "LINE or LABEL, or with ,PASSES"
+
+        def values() -> Values:
+            found: dict[str, Value] = {}
+            for name, read in readers.items():
+                with suppress(Fault):  # a variable that is not declared yet is left out
+                    found[name] = read()
+            return found
+
+        everything = debugging.trace and not readers
+        return Recorder(
+            debugging,
+            self._source,
+            {self._line_of(point := break_point(each, self._name, valid)): point for each in debugging.breaks},
+            (lambda: self._device.memory.values) if everything else values,
+        )
+
+    def _reader(self, name: str) -> Read:
+        read = self._device.language.reader(name)
+        if read is None:
+            raise Diagnostic(f"no variable {name} to watch", self._name, "valid: a variable or flag, or a name with VA")
+        return read
+
+    def _line_of(self, point: BreakPoint) -> int:
+        """The line of the file before which the run ends."""
+        labels, number = self._program.labels, whole(point.place, 0, LAST_LINE)
+        if number is None:
+            address = labels.get(point.place.upper())
+        else:
+            address = next((at for at, line in self._stored.items() if line.number == number), None)
+        index = self._interpreter.linked.index
+        found = self._executed.get(index.get(address, -1)) if address is not None else None
+        if found is None:
+            hint = f"valid: a line of the program, or a label ({', '.join(sorted(labels)) or 'none'})"
+            raise Diagnostic(f"no line to break at {point.place}", self._name, hint)
+        return found.number
+
+    def _before(self, line: int) -> bool:
+        found, recorder = self._executed.get(line), self._recorder
+        return found is not None and recorder is not None and recorder.reaches(self._device.now, found.number)
+
+    def _after(self, line: int) -> None:
+        found, recorder = self._executed.get(line), self._recorder
+        if found is not None and recorder is not None:
+            recorder.after(self._device.now, found.number)
+
+    def _outputs(self, line: int) -> None:
+        device = self._device
+        active = tuple(n for n, on in device.output_lines.driven.items() if on)
+        if active != self._active:
+            self._active = active
+            text = f"active outputs: {', '.join(map(str, active)) or 'none'}"
+            self._switched.append(Event(device.now, {"outputs": list(active)}, text))
+
+    # Running.
+
+    def _execute(self, until: float | None) -> Iterator[Event]:
+        device = self._device
+        for look, self._stuck in looks(device.thread, lambda: device.deadline, until):
+            device.advance(look, program=True)
+            yield from self._news()
+            if self._recorder is not None and self._recorder.done:
+                self._interpreter.watch(None, None)
+        if self._held:
+            yield printed(device.now, self._held)
+        if device.running:
+            yield self._summary("until", given_up=until is None)
+        elif self._recorder is not None and self._recorder.broken:
+            yield self._summary("break")
+        else:
+            last = self._last
+            failed = last is not None and last.t == device.now and not last.handled
+            yield self._summary("error" if failed else "E")
+
+    def _news(self) -> Iterator[Event]:
+        """Yield what was executed, printed and what failed since the last look, in order."""
+        news: list[Event] = [*self._switched] if self._recorder is None else [*self._recorder.take()]
+        self._switched.clear()
+        for t, text in self._device.prints():
+            *whole, self._held = (self._held + text).split(CRLF)
+            news += [printed(t, each) for each in whole]
+        for failure in self._failures:
+            news.append(self._failed(failure, self._at(failure.line), f"at {failure.t:.4f} s"))
+            if not failure.handled:
+                self._errors.append(failure.code)
+        self._last = self._failures[-1] if self._failures else self._last
+        self._failures.clear()
+        news.sort(key=lambda each: each.t)
+        yield from news
+
+    def _failed(self, failure: Failure, line: ProgramLine, when: str) -> Event:
+        """An error of the drive; `handled` is one that a subroutine of OE took."""
+        facts = {"error": failure.code, "line": line.number, **({"handled": True} if failure.handled else {})}
+        handled = " (OE has handled it)" if failure.handled else ""
+        text = f"{line.text}: {when}: {meaning(failure.code, self._personality)}{handled}"
+        return Event(failure.t, facts, text, line.number, problem=True)
+
+    def _at(self, index: int) -> ProgramLine:
+        """Find the line of the file for a line of the interpreter; after the program's end, the last one before."""
+        while index > 0 and index not in self._executed:
+            index -= 1
+        return self._executed.get(index, self._lines[0])
+
+    def _summary(self, ended: str, given_up: bool = False) -> Summary:
+        device, errors = self._device, tuple(self._errors)
+        end = device.motion(device.now)
+        position, moving = end.position, end.velocity
+        moves, instructions = device.language.motions.begun, device.thread.executed
+        line = self._at(self._interpreter.line()).number if self._executed else 0
+        failed = f"errors {', '.join(str(each) for each in errors)}" if errors else "no errors"
+        turning = f"the motor still turns, {moving} steps/s; H before E waits for it"
+        return Summary(
+            ended=ended,
+            t=device.now,
+            position=position,
+            moves=moves,
+            instructions=instructions,
+            errors=errors,
+            lines_at=(line,),
+            moving=moving,
+            given_up=given_up,
+            stuck=self._stuck and ended == "until",
+            ran=line > 0,
+            counts=f"position {position}, {counted(moves, 'motion')}, {counted(instructions, 'line')}, {failed}",
+            turning=turning if moving and ended == "E" else "",
+        )
+
+
+def meaning(code: int, personality: str) -> str:
+    return f"error {code}, {text_of_error(code, personality)}"
+
+
+def read(text: str, file: str) -> Load:
+    lines, source = program_file.read(text, file), split_lines(text)
+    return lambda spec: ProgramRun(spec, lines, file, source)
+
+
+def refusals(text: str, file: str, personality: str, found: Sequence[Problem]) -> list[Problem]:
+    """Find what a simulated drive refuses of the lines without a problem so far."""
+    lines, unready = program_file.scan(text)
+    wrong = {each.line for each in errors(found)}
+    tried = [line for line in lines if line.number not in wrong or line.mark is not None]
+    if all(line.section != "program" for line in lines):  # what follows its first line is of the program, not typed
+        begins = min((each.line for each in errors(unready)), default=inf)
+        tried = [line for line in tried if line.number < begins]
+    missing = {line.declares for line in lines if line.number in wrong}
+    problems, numbered = [], {line.number: line for line in lines}
+    run = ProgramRun(DriveSpec(personality=personality), tried, file)
+    for failed in run.refusals():
+        line, code = numbered[failed.facts["line"]], failed.facts["error"]
+        if code == ErrorNumber.PROGRAM_MEMORY_FULL:  # the drive takes none of the others either
+            problems.append(_too_big(line, lines, personality))
+            break
+        if line.number not in wrong and not missing & words(line.text):
+            what = f"{line.text}: {meaning(code, personality)}"
+            problems.append(Problem(line.number, line.column, what, remedy(code, line.text, personality)))
+        missing.add(line.declares)
+    told = {each.line for each in errors([*found, *problems])}
+    return [*problems, *_refused_later(run, lines, personality, told)]
+
+
+def _refused_later(
+    run: ProgramRun, lines: Sequence[ProgramLine], personality: str, told: Container[int]
+) -> Iterator[Problem]:
+    """Warn of the set-ups of a program that a drive stores and refuses when it executes them."""
+    for line, code, alone in refused_later(lines, run.program, personality, told):
+        after = "" if alone else ", after the set-ups before it"
+        what = f"{line.text}: a drive refuses it when it executes it{after} ({meaning(code, personality)})"
+        yield Problem(line.number, line.column, what, remedy(code, line.text, personality), warning=True)
+
+
+def _too_big(line: ProgramLine, lines: Sequence[ProgramLine], personality: str) -> Problem:
+    inside = [each for each in lines if each.section == "program" and each.mark is None]
+    size = sum(size_of(statement, personality) for each in inside if (statement := parsed(each.text)) is not None)
+    what = f"program too big: {len(inside)} lines take {size} bytes, the drive holds {SPACE}"
+    return Problem(line.number, line.column, what, "shorten the program; this line is the first without room")
+
+
+RUNS = Programs(drive=DriveSpec(), read=read, refusals=refusals)

@@ -1,0 +1,73 @@
+"""Quantities in commands of the controller, and what an axis counts.
+
+An axis counts pulses, or encoder counts while StepNLoop is on (SL). How many of them a turn has is set by jumpers and
+by the encoder, which no command reports, so a scale is by the step. Accelerations are times, so they take no quantity.
+A move `X1000` is to a position or by a distance, as MM says. (PMX-2ED-SA manual 5.1, 7.1, 7.4, 7.8, 7.17.)
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Collection, Sequence
+
+from multidrop.dialects.codec import Procedure, Request
+from multidrop.dialects.units import VALUE, Basis, Field, Takes, Units
+from multidrop.families.pmx.host.codec import PmxState
+from multidrop.families.pmx.host.operations import number
+from multidrop.families.pmx.manual.table import AXES
+
+RESTS = ("SL", "POL")
+"""Words of an axis: what it counts, and in which direction."""
+SPEEDS = ("HSPD", "LSPD", "SSPD")
+_MOVE = re.compile(rf"\s*(?:X{VALUE})?(?:Y{VALUE})?\s*|\s*I{VALUE}:{VALUE}\s*")
+_SET = re.compile(rf"\s*(P|{'|'.join(SPEEDS)})([XY])={VALUE}\s*")
+_READ = re.compile(rf"\s*(P|PS|{'|'.join(SPEEDS[:2])})([XY])\s*")
+_RECOUNTS = re.compile(rf"\s*(?:{'|'.join(RESTS)})[XY]=")
+_DISTURBS = re.compile(r"\s*(?:P|SL|SLR|POL)([XY])=")
+
+
+def fields(state: PmxState, text: str) -> Sequence[Field]:
+    if (found := _SET.fullmatch(text)) is not None:
+        takes = Takes.PLACE if found[1] == "P" else Takes.SPEED
+        return (Field(found[2].lower(), takes, *found.span(3)),)
+    found = _MOVE.fullmatch(text)
+    groups = zip((1, 2, 3, 4), "xyxy", strict=True) if found is not None else ()
+    return [Field(axis, Takes.TARGET, *found.span(n), True) for n, axis in groups if found is not None and found[n]]
+
+
+def reads(state: PmxState, text: str) -> tuple[str, Takes] | None:
+    found = _READ.fullmatch(text)
+    return (found[2].lower(), Takes.PLACE if found[1] == "P" else Takes.SPEED) if found is not None else None
+
+
+def disturbs(state: PmxState, text: str) -> Collection[str]:
+    found = _DISTURBS.match(text)
+    return (found[1].lower(),) if found is not None else ()
+
+
+def recounts(request: Request) -> bool:
+    return _RECOUNTS.match(request.text) is not None
+
+
+def target(state: PmxState) -> Procedure[Takes]:
+    return Takes.DISTANCE if (yield from number(state, "MM")) else Takes.PLACE
+
+
+def basis(state: PmxState, axis: str, full_steps: int | None) -> Procedure[Basis]:
+    names = [f"{word}{axis.upper()}" for word in RESTS]
+    settings = []
+    for name in names:
+        settings.append((name, str((yield from number(state, name)))))
+    return Basis(tuple(settings), missing="the controller does not report the steps of a turn")
+
+
+UNITS = Units(
+    lambda state: [axis.lower() for axis in AXES],
+    fields,
+    f"X, Y, I, PX, PY, {', '.join(f'{word}X, {word}Y' for word in SPEEDS)}",
+    basis,
+    disturbs,
+    recounts,
+    reads,
+    target=target,
+)

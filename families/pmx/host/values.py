@@ -1,0 +1,413 @@
+"""What is read of a controller: settings, conditions, values for plots, and all of it for a snapshot; its controls.
+
+A controller prints one value a command, so each setting is one short request, StepNLoop's state and delta are read only
+where it is on, and a program counter only while the program runs. (PMX-2ED-SA manual 7, 9, A, table 9.0.)
+
+Positions, outputs, motor drivers and the joystick's switch are states of the moment and no settings. A low speed above
+the high speed is refused, and the times of ACC and DEC depend on both: speeds go first.
+
+A number means a position after ABS and a distance after INC, and another client may have sent either: each move of a
+control sends ABS first.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import replace
+from functools import partial
+
+from multidrop.base.errors import Diagnostic, Inexpressible
+from multidrop.dialects.codec import Priority, Procedure, Request
+from multidrop.dialects.state import DriveState
+from multidrop.dialects.values import (
+    COMMUNICATION,
+    VARIABLES,
+    Actions,
+    Change,
+    Conditions,
+    Controls,
+    Facts,
+    Lamp,
+    Levels,
+    Pace,
+    Parameters,
+    Part,
+    Permission,
+    Plan,
+    Progress,
+    Reading,
+    Readings,
+    Snapshot,
+    Value,
+    Values,
+    controls_of,
+    printed_number,
+    read_each,
+    reference_lost,
+    same,
+)
+from multidrop.dialects.values import number as number_of
+from multidrop.families.pmx.host.codec import PmxState
+from multidrop.families.pmx.host.operations import (
+    LATER,
+    PROGRAMS,
+    answered,
+    beyond_doubt,
+    busy,
+    moving,
+    number,
+    perform,
+    who,
+)
+from multidrop.families.pmx.host.programs import listing
+from multidrop.families.pmx.manual import table
+from multidrop.families.pmx.manual.program_file import RAW
+
+WIRE = ("DN", "DB")
+LOOP = ("SLR", "SLT", "SLE", "SLA")
+"""StepNLoop: while it is on, a change can make it correct the position by a move."""
+JOYSTICK = ("JV", "JL")
+"""Speeds, dead zones and limits of the joystick, whose switch cannot be read."""
+STATES = frozenset({"P", "E", "EO", "DO", "SA"})
+UNREAD = (("JO", "the controller does not report whether the joystick is on"),)
+SPEED_LIMITS = ("LSPD", "HSPD")
+FASTEST = 6_000_000
+LARGEST = 2**31 - 1
+RANGES: Mapping[str, tuple[int, int]] = {
+    "LSPD": (0, FASTEST), "HSPD": (0, FASTEST), "SCV": (0, 1), "EDEC": (0, 1), "IERR": (0, 1), "RZ": (0, 1),
+    "SL": (0, 1), "SSPDM": (0, 9), "EOBOOT": (0, 3), "DOBOOT": (0, 255), "SLOAD": (0, 3), "DB": (1, 5),
+}  # fmt: skip
+"""Ranges of whole numbers; others are whole numbers of 32 bits."""
+SIGNED = ("V", "JL")
+RATIO = "SLR"
+_AXIS = re.compile(rf"([A-Z]+?)([{''.join(table.AXES)}])\Z")
+
+
+def base(name: str) -> str:
+    if name in table.COMMANDS:
+        return name
+    found = _AXIS.match(name)
+    return found[1] if found is not None and found[1] in table.COMMANDS else name.rstrip("0123456789")
+
+
+def axis(name: str) -> str:
+    found = _AXIS.match(name)
+    return found[2] if found is not None and name not in table.COMMANDS and found[1] in table.COMMANDS else ""
+
+
+def reading(name: str, value: Value) -> Reading:
+    word = base(name)
+    if word == "V":
+        return Reading(name, value, VARIABLES, default=0)
+    unit = "ms" if word in ("ACC", "DEC", "TOC") else "pulses/s" if word in SPEED_LIMITS else ""
+    return Reading(name, value, unit=unit, fixed=name in WIRE)
+
+
+NAMES = tuple(
+    sorted(
+        (
+            word
+            for row in table.COMMANDS.values()
+            if row.access == "RW" and row.name not in STATES
+            for word in row.words()
+        ),
+        key=lambda name: (base(name) not in SPEED_LIMITS, base(name) in (*LOOP, "SL")),
+    )
+)
+"""The settings in the order in which they are written."""
+
+
+def plan(state: PmxState, present: Readings, wanted: Mapping[str, Value], allowed: Permission) -> Plan:
+    now = present.values
+    changed = {name.upper(): value for name, value in wanted.items() if not same(value, now.get(name.upper()))}
+    withheld = {name: reason for name in changed if (reason := _risk(name, changed[name], now, allowed))}
+    goal = {name: value for name, value in changed.items() if name not in withheld}
+    for name, value in goal.items():
+        _check(name, value)
+    order = sorted(goal, key=NAMES.index)
+    for low in [name for name in order if base(name) == "LSPD"]:
+        order = _speeds_in_order(order, low, now, goal)
+    steps = [Change(name, now.get(name), goal[name], f"{name}={_written(name, goal[name])}") for name in order]
+    scale = [name for name in goal if base(name) in ("POL", "SLR", "SL")]
+    return Plan(tuple(steps), tuple(withheld.items()), remarks=reference_lost(steps, scale))
+
+
+def _speeds_in_order(order: list[str], low: str, now: Mapping[str, Value], goal: Mapping[str, Value]) -> list[str]:
+    """The order in which the low speed is never above the high one: the high one first, unless it falls too far."""
+    high = low.replace("LSPD", "HSPD")
+    rest = [name for name in order if name not in (low, high)]
+    falls = high in goal and number_of(goal[high]) < number_of(now.get(low))
+    pair = [name for name in ((low, high) if falls else (high, low)) if name in goal]
+    return [*pair, *rest]
+
+
+def _risk(name: str, value: Value, now: Mapping[str, Value], allowed: Permission) -> str:
+    """The reason for which a setting waits for a person's word; empty: there is none."""
+    word, on = base(name), now.get(f"SL{axis(name)}")
+    if name in allowed.named or (name in WIRE and allowed.communication):
+        return ""
+    if name in WIRE:
+        return COMMUNICATION
+    if word == "SL" and value:
+        return "StepNLoop corrects the position by moves"
+    if word in JOYSTICK:
+        return "the joystick may be on, and then it can turn the motor"
+    if word in LOOP and on:
+        return "StepNLoop is on and may correct the position by a move"
+    return "programs run after power-up" if name == "SLOAD" and value else ""
+
+
+def _check(name: str, value: Value) -> None:
+    """Raise Diagnostic for an unknown setting, or a value out of range."""
+    if name not in NAMES:
+        raise Diagnostic(f"{name}: is not a setting of the controller")
+    if name == "DN":
+        if not re.fullmatch(r"2ED\d\d", str(value)):
+            raise Diagnostic(f"DN = {value}: valid: 2ED00 to 2ED99")
+        return
+    if isinstance(value, (str, tuple)):
+        raise Diagnostic(f"{name} = {value}: takes a number")
+    if base(name) == RATIO:
+        low, high = 0.001, 999.999
+    else:
+        low, high = RANGES.get(base(name), (-LARGEST - 1 if base(name) in SIGNED else 0, LARGEST))
+        if not float(value).is_integer():
+            raise Diagnostic(f"{name} = {value}: takes a whole number")
+    if not low <= value <= high:
+        raise Diagnostic(f"{name} = {value}: valid: {low} to {high}")
+
+
+def _written(name: str, value: Value) -> str:
+    if base(name) == RATIO:
+        return f"{number_of(value):.3f}"
+    return value if isinstance(value, str) else str(int(number_of(value)))
+
+
+NAME_FORM, RATIO_FORM, WHOLE_FORM = r"[0-9A-Za-z]{1,8}", r"\d{1,6}(?:\.\d+)?", r"-?\d{1,19}"
+
+
+def read_settings(state: PmxState, progress: Progress) -> Procedure[Readings]:
+    """Read every setting; a refused word is listed. Raises NoAnswer. Nothing is changed."""
+    return (yield from read_each(NAMES, partial(_read_setting, state), progress, UNREAD))
+
+
+def _read_setting(state: PmxState, name: str) -> Procedure[Reading]:
+    ratio = base(name) == RATIO
+    form = NAME_FORM if name == "DN" else RATIO_FORM if ratio else WHOLE_FORM
+    reply = yield from answered(state, replace(state.codec.request(state.address, name), expect=form))
+    return reading(name, reply.text if name == "DN" else float(reply.text) if ratio else int(reply.text))
+
+
+def conflict(plan: Plan, others: Collection[str]) -> str:
+    numbers = [str(change.after)[-2:] for change in plan if change.name == "DN"]
+    return f"another controller of the line has number {numbers[0]}" if numbers and numbers[0] in others else ""
+
+
+def ready(state: PmxState) -> Procedure[str]:
+    if (yield from moving(state)):
+        return f"{who(state)} moves: stop it first"
+    if (yield from busy(state)):
+        return f"{who(state)} runs a program: SR0=0 and SR1=0 end them"
+    return ""
+
+
+PARAMETERS = Parameters(
+    read=read_settings,
+    plan=plan,
+    ready=ready,
+    write=lambda state, change: perform(state, change.text),
+    save=lambda state: perform(state, "STORE"),  # not speeds, times and variables below V32
+    language="PMX",
+    saving="STORE",
+    conflict=conflict,
+    later=frozenset(LATER),
+)
+
+
+RUNNING, PAUSED = 1, 2
+"""Values of SASTAT at which SPC counts."""
+SPEEDS = ("LSPD", "HSPD", "ACC", "DEC")
+POINTS = 8
+"""Inputs, and outputs."""
+ON_AXIS = ((1 << 6, "home"), (1 << 4, "lim+"), (1 << 5, "lim-"), (1 << 9, "Z"))
+"""The bits of a motor status that are switches of the axis."""
+DRIVERS = {"X": 1, "Y": 2}
+"""The bits of EO."""
+BAUDS = {1: 9600, 2: 19200, 3: 38400, 4: 57600, 5: 115200}
+"""By DB (table 6.1)."""
+POLARITY = 1 << 10
+"""The bit of POLX that inverts the inputs."""
+
+
+def parts(state: PmxState, facts: Facts) -> Sequence[Part[PmxState]]:
+    found = []
+    for axis in table.AXES:
+        loop = (f"SLS{axis}", f"DX{axis}") if facts.get(f"SL{axis}") else ()
+        found.append(Part(axis, partial(_facts, names=(f"MST{axis}", *loop))))
+    found += [Part("points", partial(_facts, names=("DI", "DO", "EO"))), Part("programs", _programs)]
+    found += [Part(f"settings {axis}", partial(_facts, names=(f"SL{axis}",)), slow=True) for axis in table.AXES]
+    named = [each + axis for axis in ("", *table.AXES) for each in SPEEDS]
+    return [*found, *(Part(name, partial(_facts, names=(name,)), slow=True) for name in (*named, "EDEC"))]
+
+
+def _facts(state: PmxState, names: Sequence[str]) -> Procedure[dict[str, Value]]:
+    doubts: list[Request] = []
+    found: dict[str, Value] = {}
+    for name in names:
+        found[name] = yield from number(state, name, Priority.POLL, doubts)
+    if doubts:
+        yield from beyond_doubt(state, doubts[0])
+    return found
+
+
+def _programs(state: PmxState) -> Procedure[Facts]:
+    found = yield from _facts(state, [f"SASTAT{program}" for program in PROGRAMS])
+    active = [f"SPC{program}" for program in PROGRAMS if found[f"SASTAT{program}"] in (RUNNING, PAUSED)]
+    return found | (yield from _facts(state, active))
+
+
+def fold(state: PmxState, facts: Facts) -> tuple[Conditions, ...]:
+    """The conditions of both axes; points and programs are with the first."""
+    whole = {name: value for name, value in facts.items() if isinstance(value, int)}
+    one, other = (_of_axis(axis, whole) for axis in table.AXES)
+    lamps = list(one.lamps)
+    for word, output in (("DI", False), ("DO", True)):
+        bits = whole.get(word)
+        on = [None if bits is None else bool(bits >> n & 1) for n in range(POINTS)]
+        lamps += [Lamp(str(n + 1), "", each, output) for n, each in enumerate(on)]
+    states = [whole.get(f"SASTAT{n}") for n in PROGRAMS]
+    active = [n for n in PROGRAMS if states[n] in (RUNNING, PAUSED)]
+    failed = ", ".join(str(n) for n in PROGRAMS if states[n] == 4)
+    one = replace(
+        one,
+        lamps=tuple(lamps),
+        program=", ".join(f"{n} {table.program_words(states[n] or 0)}" for n in active),
+        runs=None if None in states else RUNNING in states,  # a paused one moves nothing
+        line=", ".join(str(facts.get(f"SPC{n}", "")) for n in active),
+        more=(*one.more, *([("program", f"{failed} stopped by an error")] if failed else ())),
+    )
+    return one, other
+
+
+def clearing(axis: str) -> str:
+    """The command that clears the errors of an axis, which takes no move before (7.11, 7.17)."""
+    return f"CLR{axis.upper()}"
+
+
+def _of_axis(axis: str, facts: Mapping[str, int]) -> Conditions:
+    status, loop, on = facts.get(f"MST{axis}"), facts.get(f"SLS{axis}"), facts.get("EO")
+    more = []
+    if status is not None:
+        more.append(("status", ", ".join(table.status_words(status))))
+    if loop is not None:
+        more.append(("StepNLoop", table.loop_words(loop)))
+    if f"DX{axis}" in facts:
+        more.append(("delta", str(facts[f"DX{axis}"])))
+    code = (status or 0) & table.LIMIT_ERROR
+    text = table.trouble_words(code)
+    if loop is not None and loop in table.LOOP_ERRORS:
+        code, text = loop, f"StepNLoop {table.loop_words(loop)}"
+    return Conditions(
+        axis=axis.lower(),
+        lamps=tuple(Lamp("", each, None if status is None else bool(status & bit)) for bit, each in ON_AXIS),
+        error=code,
+        error_text=text,
+        clears=clearing(axis) if code else "",
+        disabled=f"EO{DRIVERS[axis]}=0" if on is not None and not on & DRIVERS[axis] else "",
+        more=tuple(more),
+        unit="counts" if facts.get(f"SL{axis}") else "pulses",
+        pace=_pace(axis, facts),
+    )
+
+
+def _pace(axis: str, facts: Mapping[str, int]) -> Pace | None:
+    """The ramps of a move: an axis's own values count unless they are 0. Times are in ms."""
+    low, high, up, down = (facts.get(name + axis) or facts.get(name, 0) for name in SPEEDS)
+    down = down if facts.get("EDEC") else up
+    if not (high > low and up and down):
+        return None
+    return Pace(low, high, (high - low) / up * 1000, (high - low) / down * 1000)
+
+
+def check(state: PmxState, word: str) -> str:
+    row = table.lookup(word)
+    if row is None or "R" not in row.access:
+        raise Diagnostic(f"{word} cannot be polled: it reads no value", hint="valid: V0 to V63, DI, SSPD and others")
+    return word.upper()
+
+
+def again(state: PmxState, word: str, priority: Priority) -> Procedure[float]:
+    reply = yield from answered(state, replace(state.codec.request(state.address, word), priority=priority))
+    return printed_number(who(state), word, reply.text)
+
+
+def take(state: PmxState, progress: Progress) -> Procedure[Snapshot]:
+    readings = yield from read_settings(state, progress)
+    identity = yield from answered(state, state.codec.request(state.address, "ID"))
+    remarks = []
+    for axis in table.AXES:
+        if (yield from number(state, f"MST{axis}")) & table.MOVING:
+            remarks.append(f"{axis} moved while it was read: its position is one of that moment")
+    for program in PROGRAMS:
+        if (yield from number(state, f"SASTAT{program}")) == RUNNING:
+            remarks.append(f"program {program} ran while it was read")
+    counters = {}
+    for key, word in (("position", "P"), ("encoder", "E")):
+        counters[key] = (yield from number(state, f"{word}X")), (yield from number(state, f"{word}Y"))
+    analog = (yield from number(state, "AI1")), (yield from number(state, "AI2"))
+    values = readings.values
+    # A bit of DI is 1 if the input is at ground, or with the other polarity if it is not.
+    inverted = not int(number_of(values.get("POLX"))) & POLARITY
+    levels = Levels("DI", tuple((n + 1, n) for n in range(POINTS)), inverted=inverted)
+    listed = yield from listing(state)
+    return Snapshot(
+        kind="pmx",
+        product="PMX",
+        part=identity.text,
+        version=state.version,
+        name=str(values.get("DN", state.name))[-2:] or state.address,
+        baud=BAUDS.get(int(number_of(values.get("DB"))), 0),
+        readings=readings,
+        program=tuple((int(row[1]), row[2]) for line in listed if (row := RAW.fullmatch(line))),
+        counters=counters,
+        inputs=levels.of((yield from number(state, levels.word))),
+        levels=levels,
+        active=bool(remarks),
+        analog=analog,
+        remarks=tuple(remarks),
+    )
+
+
+def controls(state: DriveState, axis: str) -> Controls:
+    return controls_of(__file__, axis.upper(), table.AXES.index(axis.upper()) + 1)
+
+
+SEARCHES: Mapping[str, str] = {"home": "H", "home slow": "HL", "limit": "L", "index": "Z", "home index": "ZH"}
+"""The commands of homing by what they use. (7.10.)"""
+
+
+def homings(axis: str) -> Mapping[str, Mapping[str, str]]:
+    return {mode: {sign: f"{word}{axis.upper()}{sign}" for sign in "-+"} for mode, word in SEARCHES.items()}
+
+
+def run(axis: str, velocity: int | str) -> tuple[str, ...]:
+    """Set the axis's high speed, and jog; a velocity of 0 stops it."""
+    name = axis.upper()
+    if isinstance(velocity, str):
+        raise Inexpressible(f"{velocity}: a PMX has speeds without a sign, which a scale may turn; give steps a second")
+    return (f"HSPD{name}={abs(velocity)}", f"J{name}{'-' if velocity < 0 else '+'}") if velocity else (f"STOP{name}",)
+
+
+ACTIONS = Actions(homings=homings, run=run, output=lambda number, on: f"DO{number}={on:d}", clear=clearing)
+VALUES = Values(
+    parameters=PARAMETERS,
+    snapshot=take,
+    parts=parts,
+    fold=fold,
+    check=check,
+    first=lambda state, word: again(state, word, Priority.OPERATOR),
+    again=again,
+    controls=controls,
+    actions=ACTIONS,
+)

@@ -1,0 +1,376 @@
+"""The program in a module: read line by line, downloaded and read back, run, stepped and observed.
+
+Theory of operation. Between 132 and 133 a module stores every command but the control commands, from the address in
+132 on; so nothing else goes to it, and each line is sent once. A line after the last one is overwritten with an empty
+one, as the maker's IDE does, so that the rest of a longer program is not reached. Command 134 replies with the seven
+bytes of a stored line, without status and command number; only an exchange that is in step can tell it from a late
+reply, so a mark follows each doubtful one. What the module does is in global parameters 128 and 130.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from typing import Any
+
+from multidrop.base.errors import Diagnostic, DriveError, Inexpressible, Refused, Stopped
+from multidrop.base.files import SourceLine, lines_of_text
+from multidrop.base.text import counted, whole
+from multidrop.dialects.codec import Procedure
+from multidrop.dialects.debugging import Debugging, Look, Neighbours, Stepped, lacking
+from multidrop.dialects.family import Programs, Progress
+from multidrop.dialects.program_files import Difference, Held, Stored, first_difference, numbered
+from multidrop.families.tmcl.host.codec import TmclState, call_of, line_in, parse_reply
+from multidrop.families.tmcl.host.operations import LACKS, answered, busy, moving, perform, read, store, who
+from multidrop.families.tmcl.manual import program_file
+from multidrop.families.tmcl.manual.commands import Call, Command, Global, parameter
+from multidrop.families.tmcl.manual.instructions import EMPTY, MEMORY, Word, spelled
+
+ERASED = 255
+"""The number of a line in memory that was never written, in some modules."""
+BLANK = 64
+"""Empty lines in a row after which the memory is taken for empty: routines may begin at several addresses."""
+OVER = Call(EMPTY)
+
+
+def read_line(state: TmclState, at: int) -> Procedure[Call]:
+    """Read one line of the memory. Raises Refused or NoAnswer."""
+    request = state.codec.request(state.address, f"134 0, 0, {at}", Call(Command.READ_PROGRAM, value=at))
+    reply = yield from answered(state, request)
+    fields = parse_reply(reply.body)
+    if fields is not None and (fields.module, fields.command) == (call_of(request.body)[0], Command.READ_PROGRAM):
+        raise Refused(f"{who(state)} reads no line of its program to a host")
+    found = line_in(reply.body)
+    return OVER if found.command in (EMPTY, ERASED) else found
+
+
+def read_memory(state: TmclState, last: int, progress: Progress) -> Procedure[Mapping[int, Call]]:
+    """Read the stored lines, at least up to address `last`."""
+    found: dict[int, Call] = {}
+    blank = at = 0
+    while at < MEMORY and (blank < BLANK or at <= last):
+        progress(at, min(max(at + BLANK - blank, last + 1), MEMORY))
+        try:
+            call = yield from read_line(state, at)
+        except Refused as refused:
+            if at and refused.code in LACKS:  # the end of a smaller memory
+                break
+            raise
+        if call.command == EMPTY:
+            blank += 1
+        else:
+            blank, found[at] = 0, call
+        at += 1
+    return found
+
+
+def held_of(memory: Mapping[int, Call]) -> Held:
+    return Held(tuple(Stored(at, spelled(call)) for at, call in sorted(memory.items())))
+
+
+def calls_of(held: Held) -> dict[int, Call]:
+    """The lines of the memory that `held_of` wrote."""
+    made = program_file.assembled(numbered([line.text for line in held.lines]))
+    return {line.at: placed.call for line, placed in zip(held.lines, made.lines, strict=True)}
+
+
+def read_held(state: TmclState, lines: Sequence[SourceLine], progress: Progress) -> Procedure[Held]:
+    return held_of((yield from read_memory(state, len(program_file.compiled(lines)) if lines else -1, progress)))
+
+
+def listing(state: TmclState, start: str = "") -> Procedure[tuple[str, ...]]:
+    held = yield from read_held(state, (), lambda done, total: None)
+    first = whole(start, 0, MEMORY) or 0
+    return tuple(f"{line.at}  {line.text}" for line in held.lines if line.at >= first)
+
+
+def readable(held: Held) -> tuple[str, ...]:
+    """List each line with its address and, where a jump goes there, its label."""
+    calls = calls_of(held)
+    texts = [line for line in program_file.disassembled(calls) if not line.endswith(":")]
+    labels = {line.removesuffix(":") for line in program_file.disassembled(calls) if line.endswith(":")}
+    width = max((len(program_file.label_of(at)) + 2 for at in calls if program_file.label_of(at) in labels), default=0)
+    return tuple(
+        f"{at}  {f'{name}:' if (name := program_file.label_of(at)) in labels else '':{width}}{texts[at].strip()}"
+        for at in sorted(calls)
+    )
+
+
+def file_of(_: TmclState, held: Held, raw: bool) -> tuple[str, ...]:
+    """The lines of a file that gives this memory: with labels, or `raw` with addresses."""
+    calls = calls_of(held)
+    if not raw:
+        return tuple(program_file.disassembled(calls))
+    return tuple(spelled(calls.get(at, OVER)) for at in range(max(calls, default=-1) + 1))
+
+
+# Download
+
+
+def download(
+    state: TmclState, lines: Sequence[SourceLine], held: Held | None, progress: Progress
+) -> Procedure[Sequence[SourceLine]]:
+    """Store a program from address 0 on, and an empty line after it. Raises Refused or NoAnswer.
+
+    Ends download mode in every case. `held`: what was just read; its lines beyond the file stay.
+    """
+    stored = program_file.compiled(lines)
+    if state.programming:
+        raise Refused(f"{who(state)} is in download mode; 133 0, 0, 0 ends that (nothing was sent)")
+    if not stored:
+        return lines
+    if (yield from busy(state)):
+        raise Refused(f"{who(state)}: its program runs; 128 0, 0, 0 ends it (nothing was sent)")
+    sent = [(each.source, each.call) for each in stored] + [(0, OVER)] * (len(stored) < MEMORY)
+    done, fate = 0, "cut off"
+    try:
+        yield from store(state, *_line(state, Call(Command.DOWNLOAD)), by_hand=False)
+        for source, call in sent:
+            progress(done, len(stored))
+            try:
+                yield from store(state, *_line(state, call))
+            except DriveError as error:
+                error.args = (f"line {source}: {error}" if source else str(error),)
+                raise
+            done += bool(source)
+        yield from store(state, *_line(state, Call(Command.END_DOWNLOAD)))
+        fate = "done"
+    except DriveError as error:
+        fate = "cut off" if isinstance(error, Stopped) else "told"  # the caller of a stopped one may have gone
+        error.args = (f"{error}; {_incomplete(state, done, len(stored))}",)
+        raise
+    finally:
+        if fate == "cut off":
+            state.note(f"{who(state)}: the download was cut off: {_incomplete(state, done, len(stored))}")
+        if state.programming:
+            yield from _leave(state)
+    progress(len(stored), len(stored))
+    if rest := [line.at for line in held.lines if line.at > len(stored)] if held is not None else []:
+        count = counted(len(rest), "line")
+        state.remark(f"{who(state)}: {count} from address {rest[0]} on stay as they were: the file does not reach them")
+    return lines
+
+
+def _line(state: TmclState, call: Call) -> tuple[Any, Call]:
+    return state.codec.request(state.address, spelled(call), call), call
+
+
+def _leave(state: TmclState) -> Procedure[None]:
+    """End a download that failed; a failure of this is noted, for the download's own is the one to raise."""
+    try:
+        yield from store(state, *_line(state, Call(Command.END_DOWNLOAD)))
+    except DriveError as error:
+        state.note(str(error))
+
+
+def _incomplete(state: TmclState, done: int, total: int) -> str:
+    if not done:
+        return f"no line of the file is known to be stored in {who(state)}"
+    return f"{done} of {total} lines are stored: the program in {who(state)} is incomplete"
+
+
+def end(state: TmclState) -> Procedure[bool]:
+    """End the program, and stop the motors that it has started; whether it ran.
+
+    Raises Refused where a motor moves without a program.
+    """
+    runs = yield from busy(state)
+    moves = yield from moving(state)
+    if not runs and moves:
+        raise Refused(f"{who(state)} moves: stop it first (nothing was sent)")
+    if runs:
+        yield from perform(state, "128 0, 0, 0")
+        for motor in range(max(state.motors, 1)):
+            yield from perform(state, f"MST {motor}")
+            with suppress(Refused):  # a module without reference search
+                yield from perform(state, f"RFS STOP, {motor}")
+    return runs
+
+
+def differences(
+    state: TmclState, lines: Sequence[SourceLine], held: Held, before: Held | None = None
+) -> tuple[Difference, ...]:
+    """Compare the lines of a file with the stored ones, and see that an empty line follows them."""
+    stored, there = program_file.compiled(lines), {line.at: line.text for line in held.lines}
+    found = [
+        Difference(each.source, text, each.at, there.get(each.at, spelled(OVER)))
+        for each in stored
+        if (text := spelled(each.call)) != there.get(each.at, spelled(OVER))
+    ]
+    if stored and (more := there.get(len(stored))) is not None:
+        found.append(Difference(0, "", len(stored), more))
+    return tuple(found)
+
+
+def to_send(state: TmclState, lines: Sequence[SourceLine], held: Held) -> Procedure[str]:
+    yield from ()
+    return first_difference(differences(state, lines, held), "module")
+
+
+def start(lines: Sequence[SourceLine], label: str) -> str:
+    made = program_file.assembled(lines)
+    address = made.labels.get(label.upper(), whole(label, 0, max(len(made.lines) - 1, 0)))
+    if address is None or address >= len(made.lines):
+        raise Diagnostic(
+            f"no label {label} in the file", "", f"labels: {', '.join(made.labels) or 'none; 0 is its first line'}"
+        )
+    return program_file.run_at(address)
+
+
+def annotated(text: str, held: Held) -> tuple[str, ...]:
+    """The lines of a file, each with its address where it gives a line of the memory."""
+    lines = lines_of_text(text)
+    made = program_file.assembled(numbered(lines))
+    places = {each.source: each.at for each in made.lines}
+    width = len(str(len(made.lines)))
+    return tuple(f"{places.get(number, ''):>{width}}  {line}".rstrip() for number, line in enumerate(lines, 1))
+
+
+PROGRAM_FILES: Programs[TmclState] = Programs(
+    listing=listing,
+    readable=readable,
+    who=who,
+    read=read_held,
+    file=file_of,
+    size=lambda lines: len(program_file.compiled(lines)),
+    end=end,
+    download=download,
+    differences=differences,
+    to_send=to_send,
+    start=start,
+    annotated=annotated,
+    remark="//",
+)
+
+
+# Observation
+
+
+NO_PLACE = "does not report the address of its next line (global parameter 130)"
+no_break = lacking(who, "TMCL has no break points: /break now halts a program; program test --break has them")
+
+
+def stored_rows(state: TmclState) -> Procedure[tuple[Stored, ...]]:
+    return (yield from read_held(state, (), lambda done, total: None)).lines
+
+
+def address_of(place: str) -> int:
+    """The address that a place names. Raises Diagnostic."""
+    found = whole(place or "0", 0, MEMORY - 1)
+    if found is None:
+        raise Diagnostic(f"no line {place}", "", f"valid: an address, 0 to {MEMORY - 1}; /list shows them")
+    return found
+
+
+def idle(state: TmclState, place: str, neighbours: Neighbours | None) -> Procedure[None]:
+    address = address_of(place)
+    if neighbours is None and address:
+        raise Inexpressible(f"{who(state)}: single step begins with line 0: no command sets another; nothing was sent")
+    if (yield from busy(state)):
+        raise Refused(f"{who(state)}: its program runs already; not started; 128 0, 0, 0 ends it")
+
+
+def trace(state: TmclState, place: str) -> Procedure[None]:
+    state.program_halted(False)
+    yield from perform(state, program_file.run_at(address_of(place)))
+
+
+def begin(state: TmclState, place: str) -> Procedure[None]:
+    yield from perform(state, "131 0, 0, 0")
+    state.program_halted(True)
+
+
+def look(state: TmclState, place: str) -> Procedure[Look]:
+    runs = yield from busy(state)
+    state.program_halted(state.halted and not runs)
+    if not runs and not state.halted:
+        return Look(False)
+    return Look(True, state.halted, (yield from counter(state)))
+
+
+def counter(state: TmclState) -> Procedure[int | None]:
+    """The address of the next line; None where the module does not tell."""
+    try:
+        return (yield from read(state, Call(Command.GGP, Global.PROGRAM_COUNTER)))
+    except Refused as refused:
+        if refused.code in LACKS:
+            return None
+        raise
+
+
+def waits(state: TmclState, place: str, last: Stored | None) -> Procedure[None]:
+    if not state.halted or (yield from busy(state)):
+        raise Refused(f"{who(state)}: its program is not known to be halted; nothing was sent")
+
+
+def step(state: TmclState, listed: Sequence[Stored]) -> Procedure[Stepped]:
+    """Execute the next line; a program that comes to STOP, or to its end, is over."""
+    at = yield from counter(state)
+    if at is None:
+        raise Inexpressible(f"{who(state)} {NO_PLACE}; nothing was sent")
+    row = next((each for each in listed if each.at == at), Stored(at, ""))
+    yield from perform(state, "130 0, 0, 0")
+    state.program_halted(bool(row.text) and row.text != Word.STOP.name)
+    return Stepped(row)
+
+
+def go_on(state: TmclState, place: str) -> Procedure[None]:
+    state.program_halted(False)
+    yield from perform(state, "129 0, 0, 0")
+
+
+def break_now(state: TmclState, place: str) -> Procedure[None]:
+    if not (yield from busy(state)):
+        raise Refused(f"{who(state)}: its program does not run; nothing was sent")
+    yield from perform(state, "128 0, 0, 0")
+    state.program_halted(True)
+
+
+def check_names(state: TmclState, names: Sequence[str]) -> None:
+    for name in names:
+        watched_call(name)
+
+
+def watched_call(name: str) -> Call:
+    """The command that reads a watched name: `A`, `X`, a user variable `V5`, or an axis parameter `AP1`, `AP1/2`."""
+    registers = {"A": 2, "X": 3}
+    if name in registers:
+        return Call(Command.PROGRAM_STATUS, registers[name])
+    if name.startswith("V") and (found := whole(name[1:], 0, 255)) is not None:
+        return Call(Command.GGP, found, 2)
+    if (call := parameter(name)) is not None:
+        if call.changed_by_reading:
+            raise Diagnostic(f"{name} cannot be watched: reading it clears it", "", f"{call} reads it once")
+        return call
+    raise Diagnostic(f"{name} cannot be watched", "", "valid: A, X, V0 to V255, AP and a parameter, as AP1 or AP1/2")
+
+
+def watched(state: TmclState, names: Sequence[str]) -> Procedure[Mapping[str, str]]:
+    found = {}
+    for name in names:
+        try:
+            found[name] = str((yield from read(state, watched_call(name))))
+        except Refused as refused:
+            if refused.code not in LACKS:
+                raise
+    return found
+
+
+DEBUGGING = Debugging(
+    listing=stored_rows,
+    entry=lambda listed: "0",
+    address=lambda listed, place: whole(place, 0, MEMORY - 1),
+    idle=idle,
+    trace=trace,
+    begin=begin,
+    waits=waits,
+    forget=lambda state: state.program_halted(False),
+    step=step,
+    go_on=go_on,
+    look=look,
+    break_at=no_break,
+    break_off=no_break,
+    break_now=break_now,
+    names=check_names,
+    values=watched,
+)

@@ -1,0 +1,123 @@
+"""Quantities in commands of TMCL, and what a motor of a module counts.
+
+Positions are microsteps: 2 to the power of axis parameter 140 a full step; no command reports the full steps of a turn.
+Modules with a TMC428 or TMC429 take velocities and accelerations in units of that chip, which the divisors 154 and 153
+scale; others take microsteps/s and microsteps/s2, unless 255 is 0. (TMCL firmware manuals, "Axis parameters".)
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Collection, Sequence
+from fractions import Fraction
+
+from multidrop.base.errors import Refused
+from multidrop.dialects.codec import Procedure, Request
+from multidrop.dialects.units import VALUE, Basis, Field, Takes, Units
+from multidrop.families.tmcl.host.codec import TmclState, call_of
+from multidrop.families.tmcl.host.operations import read
+from multidrop.families.tmcl.manual import commands
+from multidrop.families.tmcl.manual.commands import Axis, Call, Command
+from multidrop.families.tmcl.manual.modules import module_of
+
+CLOCK = 16_000_000
+"""Of the chip, Hz."""
+FULL_STEPS = 200
+REVERSE_SHAFT = 251
+RESTS = (Axis.MICROSTEPS, Axis.RAMP_DIVISOR, Axis.PULSE_DIVISOR, Axis.UNIT_MODE, REVERSE_SHAFT)
+PARAMETERS = {
+    Axis.TARGET_POSITION: Takes.PLACE,
+    Axis.ACTUAL_POSITION: Takes.PLACE,
+    Axis.TARGET_VELOCITY: Takes.VELOCITY,
+    Axis.ACTUAL_VELOCITY: Takes.VELOCITY,
+    Axis.MAXIMUM_VELOCITY: Takes.SPEED,
+    Axis.MAXIMUM_ACCELERATION: Takes.ACCELERATION,
+    Axis.SEARCH_SPEED: Takes.SPEED,
+    Axis.SWITCH_SPEED: Takes.SPEED,
+}
+_SETTING = re.compile(r"(\d{1,3})(?:_(\d))?", re.ASCII)
+_LINE = re.compile(rf"\s*(?:(ROR)|(MVP)\s+(ABS|REL)\s*,|(SAP)\s+(\d+)\s*,)\s*(\d+)\s*,\s*{VALUE}\s*", re.I)
+
+
+def _axis(state: TmclState, motor: int) -> str:
+    return str(motor) if state.motors > 1 else ""
+
+
+def fields(state: TmclState, text: str) -> Sequence[Field]:
+    found = _LINE.fullmatch(text)
+    if found is None:
+        return ()
+    if found[1]:
+        takes: Takes | None = Takes.VELOCITY
+    elif found[2]:
+        takes = Takes.PLACE if found[3].upper() == "ABS" else Takes.DISTANCE
+    else:
+        takes = PARAMETERS.get(Axis(int(found[5]))) if int(found[5]) in PARAMETERS else None
+    moves = bool(found[2]) or (found[5] is not None and int(found[5]) == Axis.TARGET_POSITION)
+    return (Field(_axis(state, int(found[6])), takes, *found.span(7), moves),) if takes is not None else ()
+
+
+def reads(state: TmclState, text: str) -> tuple[str, Takes] | None:
+    call = commands.parsed(text)
+    known = call is not None and call.command == Command.GAP and call.type in PARAMETERS
+    return (_axis(state, call.motor), PARAMETERS[Axis(call.type)]) if call is not None and known else None
+
+
+def disturbs(state: TmclState, text: str) -> Collection[str]:
+    call = commands.parsed(text)
+    if call is None:
+        return ()
+    if call.command == Command.FACTORY:
+        return UNITS.axes(state)
+    sets = call.command in (Command.SAP, Command.RSAP) and call.type in (Axis.ACTUAL_POSITION, *RESTS)
+    return (_axis(state, call.motor),) if sets else ()
+
+
+def recounts(request: Request) -> bool:
+    _, call = call_of(request.body)
+    if call.command == Command.FACTORY:
+        return True
+    return call.command in (Command.SAP, Command.RSAP) and call.type in RESTS
+
+
+def basis(state: TmclState, axis: str, full_steps: int | None) -> Procedure[Basis]:
+    motor, settings = int(axis or 0), {}
+    for parameter in RESTS:
+        if parameter == Axis.MICROSTEPS or parameter in module_of(state.product).axis:
+            try:
+                settings[int(parameter)] = yield from read(state, Call(Command.GAP, parameter, motor))
+            except Refused:  # a module without it has no such divisor
+                continue
+    named = tuple((f"{number}", str(value)) for number, value in settings.items())
+    if Axis.MICROSTEPS not in settings:
+        return Basis(named, missing="the module does not report its microsteps (140)")
+    turn = Fraction((full_steps or FULL_STEPS) * 2 ** settings[Axis.MICROSTEPS])
+    assumed = "" if full_steps else f"{FULL_STEPS} full steps a turn are assumed"
+    if not settings.get(Axis.UNIT_MODE, 1):
+        return Basis(named, turn, None, None, assumed)
+    if not module_of(state.product).chip_units:
+        return Basis(named, turn, assumed=assumed)
+    pulse, ramp = settings.get(Axis.PULSE_DIVISOR), settings.get(Axis.RAMP_DIVISOR)
+    if pulse is None or ramp is None:
+        return Basis(named, turn, None, None, assumed)
+    speed = Fraction(2**pulse * 2048 * 32, CLOCK)
+    return Basis(named, turn, speed, Fraction(2 ** (pulse + ramp + 29), CLOCK**2), assumed)
+
+
+def setting(state: TmclState, name: str) -> tuple[str, Takes] | None:
+    found = _SETTING.fullmatch(name)
+    takes = PARAMETERS.get(Axis(int(found[1]))) if found is not None and int(found[1]) in PARAMETERS else None
+    return (_axis(state, int(found[2] or 0)), takes) if found is not None and takes is not None else None
+
+
+UNITS = Units(
+    lambda state: [str(motor) for motor in range(state.motors)] if state.motors > 1 else [""],
+    fields,
+    "MVP ABS, MVP REL, ROR, and SAP of 0, 1, 2, 4, 5, 194, 195",
+    basis,
+    disturbs,
+    recounts,
+    reads,
+    setting,
+    lambda axis, name: commands.setting_name(f"{name}_{axis}" if axis else name),
+)

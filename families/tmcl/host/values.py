@@ -1,0 +1,351 @@
+"""What is read of a module: settings, conditions, values for plots, and all of it for a snapshot.
+
+The extended error flags (207) are not read, since that clears them. (TMCL firmware manuals, "Axis parameters".)
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import replace
+from functools import partial
+
+from multidrop.base.errors import Diagnostic, Refused
+from multidrop.dialects.codec import Priority, Procedure
+from multidrop.dialects.program_files import Held
+from multidrop.dialects.values import (
+    BY,
+    COMMUNICATION,
+    UNREAD,
+    Actions,
+    Change,
+    Conditions,
+    Controls,
+    Facts,
+    Lamp,
+    Pace,
+    Parameters,
+    Part,
+    Permission,
+    Plan,
+    Progress,
+    Reading,
+    Readings,
+    Snapshot,
+    Value,
+    Values,
+    controls_of,
+    read_each,
+    reference_lost,
+    same,
+)
+from multidrop.families.tmcl.host.codec import TmclState
+from multidrop.families.tmcl.host.motions import DRIVER_FAULTS
+from multidrop.families.tmcl.host.operations import busy, motors, moving, perform, read, who
+from multidrop.families.tmcl.host.programs import read_held
+from multidrop.families.tmcl.manual.commands import (
+    STARTING_PARAMETERS,
+    Axis,
+    Call,
+    Command,
+    Global,
+    parameter,
+    setting_name,
+)
+from multidrop.families.tmcl.manual.modules import BAUDS, MODULES, RELATIVE_FROM, Module, Parameter, module_of
+
+GLOBAL_PREFIX = "G"
+ADDRESS = f"{GLOBAL_PREFIX}{int(Global.ADDRESS)}"
+WIRE = frozenset({Global.BAUD, Global.ADDRESS, Global.PAUSE, Global.HOST_ADDRESS, Global.SUPPRESS_REPLY})
+UNITS = (Axis.UNIT_MODE, Axis.PULSE_DIVISOR, Axis.RAMP_DIVISOR)
+"""Parameters that change the meaning of others, and so are written first."""
+NOT_STORED = (3, 6)
+"""The statuses of a module that lacks a parameter, or does not store it: wrong type, command not available."""
+
+
+def setting_names(module: Module, motors: int) -> tuple[str, ...]:
+    """The settings of a module, in the order in which they are written."""
+    axis = [int(number) for number, each in module.axis.items() if each.writable and not each.live]
+    axis.sort(key=lambda number: number not in UNITS)
+    own = [f"{number}{f'_{motor}' if motor else ''}" for motor in range(motors) for number in axis]
+    own_globals = [int(number) for number, each in module.banks[0].items() if each.writable and not each.live]
+    ordered = sorted(own_globals, key=lambda number: (number in WIRE, number == Global.ADDRESS, number == Global.BAUD))
+    return (*own, *(f"{GLOBAL_PREFIX}{number}" for number in ordered))
+
+
+def _row(module: Module, name: str) -> Parameter:
+    of_module, number, _ = _parts(name)
+    return (module.banks[0] if of_module else module.axis)[number]
+
+
+def _call(name: str, command: Command, value: int = 0) -> Call:
+    """The command for a setting; `command` is the one for an axis parameter."""
+    of_module, number, motor = _parts(name)
+    if of_module:
+        command = {Command.GAP: Command.GGP, Command.SAP: Command.SGP}[command]
+    return Call(command, number, motor, value)
+
+
+def reading(name: str, value: int, module: Module) -> Reading:
+    of_module, number, _ = _parts(name)
+    row = _row(module, name)
+    unit = ", ".join(each for each in (row.title, row.unit) if each)
+    default = row.fresh if row.known else None
+    return Reading(name, value, unit=unit, default=default, fixed=of_module and number in WIRE)
+
+
+def plan(state: TmclState, present: Readings, wanted: Mapping[str, Value], allowed: Permission) -> Plan:
+    module = module_of(state.product)
+    now, names = present.values, setting_names(module, state.motors or 1)
+    changed = {
+        setting_name(name): value for name, value in wanted.items() if not same(value, now.get(setting_name(name)))
+    }
+    allowed = replace(allowed, named=frozenset(map(setting_name, allowed.named)))
+    withheld = {name: reason for name in changed if (reason := _risk(name, changed[name], now, allowed))}
+    goal = {name: _checked(name, value, names, module) for name, value in changed.items() if name not in withheld}
+    order = [name for name in names if name in goal]
+    steps = [Change(name, now.get(name), goal[name], str(_call(name, Command.SAP, goal[name]))) for name in order]
+    scale = [name for name in goal if _parts(name)[:2] == (False, Axis.MICROSTEPS)]
+    return Plan(tuple(steps), tuple(withheld.items()), remarks=reference_lost(steps, scale))
+
+
+def _parts(name: str) -> tuple[bool, int, int]:
+    """Divide a name: whether it is a global parameter, the number, the motor."""
+    found = parameter(name)
+    return (found.command == Command.GGP, found.type, found.motor) if found is not None else (False, -1, 0)
+
+
+def _checked(name: str, value: Value, names: Collection[str], module: Module) -> int:
+    """Return the value as a whole number. Raises Diagnostic."""
+    if name not in names:
+        raise Diagnostic(f"{name}: is not a setting of the module")
+    row = _row(module, name)
+    if isinstance(value, (str, tuple)) or not float(value).is_integer() or int(value) not in row.limits:
+        raise Diagnostic(f"{name} = {value}: valid: {row.valid}")
+    return int(value)
+
+
+def _risk(name: str, value: Value, now: Mapping[str, Value], allowed: Permission) -> str:
+    """The reason for which a setting waits for a person's word; empty: there is none."""
+    of_module, number, _ = _parts(name)
+    communicates = of_module and number in WIRE
+    if name in allowed.named or (communicates and allowed.communication):
+        return ""
+    if communicates:
+        return COMMUNICATION
+    if of_module and number == Global.AUTOSTART and value:
+        return "the stored program starts at power-up"
+    if not of_module and number in (Axis.RIGHT_LIMIT_OFF, Axis.LEFT_LIMIT_OFF) and value:
+        return "a move that the limit switch holds back may go on"
+    waits = not of_module and number in STARTING_PARAMETERS and now.get(name) == 0
+    return "a move may wait for it" if waits else ""
+
+
+def read_settings(state: TmclState, progress: Progress) -> Procedure[Readings]:
+    """Read every setting; modules differ, so a refused one is listed. Raises NoAnswer."""
+    names = setting_names(module_of(state.product), (yield from motors(state)))
+    return (yield from read_each(names, partial(_read, state), progress))
+
+
+def _read(state: TmclState, name: str) -> Procedure[Reading]:
+    return reading(name, (yield from read(state, _call(name, Command.GAP))), module_of(state.product))
+
+
+def conflict(plan: Plan, others: Collection[str]) -> str:
+    numbers = [str(change.after) for change in plan if change.name == ADDRESS]
+    return f"another module of the line has address {numbers[0]}" if numbers and numbers[0] in others else ""
+
+
+def ready(state: TmclState) -> Procedure[str]:
+    return f"{who(state)} moves: stop it first" if (yield from moving(state)) else ""
+
+
+def save(state: TmclState) -> Procedure[None]:
+    """Store the axis parameters in EEPROM, one by one; a module may lack some."""
+    for name in setting_names(module_of(state.product), (yield from motors(state))):
+        if not name.startswith(GLOBAL_PREFIX):
+            call = _call(name, Command.GAP)
+            try:
+                yield from perform(state, f"STAP {call.type}, {call.motor}")
+            except Refused as refusal:
+                if refusal.code not in NOT_STORED:
+                    raise
+
+
+PARAMETERS = Parameters(
+    read=read_settings,
+    plan=plan,
+    ready=ready,
+    write=lambda state, change: perform(state, change.text),  # a module keeps global parameters by itself
+    save=save,
+    language="TMCL",
+    saving="STAP",
+    conflict=conflict,
+)
+
+
+STATE = (Axis.TARGET_POSITION, Axis.POSITION_REACHED)
+FLAGS = Axis.DRIVER_FLAGS
+SWITCHES = ((Axis.HOME_SWITCH, "home"), (Axis.RIGHT_SWITCH, "lim+"), (Axis.LEFT_SWITCH, "lim-"))
+RAMP = (Axis.MAXIMUM_VELOCITY, Axis.MAXIMUM_ACCELERATION)
+SETTINGS = (Axis.RUN_CURRENT, Axis.STANDBY_CURRENT, Axis.FREEWHEELING, *RAMP)
+KNOWN = (*STATE, FLAGS, *(axis for axis, _ in SWITCHES), *SETTINGS)
+RUNS = "RUNS"
+"""Whether the module's program runs."""
+ABSENT = "absent"
+"""A parameter that the module refuses: it lacks it."""
+FULL_CURRENT = 255
+
+
+def parts(state: TmclState, facts: Facts) -> Sequence[Part[TmclState]]:
+    """The parts of a module, for each motor that was counted; at first they are counted."""
+    if not state.motors:
+        return (Part("motors", _count),)
+    found: list[Part[TmclState]] = [Part("program", _program)]
+    for motor in range(state.motors):
+        some = (FLAGS, *(axis for axis, _ in SWITCHES))
+        asked = [*STATE, *(axis for axis in some if facts.get(_key(axis, motor)) != ABSENT)]
+        found.append(Part(f"motor {motor}", partial(_parameters, motor=motor, wanted=asked)))
+        for axis in SETTINGS:
+            found.append(Part(_key(axis, motor), partial(_parameters, motor=motor, wanted=(axis,)), slow=True))
+    return found
+
+
+def _key(axis: Axis, motor: int) -> str:
+    return f"{axis.name} {motor}"
+
+
+def _count(state: TmclState) -> Procedure[Facts]:
+    yield from motors(state, Priority.POLL)
+    return {}
+
+
+def _program(state: TmclState) -> Procedure[Facts]:
+    return {RUNS: int((yield from busy(state, Priority.POLL)))}
+
+
+def _parameters(state: TmclState, motor: int, wanted: Sequence[Axis]) -> Procedure[Facts]:
+    found: dict[str, int | str] = {}
+    for axis in wanted:
+        try:
+            found[_key(axis, motor)] = yield from read(state, Call(Command.GAP, axis, motor), Priority.POLL)
+        except Refused:
+            found[_key(axis, motor)] = ABSENT
+    return found
+
+
+def fold(state: TmclState, facts: Facts) -> tuple[Conditions, ...]:
+    return tuple(_conditions(state, facts, motor) for motor in range(state.motors))
+
+
+def _conditions(state: TmclState, facts: Facts, motor: int) -> Conditions:
+    """The conditions of a motor: one ramp up and down. Older modules count it and velocities in units of their chip."""
+    values = {axis: value for axis in KNOWN if isinstance(value := facts.get(_key(axis, motor)), int)}
+    run, hold = values.get(Axis.RUN_CURRENT), values.get(Axis.STANDBY_CURRENT)
+    speed, ramp = (values.get(axis) for axis in RAMP)
+    chip = module_of(state.product).chip_units
+    freewheels = "freewheels: parameter 204" if values.get(Axis.FREEWHEELING) else ""
+    faults = ", ".join(words for bit, words in DRIVER_FAULTS.items() if values.get(FLAGS, 0) & bit)
+    return Conditions(
+        axis=str(motor) if state.motors > 1 else "",
+        lamps=tuple(Lamp("", function, bool(values[axis])) for axis, function in SWITCHES if axis in values),
+        error=UNREAD if faults else 0,
+        error_text=faults,
+        cause=faults,
+        program="running" if facts.get(RUNS) else "",
+        runs=bool(facts[RUNS]) if RUNS in facts else None,
+        target=None if values.get(Axis.POSITION_REACHED) else values.get(Axis.TARGET_POSITION),
+        run_current=None if run is None else round(run * 100 / FULL_CURRENT),
+        hold_current=None if hold is None else round(hold * 100 / FULL_CURRENT),
+        released="parameter 7 is 0" if hold == 0 else freewheels,
+        unit="microsteps",
+        speed="of 2047" if chip else "",
+        pace=Pace(0, speed, ramp, ramp) if speed and ramp and not chip else None,
+    )
+
+
+def check(state: TmclState, word: str) -> str:
+    found = parameter(word)
+    if found is None:
+        raise Diagnostic(f"{word} cannot be polled", hint="valid: AP and a parameter, /MOTOR after it; as AP206, AP1/1")
+    if found.changed_by_reading:
+        raise Diagnostic(f"{word} cannot be polled: reading it clears it", hint=f"{found} reads it once")
+    return f"AP{word}" if word[0].isdigit() else word.upper()
+
+
+def again(state: TmclState, word: str, priority: Priority) -> Procedure[float]:
+    """Read a parameter, none whose reading changes the module: `check` refuses that."""
+    found = parameter(word)
+    assert found is not None
+    return float((yield from read(state, found, priority)))
+
+
+def take(state: TmclState, progress: Progress) -> Procedure[Snapshot]:
+    readings = yield from read_settings(state, progress)
+    remarks = []
+    if active := (yield from moving(state)):
+        remarks.append("moving while it was read: its position is one of that moment")
+    if runs := (yield from busy(state)):
+        remarks.append("its program ran while it was read")
+    try:
+        held = yield from read_held(state, (), lambda done, total: None)
+    except Refused as refused:
+        held = Held()
+        remarks.append(f"its program was not read: {refused}")
+    count = yield from motors(state)
+    module, (major, _, minor) = state.product.rpartition("-")[2], state.version.partition(".")
+    if count > (simulated := MODULES[module].motors if module in MODULES else 1):
+        remarks.append(f"it has {count} motors; the simulated module has {simulated}")
+    positions, targets = [], []
+    for motor in range(count):
+        positions.append((yield from read(state, Call(Command.GAP, Axis.ACTUAL_POSITION, motor))))
+        targets.append((yield from read(state, Call(Command.GAP, Axis.TARGET_POSITION, motor))))
+    code = readings.values.get(f"G{int(Global.BAUD)}")
+    return Snapshot(
+        kind="tmcl",
+        product=state.product,
+        version=f"{module}V{major}{minor}" if module.isdecimal() and major else "",  # as in its text form, `1241V115`
+        name=state.address,
+        baud=BAUDS.get(code, 0) if isinstance(code, int) else 0,
+        readings=readings,
+        counters={"position": tuple(positions), **({"target": tuple(targets)} if targets != positions else {})},
+        program=tuple((line.at, line.text) for line in held.lines),
+        active=active or runs,
+        remarks=tuple(remarks),
+    )
+
+
+def controls(state: TmclState, axis: str) -> Controls:
+    found = controls_of(__file__, axis or "0")
+    counted = RELATIVE_FROM.get(state.relative.get(int(axis or 0), -1), "from where it counts is not known")
+    return {**found, BY: replace(found[BY], about=counted)}
+
+
+def _word(word: str, axis: str) -> str:
+    """A parameter by its number, of the motor that it names or that is meant; any other word as it is."""
+    found = parameter(word)
+    if found is None:
+        return word
+    named = re.search(r"[_/]\d$", word) is not None
+    return f"G{found.type}" if found.command == Command.GGP else f"AP{found.type}_{found.motor if named else axis or 0}"
+
+
+ACTIONS = Actions(
+    homings=lambda axis: {"search": {"": f"RFS START, {axis or '0'}"}},
+    run=lambda axis, velocity: (f"ROR {axis or '0'}, {velocity}",),
+    output=lambda number, on: f"SIO {number}, 2, {on:d}",
+    no_error="a module has no error to read: each refusal says its own; read('AP208') shows the driver's flags",
+    word=_word,
+    ports=lambda state: {port: f"GIO {port}, 0" for port in module_of(state.product).inputs},
+)
+VALUES = Values(
+    parameters=PARAMETERS,
+    snapshot=take,
+    parts=parts,
+    fold=fold,
+    check=check,
+    first=lambda state, word: again(state, word, Priority.OPERATOR),
+    again=again,
+    controls=controls,
+    actions=ACTIONS,
+)
