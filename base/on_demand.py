@@ -6,7 +6,7 @@ import contextlib
 import gc
 import importlib
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from typing import Any, TypeVar
 
 T = TypeVar("T")
@@ -45,22 +45,23 @@ def imported_if(place: str) -> Any:
 
 
 class OnDemand(Mapping[str, T]):
-    """A mapping of names to records at a `MODULE:ATTRIBUTE`. Names and membership import nothing."""
+    """A mapping of names to what is at a `MODULE:ATTRIBUTE`. Names and membership import none of that."""
 
-    def __init__(self, places: Mapping[str, str]) -> None:
-        self._places = dict(places)
+    def __init__(self, places: Callable[[], Mapping[str, str]]) -> None:
+        """`places`: gives the places by name, as they are declared now."""
+        self._places = places
         self._found: dict[str, T] = {}
 
     def __getitem__(self, name: str) -> T:
         if name not in self._found:
-            self._found[name] = imported(self._places[name])
+            self._found[name] = imported(self._places()[name])
         return self._found[name]
 
     def __iter__(self) -> Iterator[str]:
-        return iter(self._places)
+        return iter(self._places())
 
     def __len__(self) -> int:
-        return len(self._places)
+        return len(self._places())
 
     def __contains__(self, name: object) -> bool:
-        return name in self._places
+        return name in self._places()

@@ -1,9 +1,10 @@
-"""Every feature: the wheel's, those that other packages bring, and a person's own files. It imports none of them.
+"""Every feature and family of drives: the wheel's, those of packages, a person's own files. It imports none of them.
 
 The wheel's are in the table below: the words that each answers to (verbs, commands, schemes), so that one word imports
 one feature, and the word of a feature that was deleted is explained. Packages name theirs in the entry points
-`multidrop.features`; their names are kept until the environment changes, because reading them takes 40 ms. A person's
-own features are the files in the folder `features` of the configuration.
+`multidrop.features` and `multidrop.families`; their names are kept until the environment changes, because reading them
+takes 40 ms. A person's own features are the files in the folder `features` of the configuration. A family is declared
+as a feature is.
 
 A feature by others is imported when a session opens, or for a word that nothing else explains. Its functions are
 guarded (`base.foreign`). One that cannot be loaded, or adds what there is already, is a warning, and the rest works. So
@@ -26,9 +27,9 @@ from multidrop.base.feature import NAME, Feature
 from multidrop.base.on_demand import importing
 
 T = TypeVar("T")
-GROUP = "multidrop.features"
-"""The entry points of features, and the package of the wheel's."""
-RECORD = "FEATURE"
+GROUP, FAMILY_GROUP = "multidrop.features", "multidrop.families"
+"""The entry points of features and of families, and the packages of the wheel's."""
+RECORDS = {GROUP: "FEATURE", FAMILY_GROUP: "FAMILY"}
 """The name of the record in a module."""
 WHEEL = "multidrop"
 KEPT = "features.json"
@@ -54,6 +55,14 @@ class Failed(NamedTuple):
         return f"the feature {self.entry.name} ({self.entry.source}) cannot be loaded: {self.why}"
 
 
+FAMILIES: dict[str, tuple[str, ...]] = {
+    "lexium": ("dialect=mcode", "dialect=modbus", "modbus:"),
+    "pmx": ("dialect=pmx",),
+    "tmcl": ("dialect=tmcl",),
+}
+"""The families of drives of the wheel, and the words that each answers to, as below; `dialect=` names a language."""
+DEFAULT = "mcode"
+"""The language of drives of which nothing is said."""
 IN_WHEEL: dict[str, tuple[str, ...]] = {
     "certify": ("certify",),
     "convert": ("program convert",),
@@ -106,14 +115,15 @@ class Attempt:
 
 def _wheel(name: str) -> Feature | None:
     """A feature of the wheel; None where its folder was deleted, or where its module raises: that is a warning."""
-    module, why = f"{GROUP}.{name}", list[str]()
+    group = FAMILY_GROUP if name in FAMILIES else GROUP
+    module, why = f"{group}.{name}", list[str]()
     found: Feature | None = None
     with Attempt(why):
         try:
             with importing():
-                found = getattr(importlib.import_module(module), RECORD)
+                found = getattr(importlib.import_module(module), RECORDS[group])
         except ModuleNotFoundError as missing:
-            if missing.name not in (module, GROUP):
+            if missing.name not in (module, group):
                 raise
     if why:
         _fail(Entry(name, WHEEL, "", module), why[0])
@@ -128,12 +138,13 @@ def with_word(word: str) -> Feature | None:
 
     Raises Diagnostic where it is gone or cannot be loaded.
     """
-    for name, words in IN_WHEEL.items():
+    for name, words in (*FAMILIES.items(), *IN_WHEEL.items()):
         if word in words:
             found = wheel(name)
             if found is None:
-                failed = _failed.get(f"{GROUP}.{name}")
-                what = f"the feature {name} {'is not there' if failed is None else f'cannot be loaded: {failed.why}'}"
+                group, kind = (FAMILY_GROUP, "family") if name in FAMILIES else (GROUP, "feature")
+                failed = _failed.get(f"{group}.{name}")
+                what = f"the {kind} {name} {'is not there' if failed is None else f'cannot be loaded: {failed.why}'}"
                 raise Diagnostic(what, word.rstrip(":"), "install multidrop again, whole")
             return found
     return None
@@ -153,7 +164,7 @@ def needed(kind: type[T], word: str) -> T:
 
 def words() -> tuple[str, ...]:
     """The words of the wheel's features, whether these are there or not."""
-    return tuple(word for each in IN_WHEEL.values() for word in each)
+    return tuple(word for each in (*FAMILIES.values(), *IN_WHEEL.values()) for word in each)
 
 
 # By others
@@ -186,9 +197,10 @@ def _parse_kept(found: Any) -> tuple[str, list[Entry]]:
 def _read_entry_points() -> Iterator[Entry]:
     from importlib.metadata import entry_points
 
-    for each in entry_points(group=GROUP):
-        source, version = (each.dist.name, each.dist.version) if each.dist is not None else ("?", "")
-        yield Entry(each.name, source, version, each.value)
+    for group, record in RECORDS.items():
+        for each in entry_points(group=group):
+            source, version = (each.dist.name, each.dist.version) if each.dist is not None else ("?", "")
+            yield Entry(each.name, source, version, each.value if ":" in each.value else f"{each.value}:{record}")
 
 
 def _environment() -> str:
@@ -247,12 +259,14 @@ def _loaded(entry: Entry) -> Feature:
     """Import a feature by others, and guard its functions. Raises anything."""
     from multidrop.base.foreign import guarded
 
-    if entry.name in IN_WHEEL or entry.name in (known.name for known, _ in _others.values()):
+    if entry.name in (*FAMILIES, *IN_WHEEL) or entry.name in (known.name for known, _ in _others.values()):
         raise Diagnostic("another feature has this name")
+    own = entry.place == entry.source
     with redirect_stdout(sys.stderr):  # what it prints is no reply of a drive
-        found = _of_file(entry.place) if entry.place == entry.source else _of_place(entry.place)
+        found = _of_file(entry.place) if own else _of_place(entry.place)
     if not isinstance(found, Feature):
-        raise TypeError(f"{RECORD} is no multidrop.base.feature.Feature")
+        record = RECORDS[GROUP] if own else entry.place.partition(":")[2]
+        raise TypeError(f"{record} is no multidrop.base.feature.Feature")
     if wrong := found.wrong():
         raise TypeError(wrong)
     if found.name != entry.name or not NAME.fullmatch(found.name):
@@ -270,7 +284,7 @@ def _loaded(entry: Entry) -> Feature:
 
 def _of_place(place: str) -> Any:
     module, _, attribute = place.partition(":")
-    return getattr(importlib.import_module(module), attribute or RECORD)
+    return getattr(importlib.import_module(module), attribute)
 
 
 def _of_file(place: str) -> Any:
@@ -290,7 +304,7 @@ def _of_file(place: str) -> Any:
     module = util.module_from_spec(spec)
     sys.modules[spec.name] = module
     spec.loader.exec_module(module)
-    return getattr(module, RECORD)
+    return getattr(module, RECORDS[GROUP])
 
 
 # What they add
@@ -302,8 +316,14 @@ def by_others() -> list[Feature]:
 
 
 def wheels() -> Iterator[Feature]:
-    """The features of the wheel that are there."""
-    return filter(None, map(wheel, IN_WHEEL))
+    """The families and features of the wheel that are there."""
+    yield from filter(None, map(wheel, (*FAMILIES, *IN_WHEEL)))
+
+
+def families() -> Iterator[Feature]:
+    """What may declare families of drives: those of the wheel that are there, and all that others bring."""
+    yield from filter(None, map(wheel, FAMILIES))
+    yield from by_others()
 
 
 def features() -> Iterator[Feature]:
@@ -356,8 +376,9 @@ def claims(feature: Feature) -> Iterator[str]:
 def states(version: str) -> Iterator[tuple[Entry, str, str]]:
     """Every feature with its meaning and its state, both in words. Loads those by others. `version`: the wheel's."""
     load_others()
-    for name in IN_WHEEL:
-        yield Entry(name, WHEEL, version, ""), *_described(wheel(name), f"{GROUP}.{name}")
+    for group, names in ((FAMILY_GROUP, FAMILIES), (GROUP, IN_WHEEL)):
+        for name in names:
+            yield Entry(name, WHEEL, version, ""), *_described(wheel(name), f"{group}.{name}")
     for entry in entries():
         _, found = _others.get(entry.place, (entry, None))
         yield entry, *_described(found, entry.place)

@@ -1,6 +1,6 @@
-"""The one table of the families of drives. A new family adds one row here.
+"""The languages of drives, as the families declare them (`multidrop.families.NAME.FAMILY`).
 
-A row holds what is known of a family without its code, which is imported at the first use of its record.
+A declaration holds what is known of a language without its code, which is imported at the first use of its record.
 """
 
 from __future__ import annotations
@@ -9,6 +9,7 @@ import os
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from multidrop.base import registry
 from multidrop.base.files import split_lines
 from multidrop.base.on_demand import OnDemand
 from multidrop.base.text import visible
@@ -19,54 +20,31 @@ if TYPE_CHECKING:
     from multidrop.dialects.family import Family, Language
 
 
-class Row(NamedTuple):
-    """A family: the place of its record, and what a URL or the name of a file says of it."""
+class Dialect(NamedTuple):
+    """A language that drives of a family speak: in the record of the family."""
 
+    name: str
+    """Its name in `dialect=`."""
     record: str
+    """The place of its `Family`."""
     scheme: str = ""
-    """The URL scheme that implies this family; empty: the user chooses it by `dialect=`."""
+    """The URL scheme that implies it; empty: the user chooses it by `dialect=`."""
     files: ProgramFiles | None = None
     """None: there are no program files."""
 
+    def claims(self) -> tuple[str, ...]:
+        """What only one family can add."""
+        return (f"dialect={self.name}",)
 
-TABLE: Mapping[str, Row] = {
-    "mcode": Row(
-        "multidrop.families.lexium.host.mcode.family:MCODE",
-        files=ProgramFiles(
-            "MCode",
-            (".mxt", ".txt"),
-            "multidrop.families.lexium.manual.program_checker",
-            "multidrop.families.lexium.manual.editing",
-            ("mcode", "mxt"),
-            {"lexium": "multidrop.families.lexium.manual.conversion"},
-            "multidrop.families.lexium.manual.supported:unsupported",
-        ),
-    ),
-    "modbus": Row("multidrop.families.lexium.host.modbus.family:MODBUS", scheme="modbus"),
-    "pmx": Row(
-        "multidrop.families.pmx.host.family:PMX",
-        files=ProgramFiles(
-            "A-SCRIPT",
-            (".prg", ".asc"),
-            "multidrop.families.pmx.manual.program_file",
-            "multidrop.families.pmx.manual.editing",
-            ("ascript", "a-script", "pmx"),
-        ),
-    ),
-    "tmcl": Row(
-        "multidrop.families.tmcl.host.family:TMCL",
-        files=ProgramFiles(
-            "TMCL",
-            (".tmc", ".tmcl"),
-            "multidrop.families.tmcl.manual.program_file",
-            "multidrop.families.tmcl.manual.editing",
-            ("tmcl",),
-        ),
-    ),
-}
-FAMILIES: Mapping[str, Family[Any]] = OnDemand({name: row.record for name, row in TABLE.items()})
+
+def dialects() -> dict[str, Dialect]:
+    """All languages by name, those of the wheel first."""
+    return {each.name: each for each in registry.records(registry.families(), Dialect)}
+
+
+FAMILIES: Mapping[str, Family[Any]] = OnDemand(lambda: {each.name: each.record for each in dialects().values()})
 """By name. Nothing tries one family after another: a URL names the family, or the drives are `DEFAULT`."""
-DEFAULT = next(iter(TABLE))
+DEFAULT = registry.DEFAULT
 
 
 def family_of(codec: Codec) -> Family[Any]:
@@ -79,7 +57,7 @@ def languages() -> list[Language]:
 
 
 def program_languages() -> dict[str, ProgramFiles]:
-    return {name: row.files for name, row in TABLE.items() if row.files is not None}
+    return {name: each.files for name, each in dialects().items() if each.files is not None}
 
 
 def program_language_of(path: str | os.PathLike[str]) -> str:

@@ -139,7 +139,7 @@ def port(data: bytes) -> None:
 
 def modbus_port(data: bytes) -> None:
     """The Modbus/TCP port of a simulated Ethernet drive, to which anything is sent."""
-    connection = Floor(cells.read(CELL.format("LMDCE"))).modbus("one")
+    connection = Floor(cells.read(CELL.format("LMDCE"))).own_port("one")
     answered = 0
     for number, at in enumerate(range(0, len(data), 16)):
         if connection.closed:

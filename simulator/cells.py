@@ -12,6 +12,7 @@ from importlib.resources.abc import Traversable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from multidrop.base import registry
 from multidrop.base.errors import Diagnostic
 from multidrop.base.files import toml_of, utf8_of
 from multidrop.base.text import NOT_FIRST, acts_first
@@ -20,14 +21,16 @@ from multidrop.simulator.cell.drive_keys import check_inside
 from multidrop.simulator.cell.endpoint_kinds import kind_of, kinds
 from multidrop.simulator.cell.spec import BusSpec, Cell, DriveSpec, Endpoint, Faults, MotorSpec
 from multidrop.simulator.cell.table import Folder, Source, Table, quoted
+from multidrop.simulator.declared import Demo, own_ports
 from multidrop.simulator.families import BY_PERSONALITY
 from multidrop.simulator.motor_files import with_motor
 
 if TYPE_CHECKING:
     from multidrop.simulator.family import Family
 
-SCHEMES = ("pty", "tcp", "udp", "modbus")
-"""Of endpoints; features add others (`EndpointKind`)."""
+SCHEMES = ("pty", "tcp", "udp")
+"""Of endpoints; families add those of `own_ports`, and features others (`EndpointKind`)."""
+DEMO_SEED = 1
 LONGEST_GATHER = 0.02
 """The highest `gather`, s: USB chips hold bytes for up to 16 ms."""
 DRIVE_KEYS = (
@@ -134,15 +137,16 @@ class Reader:
                 )
             names[drive.name] = number
         on_ethernet = any(self._is_ethernet(each.personality) for each in bus.drives)
-        if any(each.scheme == "modbus" for each in bus.serve) and not on_ethernet:
-            raise table.wrong("serve", "has modbus://, and no drive of the bus serves it", f"valid: {self._ethernet}")
+        own = next((each.scheme for each in bus.serve if each.scheme in own_ports()), "")
+        if own and not on_ethernet:
+            raise table.wrong("serve", f"has {own}://, and no drive of the bus serves it", f"valid: {self._ethernet}")
         if bus.gather is not None and on_ethernet:
             raise table.wrong("gather", "is for serial drives", "leave it out: an Ethernet drive sends whole replies")
 
     def _check_kinds(self, bus: BusSpec, where: str, text: str) -> None:
         """Refuse an endpoint that features serve for other drives than it is for, with the line that has it."""
         for scheme in dict.fromkeys(each.scheme for each in bus.serve):
-            kind = kind_of(scheme) if scheme not in SCHEMES else None
+            kind = None if scheme in _schemes() else kind_of(scheme)
             if kind is None or not kind.families:
                 continue
             fits = [name for name, each in self._families.items() if each.name in kind.families]
@@ -162,10 +166,14 @@ class Reader:
         return personality in self._families[personality].ethernet
 
 
+def _schemes() -> tuple[str, ...]:
+    return (*SCHEMES, *own_ports())
+
+
 def _endpoint(text: str, table: Table, folder: Folder) -> Endpoint:
     scheme, colon, rest = text.partition(":")
-    if not colon or (scheme not in SCHEMES and kind_of(scheme) is None):
-        *forms, last = (f"{each}://" for each in (*SCHEMES[1:], *(each.scheme for each in kinds())))
+    if not colon or (scheme not in _schemes() and kind_of(scheme) is None):
+        *forms, last = (f"{each}://" for each in (*_schemes()[1:], *(each.scheme for each in kinds())))
         what = f"valid: pty:, {', '.join(forms)} or {last} at the beginning"
         raise table.wrong("serve", f"cannot be {quoted(text)}", what)
     if scheme == "pty":
@@ -221,12 +229,20 @@ read = _READER.read
 
 
 def demo() -> Cell:
-    """Read the cell that comes with the program."""
-    return read(_demo_text(), "demo cell", resources.files("multidrop.simulator"))
+    """Read the cell that comes with the program: the buses that the families show, in order."""
+    buses = [bus for each in _shown() for bus in read(_text(each), "demo cell", each).buses]
+    cell = Cell(seed=DEMO_SEED, buses=tuple(buses))
+    _check_cell(cell, "demo cell")
+    return cell
 
 
-def _demo_text() -> str:
-    return resources.files("multidrop.simulator").joinpath("demo.toml").read_text(encoding="utf-8")
+def _shown() -> list[Traversable]:
+    """The folders with a demo.toml."""
+    return [resources.files(each.package) for each in registry.records(registry.families(), Demo)]
+
+
+def _text(folder: Traversable) -> str:
+    return folder.joinpath("demo.toml").read_text(encoding="utf-8")
 
 
 class Placed(NamedTuple):
@@ -267,9 +283,9 @@ def matching(cell: str, allow: Sequence[Path] = ()) -> Sequence[Placed]:
 
 
 def _drives(path: str, allow: Sequence[Path]) -> list[Placed]:
-    text = utf8_of(path) if path else _demo_text()
-    shop = read(text, path, Path(path).absolute().parent, allow) if path else demo()
-    tables = toml_of(text, path).get("bus", [])
+    texts = [utf8_of(path)] if path else [*map(_text, _shown())]
+    shop = read(texts[0], path, Path(path).absolute().parent, allow) if path else demo()
+    tables = [table for text in texts for table in toml_of(text, path).get("bus", [])]
     return [
         Placed(path, bus.name, spec, _without_files(table, spec), shop.own_units)
         for bus, rows in zip(shop.buses, tables, strict=True)

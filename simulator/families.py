@@ -1,64 +1,33 @@
-"""The one table of simulated families. A new family is one row here.
+"""The simulated drives, as the families declare them (`multidrop.families.NAME.FAMILY`).
 
-A family is imported at the first use of one of its drives.
+Their code is imported at the first use of one of the drives.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 from multidrop.base.errors import Diagnostic
 from multidrop.base.on_demand import OnDemand
+from multidrop.simulator.declared import simulated
 
 if TYPE_CHECKING:
     from multidrop.simulator.family import Family, Snapshots
     from multidrop.simulator.program_run import Programs
 
 
-class Row(NamedTuple):
-    """A family: the place of its record, its products by the names that a cell file gives them, and its programs."""
-
-    record: str
-    personalities: tuple[str, ...]
-    programs: str = ""
-    """The place of its `Programs`; empty: there are no program files."""
+def _personalities() -> dict[str, str]:
+    return {personality: each.record for each in simulated().values() for personality in each.personalities}
 
 
-TABLE: Mapping[str, Row] = {
-    "mcode": Row(
-        "multidrop.families.lexium.simulator.family:MCODE",
-        ("LMDOM", "LMDCM", "LMDOE", "LMDCE", "LMM", "MDI", "MDIE", "MDIX"),
-        "multidrop.families.lexium.simulator.program_run:RUNS",
-    ),
-    "pmx": Row(
-        "multidrop.families.pmx.simulator.family:PMX", ("PMX",), "multidrop.families.pmx.simulator.program_run:RUNS"
-    ),
-    "tmcl": Row(
-        "multidrop.families.tmcl.simulator.family:TMCL",
-        (
-            "TMCM",
-            "TMCM-1140",
-            "TMCM-1141",
-            "TMCM-1161",
-            "TMCM-1240",
-            "TMCM-1241",
-            "TMCM-1260",
-            "TMCM-1276",
-            "TMCM-3110",
-            "TMCM-6110",
-            "TMCM-6214",
-        ),
-        "multidrop.families.tmcl.simulator.program_run:RUNS",
-    ),
-}
-FAMILIES: Mapping[str, Family] = OnDemand({name: row.record for name, row in TABLE.items()})
+FAMILIES: Mapping[str, Family] = OnDemand(lambda: {name: each.record for name, each in simulated().items()})
 """By name."""
-PROGRAMS: Mapping[str, Programs] = OnDemand({name: row.programs for name, row in TABLE.items() if row.programs})
-"""The runs of program files, by the name of their family."""
-BY_PERSONALITY: Mapping[str, Family] = OnDemand(
-    {personality: row.record for row in TABLE.values() for personality in row.personalities}
+PROGRAMS: Mapping[str, Programs] = OnDemand(
+    lambda: {name: each.programs for name, each in simulated().items() if each.programs}
 )
+"""The runs of program files, by the name of their family."""
+BY_PERSONALITY: Mapping[str, Family] = OnDemand(_personalities)
 
 
 def snapshots_of(family: Family) -> Snapshots:

@@ -28,7 +28,7 @@ class Device(Protocol):
 
 
 class Connection(Protocol):
-    """One client's connection to an Ethernet drive over Modbus/TCP."""
+    """One client's connection to the own port of an Ethernet drive."""
 
     @property
     def closed(self) -> bool:
@@ -70,7 +70,7 @@ class Unit:
 
     `worlds` are those of its axes, by the name that `/sim` gives them; "" where there is only one. `inputs` are the
     numbers of its inputs, `counts` is the end of scale of its analog input. `single_supply`: it has no auxiliary
-    supply. `connect` makes a connection over Modbus/TCP; None: the drive has no Ethernet port.
+    supply. `connect` makes a connection to its own port (`Simulated.own_port`); None: it has none.
     """
 
     device: Device

@@ -144,8 +144,8 @@ class Floor:
         held = _on(words[1], where)
         return lambda now: world.hold(held)
 
-    def modbus(self, bus: str) -> Connection:
-        """Connect over Modbus/TCP to the Ethernet drive of a bus. Raises Diagnostic if there is none.
+    def own_port(self, bus: str) -> Connection:
+        """Connect to the own port of the Ethernet drive of a bus. Raises Diagnostic if there is none.
 
         What comes by it can change the drive: the bus's wire is to `look_again`.
         """
@@ -153,7 +153,7 @@ class Floor:
             if unit.connect is not None:
                 return unit.connect()
         names = " and ".join(name for name, each in BY_PERSONALITY.items() if name in each.ethernet)
-        raise Diagnostic("no drive that serves Modbus", f'bus "{bus}"', f"valid: {names}")
+        raise Diagnostic("no drive with a port of its own", f'bus "{bus}"', f"valid: {names}")
 
     def connectable(self, bus: str) -> bool:
         """Whether a client can connect: not while the Ethernet drive of the bus has no power, or boots."""

@@ -1,1 +1,40 @@
 """Lexium MDrive, Lexium Motion Module and MDrivePlus: MCode on a serial line or TCP, and Modbus/TCP."""
+
+from __future__ import annotations
+
+from multidrop.base.feature import Feature
+from multidrop.dialects.families import Dialect
+from multidrop.dialects.program_files import ProgramFiles
+from multidrop.families.lexium.scheme import Modbus
+from multidrop.simulator.declared import Demo, Simulated
+
+HERE = __name__
+FAMILY = Feature(
+    "lexium",
+    "Lexium MDrive, Lexium Motion Module, MDrivePlus",
+    adds=(
+        Dialect(
+            "mcode",
+            f"{HERE}.host.mcode.family:MCODE",
+            files=ProgramFiles(
+                "MCode",
+                (".mxt", ".txt"),
+                f"{HERE}.manual.program_checker",
+                f"{HERE}.manual.editing",
+                ("mcode", "mxt"),
+                {"lexium": f"{HERE}.manual.conversion"},
+                f"{HERE}.manual.supported:unsupported",
+            ),
+        ),
+        Dialect("modbus", f"{HERE}.host.modbus.family:MODBUS", scheme="modbus"),
+        Simulated(
+            "mcode",
+            f"{HERE}.simulator.family:MCODE",
+            ("LMDOM", "LMDCM", "LMDOE", "LMDCE", "LMM", "MDI", "MDIE", "MDIX"),
+            f"{HERE}.simulator.program_run:RUNS",
+            own_port="modbus",
+        ),
+        Demo(f"{HERE}.simulator"),
+        Modbus(),
+    ),
+)

@@ -1,1 +1,29 @@
 """Arcus PMX-2ED-SA: lines of ASCII with a device number in front, over RS-485 or without a number through a gateway."""
+
+from __future__ import annotations
+
+from multidrop.base.feature import Feature
+from multidrop.dialects.families import Dialect
+from multidrop.dialects.program_files import ProgramFiles
+from multidrop.simulator.declared import Demo, Simulated
+
+HERE = __name__
+FAMILY = Feature(
+    "pmx",
+    "Arcus PMX-2ED-SA",
+    adds=(
+        Dialect(
+            "pmx",
+            f"{HERE}.host.family:PMX",
+            files=ProgramFiles(
+                "A-SCRIPT",
+                (".prg", ".asc"),
+                f"{HERE}.manual.program_file",
+                f"{HERE}.manual.editing",
+                ("ascript", "a-script", "pmx"),
+            ),
+        ),
+        Simulated("pmx", f"{HERE}.simulator.family:PMX", ("PMX",), f"{HERE}.simulator.program_run:RUNS"),
+        Demo(f"{HERE}.simulator"),
+    ),
+)

@@ -1,1 +1,45 @@
 """Trinamic TMCL in direct mode: binary frames of nine bytes between a host and motion modules."""
+
+from __future__ import annotations
+
+from multidrop.base.feature import Feature
+from multidrop.dialects.families import Dialect
+from multidrop.dialects.program_files import ProgramFiles
+from multidrop.simulator.declared import Simulated
+
+HERE = __name__
+FAMILY = Feature(
+    "tmcl",
+    "Trinamic motion modules",
+    adds=(
+        Dialect(
+            "tmcl",
+            f"{HERE}.host.family:TMCL",
+            files=ProgramFiles(
+                "TMCL",
+                (".tmc", ".tmcl"),
+                f"{HERE}.manual.program_file",
+                f"{HERE}.manual.editing",
+                ("tmcl",),
+            ),
+        ),
+        Simulated(
+            "tmcl",
+            f"{HERE}.simulator.family:TMCL",
+            (
+                "TMCM",
+                "TMCM-1140",
+                "TMCM-1141",
+                "TMCM-1161",
+                "TMCM-1240",
+                "TMCM-1241",
+                "TMCM-1260",
+                "TMCM-1276",
+                "TMCM-3110",
+                "TMCM-6110",
+                "TMCM-6214",
+            ),
+            f"{HERE}.simulator.program_run:RUNS",
+        ),
+    ),
+)

@@ -22,7 +22,7 @@ from multidrop.dialects.program_files import Problem
 from multidrop.features.lsp import replies
 from multidrop.features.lsp.replies import DELAY, Document, Documents, Positions
 from multidrop.shell.streams.stdout import shortened
-from multidrop.simulator.families import TABLE
+from multidrop.simulator.declared import simulated
 
 TRIGGERS = (" ", ",", "=")
 Found = list[types.Location]
@@ -137,7 +137,7 @@ class Server:
         product = options.get("personality") if isinstance(options, dict) else None
         if product is None:
             return
-        known = [each for row in TABLE.values() if row.programs for each in row.personalities]
+        known = [each for row in simulated().values() if row.programs for each in row.personalities]
         if isinstance(product, str) and product.upper() in known:
             self.documents.check_for(product.upper())
         else:

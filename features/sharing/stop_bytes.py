@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 from multidrop.base.errors import Diagnostic
 from multidrop.dialects import StopPiece
-from multidrop.dialects.families import DEFAULT, FAMILIES, TABLE
+from multidrop.dialects.families import DEFAULT, FAMILIES, dialects
 from multidrop.drives.half_line import CR, LF, LONGEST
 
 ENDS = b"\r\n"
@@ -152,7 +152,7 @@ def stop_bytes(family: str, drives: Sequence[str] = (), party: bool | None = Non
 
     `party`: whether the drives use names (MCode); None: not known, unless several drives are.
     """
-    names = [family] if family else [name for name, row in TABLE.items() if not row.scheme]
+    names = [family] if family else [name for name, row in dialects().items() if not row.scheme]
     shared = [each for name in names if (each := FAMILIES[name]).stop_bytes is not None]
     if not shared:
         valid = "an Ethernet drive takes several clients itself"

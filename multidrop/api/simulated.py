@@ -9,18 +9,16 @@ from types import TracebackType
 
 from multidrop.api.threads import LoopThread
 from multidrop.base.errors import Diagnostic
-from multidrop.dialects.families import TABLE
 from multidrop.shell import configuration
 from multidrop.simulator import cells
 from multidrop.simulator.cell.spec import BusSpec, Cell, Endpoint
+from multidrop.simulator.declared import own_ports
 from multidrop.simulator.floor import Floor
 from multidrop.simulator.serving.endpoints import Served, serve_bus
 from multidrop.simulator.serving.running import RunningFloor
 
 HOST = "127.0.0.1"
 PTY = "pty"
-SCHEMES = tuple(row.scheme for row in TABLE.values() if row.scheme)
-"""The schemes of families with a port of their own, which an Ethernet drive has beside TCP."""
 
 
 class SimulatedCell:
@@ -108,7 +106,7 @@ def _read(file: str | os.PathLike[str], text: str) -> Cell:
 
 def _everywhere(bus: BusSpec, ethernet: bool) -> BusSpec:
     """Serve a bus in all ways that it can have."""
-    schemes = ["tcp", *(SCHEMES if ethernet else []), *([PTY] if sys.platform != "win32" else [])]
+    schemes = ["tcp", *(own_ports() if ethernet else []), *([PTY] if sys.platform != "win32" else [])]
     return bus._replace(serve=tuple(Endpoint(f"{each}:", each, HOST if each != PTY else "") for each in schemes))
 
 

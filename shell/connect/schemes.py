@@ -97,15 +97,6 @@ class Udp(Scheme):
         return await open_udp(connection.host, connection.port)
 
 
-class Modbus(Tcp):
-    """The registers of a drive with Ethernet, over a stream of bytes."""
-
-    name, prefix, example = "modbus", "modbus://", "modbus://HOST:502"
-    meaning = "an Ethernet drive's registers"
-    port = 502
-    turns = 0.0
-
-
 class Rfc2217(Scheme):
     """A serial port of a terminal server."""
 
@@ -210,7 +201,7 @@ def _far_port(connection: Connection) -> FarPort:
     return FarPort(connection.host, connection.target, connection.user, connection.port)
 
 
-CORE: Mapping[str, Scheme] = {each.name: each for each in (Serial(), Tcp(), Udp(), Modbus(), Rfc2217(), Ssh(), Sim())}
+CORE: Mapping[str, Scheme] = {each.name: each for each in (Serial(), Tcp(), Udp(), Rfc2217(), Ssh(), Sim())}
 """The schemes of the core, by name."""
 SAVED = "the name of a saved connection"
 

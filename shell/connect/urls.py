@@ -11,20 +11,17 @@ from dataclasses import replace
 from typing import Any
 from urllib.parse import unquote
 
+from multidrop.base import registry
 from multidrop.base.errors import Diagnostic
 from multidrop.base.text import acts_first, whole
 from multidrop.dialects import Hints
-from multidrop.dialects.families import TABLE
+from multidrop.dialects.families import Dialect, dialects
 from multidrop.shell.configuration import SavedConnection
 from multidrop.shell.connect.scheme import Connection, Scheme
 from multidrop.shell.connect.schemes import CORE, named, no_line, sentence
 from multidrop.shell.secrets import holds_password, url_without_secrets, without_secrets
 from multidrop.transports.ssh import WAYS
 
-DIALECTS = tuple(name for name, row in TABLE.items() if not row.scheme)
-"""The families that `dialect=` names."""
-IMPLIED = {row.scheme: name for name, row in TABLE.items() if row.scheme}
-"""The families that a scheme implies."""
 OF_A_LINE = ("family", "drives", "baud", "party", "checksum", "em", "local_echo", "addressed")
 """What is not to be given of a connection to one drive."""
 
@@ -84,18 +81,30 @@ def _scheme(text: str) -> tuple[Scheme, str]:
     raise Diagnostic("neither a URL nor a saved connection", text or "empty URL", f"valid: {sentence()}")
 
 
-def _choice(*allowed: str) -> tuple[Callable[[str], Any], str]:
-    return (lambda value: value if value in allowed else None), " or ".join(allowed)
+def _choice(*allowed: str) -> tuple[Callable[[str], Any], Callable[[], str]]:
+    return (lambda value: value if value in allowed else None), lambda: " or ".join(allowed)
 
 
-def _number(low: float, high: float, kind: type) -> tuple[Callable[[str], Any], str]:
+def _chosen() -> list[str]:
+    """The languages that `dialect=` names."""
+    return [name for name, each in dialects().items() if not each.scheme]
+
+
+def _dialect(value: str) -> str | None:
+    """Read the name of a language, which a family by others may speak. Raises Diagnostic where its family is gone."""
+    if value not in dialects():
+        [*registry.answering(Dialect, f"dialect={value}")]
+    return value if value in _chosen() else None
+
+
+def _number(low: float, high: float, kind: type) -> tuple[Callable[[str], Any], Callable[[], str]]:
     def read(value: str) -> Any:
         if kind is int:
             return whole(value, int(low), int(high))
         number = float(value) if re.fullmatch(r"\d+(\.\d+)?", value, re.ASCII) else -1.0
         return number if low <= number <= high else None
 
-    return read, f"a number from {low} to {high}"
+    return read, lambda: f"a number from {low} to {high}"
 
 
 def _names(value: str) -> Any:
@@ -104,9 +113,9 @@ def _names(value: str) -> Any:
     return names if good and len(set(names)) == len(names) else None
 
 
-KEYS: dict[str, tuple[str, Callable[[str], Any], str]] = {
-    "dialect": ("family", *_choice(*DIALECTS)),
-    "drives": ("drives", _names, "different names of one to three characters, as in a,b,c"),
+KEYS: dict[str, tuple[str, Callable[[str], Any], Callable[[], str]]] = {
+    "dialect": ("family", _dialect, lambda: " or ".join(_chosen())),
+    "drives": ("drives", _names, lambda: "different names of one to three characters, as in a,b,c"),
     "baud": ("baud", *_number(300, 1_000_000, int)),
     "party": ("party", *_choice("0", "1")),
     "checksum": ("checksum", *_number(0, 2, int)),
@@ -138,13 +147,13 @@ def _with_query(connection: Connection, query: str) -> Connection:
         found = read(unquote(value))
         if found is None:
             what = f"no {key} {value}" if value else f"no value for {key}"
-            raise Diagnostic(what, connection.text, f"valid: {allowed}")
+            raise Diagnostic(what, connection.text, f"valid: {allowed()}")
         values[name] = CONVERT.get(name, lambda same: same)(found)
     if not values.get("addressed", True) and len(values.get("drives", ())) > 1:
         raise Diagnostic("address=none allows one drive only", connection.text, "drop one of the keys")
     if "relay" in values and not connection.scheme.relayed:
         raise Diagnostic("relay= is valid only with ssh://", connection.text, "drop relay=")
-    if own := IMPLIED.get(connection.scheme.name):
+    if own := next((name for name, each in dialects().items() if each.scheme == connection.scheme.name), ""):
         if "family" in values:
             raise Diagnostic(f"dialect= is not valid with {connection.scheme.prefix}", connection.text, "drop dialect=")
         values["family"] = own

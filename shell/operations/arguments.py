@@ -158,13 +158,14 @@ class _Checked:
         return any(personality == each for each in self)
 
     def __iter__(self) -> Iterator[str]:
-        from multidrop.simulator.families import PROGRAMS, TABLE
+        from multidrop.simulator.declared import simulated
+        from multidrop.simulator.families import PROGRAMS
 
         return (
             personality
             for name, programs in PROGRAMS.items()
             if programs.refusals is not None
-            for personality in TABLE[name].personalities
+            for personality in simulated()[name].personalities
         )
 
 
@@ -195,9 +196,10 @@ def edited_personality() -> Mapping[str, Any]:
 def tested_personality() -> Mapping[str, Any]:
     """Declare the simulated drive of a program test."""
     from multidrop.simulator.cell.spec import DriveSpec
-    from multidrop.simulator.families import PROGRAMS, TABLE
+    from multidrop.simulator.declared import simulated
+    from multidrop.simulator.families import PROGRAMS
 
-    tested = tuple(personality for name in PROGRAMS for personality in TABLE[name].personalities)
+    tested = tuple(personality for name in PROGRAMS for personality in simulated()[name].personalities)
     about = f"%(choices)s (default: the cell's, or {DriveSpec().personality})"
     return {"help": about, "type": str.upper, "choices": tested}
 

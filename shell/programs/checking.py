@@ -17,7 +17,8 @@ from multidrop.base.files import encoded_program_of, program_text_of, split_line
 from multidrop.dialects.families import correct_in, program_language_of, program_languages
 from multidrop.dialects.program_files import Problem, errors, in_order, refuse
 from multidrop.simulator.cell.spec import DriveSpec
-from multidrop.simulator.families import PROGRAMS, TABLE
+from multidrop.simulator.declared import simulated
+from multidrop.simulator.families import PROGRAMS
 
 if TYPE_CHECKING:
     pass
@@ -85,14 +86,14 @@ def examine_text(text: str, file: str, personality: str, language: str = "", enc
 
 def personality_of(language: str, product: str) -> str:
     """Return the product if its drives run programs of that language, else the usual one of those that do."""
-    known = TABLE[language].personalities
+    known = simulated()[language].personalities
     return product if product in known else USUAL if USUAL in known else known[0]
 
 
 def ending_of(product: str) -> str:
     """Return the usual ending of program files for a product; that of the usual language where it has none."""
     known = program_languages()
-    names = [name for name, row in TABLE.items() if name in known and product.startswith(row.personalities)]
+    names = [name for name, row in simulated().items() if name in known and product.startswith(row.personalities)]
     return known[(names or list(known))[0]].endings[0]
 
 

@@ -22,7 +22,8 @@ from multidrop.shell.operations.conditions import simulated_cell
 from multidrop.shell.operations.table import VERBS
 from multidrop.shell.operations.usage import following, narrowed
 from multidrop.shell.workspace import Workspace
-from multidrop.simulator.families import PROGRAMS, TABLE
+from multidrop.simulator.declared import simulated
+from multidrop.simulator.families import PROGRAMS
 
 if TYPE_CHECKING:
     from multidrop.dialects.family import Language
@@ -177,7 +178,7 @@ def offered(workspace: Workspace, placeholder: str, word: str) -> Found:
                 found = workspace.macros.names() if what == "MACRO" else workspace.macros.pages()
                 yield from [(name, "macro" if what == "MACRO" else "page of keys") for name in found]
         case "PERSONALITY":
-            yield from ((name, family) for family in PROGRAMS for name in TABLE[family].personalities)
+            yield from ((name, family) for family in PROGRAMS for name in simulated()[family].personalities)
         case "URL":
             yield from ((name, each.url) for name, each in workspace.settings.connections.items())
             yield from ((form.prefix, form.meaning) for form in schemes().values())

@@ -10,7 +10,7 @@ from typing import Any
 from multidrop.base.errors import Diagnostic, Inexpressible
 from multidrop.base.on_demand import imported
 from multidrop.dialects import Procedure
-from multidrop.dialects.families import FAMILIES, TABLE
+from multidrop.dialects.families import FAMILIES, dialects
 from multidrop.dialects.family import Registers
 from multidrop.drives.drive import Drive
 from multidrop.shell import motions, plot_targets
@@ -143,7 +143,7 @@ def _registered(call: Call) -> tuple[Drive, Registers[Any]]:
     """The selected drive and its registers. Raises Inexpressible if its family has none."""
     drive = call.drive()
     if (registers := drive.family.registers) is None:
-        having = {name: TABLE[name].scheme for name, family in FAMILIES.items() if family.registers is not None}
+        having = {name: dialects()[name].scheme for name, family in FAMILIES.items() if family.registers is not None}
         opened = " or ".join(f"{scheme}://HOST" if scheme else f"dialect={name}" for name, scheme in having.items())
         where = call.session.display_name(drive)
         raise Inexpressible(f"{where}: no registers; {call.verb.name} is valid on a bus opened with {opened}")

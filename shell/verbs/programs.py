@@ -18,7 +18,8 @@ from multidrop.shell.programs import debugging, transfers
 from multidrop.shell.programs.checking import examine
 from multidrop.shell.programs.debugging import LEFT, Debugger
 from multidrop.shell.verbs.call import Call
-from multidrop.simulator.families import PROGRAMS, TABLE
+from multidrop.simulator.declared import simulated
+from multidrop.simulator.families import PROGRAMS
 
 FLAGS = ("--save", "--only-changed", "--no-verify")
 
@@ -95,7 +96,7 @@ async def download(call: Call) -> None:
 async def check(call: Call) -> None:
     file, *personality = call.words()
     wanted, language = "".join(personality).upper(), program_language_of(file)
-    valid = TABLE[language].personalities
+    valid = simulated()[language].personalities
     if wanted and wanted not in valid:
         raise Diagnostic(f"no personality {wanted}", call.verb.name, f"valid for {file}: {', '.join(valid)}")
     selected = call.session.selected

@@ -12,6 +12,7 @@ from multidrop.base.text import visible
 from multidrop.dialects.units import PLACES, Scale
 from multidrop.dialects.values import Reading, same
 from multidrop.simulator.cell.drive_keys import LONGEST
+from multidrop.simulator.declared import own_ports
 
 HEAD = "A machine as it was read. Open it with sim:FILE; `multidrop snapshot apply FILE URL` puts a drive onto a unit."
 
@@ -91,7 +92,7 @@ def _bus(bus: BusText) -> Any:
     baud = bus.baud or next((each.baud for each in bus.drives if each.baud), 0)
     table = tomlkit.table()
     table.add("name", bus.name)
-    table.add("serve", [ANY_PORT, MODBUS] if ethernet else ["pty:", ANY_PORT])
+    table.add("serve", [ANY_PORT, *map(ANY.format, own_ports())] if ethernet else ["pty:", ANY_PORT])
     if baud and not ethernet:
         table.add("baud", baud)
     for text in bus.missing:
@@ -104,7 +105,8 @@ def _bus(bus: BusText) -> Any:
     return table
 
 
-ANY_PORT, MODBUS = "tcp://127.0.0.1:0", "modbus://127.0.0.1:0"
+ANY = "{}://127.0.0.1:0"
+ANY_PORT = ANY.format("tcp")
 
 
 def _drive(drive: DriveText) -> Any:

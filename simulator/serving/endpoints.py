@@ -1,7 +1,7 @@
-"""The ways in to a running floor from outside, as the cell file's `serve` says: pseudo-terminals, TCP, UDP, Modbus/TCP.
+"""The ways in to a running floor from outside, as the cell file's `serve` says: pseudo-terminals, TCP, UDP.
 
-Every endpoint of a bus hears the whole wire, and so does every client of an endpoint. Not so over Modbus/TCP: there
-each client has a connection of its own to the drive, and hears the answers to its own requests.
+Every endpoint of a bus hears the whole wire, and so does every client of an endpoint. Not so at a drive's own port
+(`Simulated.own_port`): there each client hears the answers to its own requests.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ from typing import cast
 from multidrop.base.errors import Diagnostic
 from multidrop.simulator.cell.endpoint_kinds import kind_of
 from multidrop.simulator.cell.spec import BusSpec, Endpoint
+from multidrop.simulator.declared import own_ports
 from multidrop.simulator.serving.running import PIECE, Client, InputQueue, Listener, RunningFloor
 
 BACKLOG = 1 << 20
@@ -28,7 +29,7 @@ UDP_CLIENTS = 4
 UDP_WAITING = 1024
 """Bytes of datagrams that wait to go out when a further one is dropped."""
 MOST_LATE = 64
-"""Delayed replies over Modbus/TCP from which on no more requests are read."""
+"""Delayed replies to a client of a drive's own port from which on no more requests are read."""
 NO_TERMINALS = "Windows has no pseudo-terminals"
 ESTABLISHED = 1
 """Linux's state of a connection that neither side has ended."""
@@ -92,7 +93,7 @@ class TcpServer(Listener):
     def __init__(self, floor: RunningFloor, bus: str, endpoint: Endpoint) -> None:
         self._floor, self._bus = floor, bus
         self._host, self.port = endpoint.host, endpoint.port
-        self._kind = ModbusClient if endpoint.scheme == "modbus" else TcpClient
+        self._kind = MessageClient if endpoint.scheme in own_ports() else TcpClient
         self._clients: set[TcpClient] = set()
         self._server: asyncio.Server | None = None
         self._opening: asyncio.Task[None] | None = None
@@ -209,17 +210,17 @@ class TcpClient(asyncio.BufferedProtocol, Client):
             self._transport.close()
 
 
-class ModbusClient(TcpClient):
-    """One client's connection over Modbus/TCP: it receives the replies to its own requests."""
+class MessageClient(TcpClient):
+    """One client's connection to a drive's own port: it receives the replies to its own requests."""
 
     def __init__(self, floor: RunningFloor, bus: str, clients: set[TcpClient]) -> None:
         super().__init__(floor, bus, clients)
-        self._port = floor.floor.modbus(bus)
+        self._port = floor.floor.own_port(bus)
         self._delays = floor.floor.delays(bus)
         self._late: deque[bytes] = deque()
 
     def take(self, data: bytes) -> None:
-        """Reply at once, or as late as the bus's faults say; disconnect a client that does not speak Modbus."""
+        """Reply at once, or as late as the bus's faults say; disconnect a client that does not speak the language."""
         answer = self._floor.exchange(self._bus, self._port, data)
         delay = next(self._delays)
         if delay and answer:
@@ -243,7 +244,7 @@ class ModbusClient(TcpClient):
             self.unplugged()
 
     def receive(self, data: bytes) -> None:
-        """Nothing to do: MCode is not for this client."""
+        """Nothing to do: what is on the line is not for this client."""
 
 
 def _ended(transport: asyncio.Transport) -> bool:

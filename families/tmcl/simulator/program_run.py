@@ -41,10 +41,10 @@ class ProgramRun:
     """One file on one module. Raises Diagnostic for a module that refuses its settings, or holds fewer lines."""
 
     def __init__(self, spec: DriveSpec, made: Assembled, name: str, source: Sequence[str]) -> None:
-        from multidrop.simulator.families import TABLE
+        from multidrop.simulator.declared import simulated
 
-        if spec.personality not in TABLE["tmcl"].personalities:
-            valid = ", ".join(TABLE["tmcl"].personalities)
+        if spec.personality not in simulated()["tmcl"].personalities:
+            valid = ", ".join(simulated()["tmcl"].personalities)
             raise Diagnostic(f"a {spec.personality} does not run TMCL", name, f"valid: {valid}")
         self._name, self._made, self._text = name, made, source
         # without a cell it has the name of another drive

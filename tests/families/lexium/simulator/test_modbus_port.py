@@ -22,7 +22,7 @@ CELL = '[[bus]]\nname = "eth"\n[[bus.drive]]\npersonality = "{}"\n'
 
 def drive(personality: str = "LMDCE") -> tuple[ModbusPort, MCodeDevice, Floor]:
     floor = Floor(read(CELL.format(personality)))
-    return floor.modbus("eth"), floor.drives[0].device, floor
+    return floor.own_port("eth"), floor.drives[0].device, floor
 
 
 def message(pdu: str, transaction: str = "0001", unit: str = "01") -> bytes:
@@ -281,7 +281,7 @@ def test_the_longest_message_there_can_be_is_heard():
 
 def test_clients_do_not_hear_each_others_halves():
     one, _, floor = drive()
-    other = floor.modbus("eth")
+    other = floor.own_port("eth")
     request = message("03 0029 0001")
     assert one.receive(request[:6], 0.0) == b""
     assert other.receive(request, 0.0) == message("03 02 0005")

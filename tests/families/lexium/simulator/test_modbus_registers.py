@@ -27,7 +27,7 @@ class Drive:
     def __init__(self, personality: str = "LMDCE") -> None:
         cell = f'[[bus]]\nname = "eth"\n[[bus.drive]]\npersonality = "{personality}"\n'
         self.floor = Floor(read(cell))
-        self.port = self.floor.modbus("eth")
+        self.port = self.floor.own_port("eth")
         self.device = self.floor.drives[0].device
         self.now = 0.0
 
