@@ -10,7 +10,7 @@ class DriveError(Exception):
 
 
 class Refused(DriveError):
-    """The drive refused. `code` is its own error number (MCode: section 10), None where it gives none.
+    """The drive refused. `code` is its own error number, None where it gives none.
 
     Not `certain`: the error may be another's, and the line may have been executed.
     """

@@ -1,7 +1,7 @@
 r"""What the drives hold of a line that has begun and not ended, as far as the bytes show that were written to them.
 
 Theory of operation. Another writer's first end of a line would execute what the drives hold, so it is made harmless
-before that, whatever it says. A drive of MCode ends a line with CR, or in party mode (PY=1) with LF. There a CR only
+before that, whatever it says. A drive may end a line with CR or, in party mode, with LF. There a CR only
 separates commands, which wait for the LF; without party mode a LF is no part of a line. Where the mode is not known,
 CR LF ends a line for certain, and so does either of them once a drive has replied after it. A reply proves nothing
 while the line may belong to an end of the other kind shortly before.
@@ -22,7 +22,7 @@ LONGEST = 80
 REPLIED = 0.3
 """Seconds without a reply after which a reply is none to that end of a line."""
 REPLY = re.compile(rb"\r\n|[\x06\x15]")
-"""What a reply of MCode has, and the echo of a line that waits has not."""
+"""What a reply has, and the echo of a line that waits has not."""
 _LINES = re.compile(b"[\r\n]")
 
 

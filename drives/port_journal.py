@@ -8,7 +8,7 @@ from multidrop.dialects import DriveState, Owed
 from multidrop.dialects.state import Remembered
 
 GLOBAL = ("*", "^")
-"""Addresses that several drives hear: all of them, and all that are queued (MCode QD=1)."""
+"""Addresses that several drives hear: all of them, and all that are queued ."""
 
 
 class Keeper:

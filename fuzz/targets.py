@@ -151,7 +151,7 @@ def modbus_port(data: bytes) -> None:
 def usb(data: bytes) -> None:
     """The messages of USB/IP, of both sides; then requests and packets to the USB side of a simulated controller."""
     from multidrop.features.usb.device import sides
-    from multidrop.features.usb.performax import PACKET
+    from multidrop.features.usb.interface import PACKET
     from multidrop.features.usb.usbip import Malformed, Transfers
 
     for answers in (False, True):

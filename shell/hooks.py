@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from multidrop.base import registry
 from multidrop.base.errors import Diagnostic
 from multidrop.base.feature import Kinds
-from multidrop.shell.operations.operation import TYPE_RAISES
+from multidrop.shell.operations.operation import TYPE_RAISES, Examples
 
 if TYPE_CHECKING:
     from multidrop.shell.session import Session
@@ -162,5 +162,6 @@ def around(app: App, chosen: argparse.Namespace) -> Iterator[None]:
 
 
 def examples(command: str) -> list[str]:
-    """The examples that features add to those of a command."""
-    return [example for each in options(command) for example in each.examples]
+    """The examples that features and families add to those of a command."""
+    found = [example for each in options(command) for example in each.examples]
+    return [*found, *(line for each in registry.added(Examples) if each.command == command for line in each.lines)]

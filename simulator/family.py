@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from types import MappingProxyType
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 from multidrop.dialects.family import Motion
 from multidrop.dialects.values import Snapshot, Value
@@ -64,6 +64,15 @@ class Shadow:
     """The shafts of the axes whose switches are no inputs, by the name of the axis."""
 
 
+class UsbSide(NamedTuple):
+    """The lines that a simulated drive takes on its USB interface (`dialects.usb.UsbModule`)."""
+
+    serial: Callable[[], str]
+    """Its serial number there, as its settings have it now."""
+    execute: Callable[[str, float], str]
+    """Carry out a line at a time; return the reply."""
+
+
 @dataclass(frozen=True)
 class Unit:
     """A simulated drive with its port and its surroundings.
@@ -82,6 +91,8 @@ class Unit:
     connect: Callable[[], Connection] | None = None
     shadow: Shadow | None = None
     """None: it cannot run beside a real drive."""
+    usb: UsbSide | None = None
+    """None: it has no USB."""
 
 
 @dataclass(frozen=True)

@@ -6,6 +6,7 @@ from multidrop.base.feature import Feature
 from multidrop.dialects.families import Dialect
 from multidrop.dialects.program_files import ProgramFiles
 from multidrop.families.lexium.scheme import Modbus
+from multidrop.shell.operations.operation import Examples
 from multidrop.simulator.declared import Demo, Simulated
 
 HERE = __name__
@@ -36,5 +37,6 @@ FAMILY = Feature(
         ),
         Demo(f"{HERE}.simulator"),
         Modbus(),
+        Examples("rescue", ("rescue COM3 --baud 9600 --dialect mcode",)),
     ),
 )

@@ -5,6 +5,8 @@ from __future__ import annotations
 from multidrop.base.feature import Feature
 from multidrop.dialects.families import Dialect
 from multidrop.dialects.program_files import ProgramFiles
+from multidrop.dialects.usb import UsbModule
+from multidrop.shell.operations.operation import Examples
 from multidrop.simulator.declared import Demo, Simulated
 
 HERE = __name__
@@ -24,6 +26,10 @@ FAMILY = Feature(
             ),
         ),
         Simulated("pmx", f"{HERE}.simulator.family:PMX", ("PMX",), f"{HERE}.simulator.program_run:RUNS"),
+        UsbModule("pmx", "a PMX controller", "Performax controller", 0x1589, 0xA101, ("Arcus", "Performax USB")),
         Demo(f"{HERE}.simulator"),
+        Examples("program list", ("program list 'sim:#pmx'",)),
+        Examples("poll", ("poll 'sim:#pmx' PX --every 0.5 --rows 10",)),
+        Examples("help", ("help EX --dialect pmx",)),
     ),
 )

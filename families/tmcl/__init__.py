@@ -5,6 +5,7 @@ from __future__ import annotations
 from multidrop.base.feature import Feature
 from multidrop.dialects.families import Dialect
 from multidrop.dialects.program_files import ProgramFiles
+from multidrop.shell.operations.operation import Examples
 from multidrop.simulator.declared import Simulated
 
 HERE = __name__
@@ -41,5 +42,6 @@ FAMILY = Feature(
             ),
             f"{HERE}.simulator.program_run:RUNS",
         ),
+        Examples("scan", ("scan /dev/ttyUSB0 --dialect tmcl --all",)),
     ),
 )

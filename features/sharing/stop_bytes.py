@@ -150,7 +150,7 @@ class OwedStop:
 def stop_bytes(family: str, drives: Sequence[str] = (), party: bool | None = None) -> StopBytes:
     """The stops of a family's lines; empty: of any language that is text. `drives`: those known. Raises Diagnostic.
 
-    `party`: whether the drives use names (MCode); None: not known, unless several drives are.
+    `party`: whether the drives use names; None: not known, unless several drives are.
     """
     names = [family] if family else [name for name, row in dialects().items() if not row.scheme]
     shared = [each for name in names if (each := FAMILIES[name]).stop_bytes is not None]

@@ -293,7 +293,7 @@ class Exchange:
     def _stop(self, stop: bytes, others: bool, now: float) -> None:
         """Stop, and drop the bytes that wait for their client's turn. `others`: not by who has begun the line.
 
-        Within a line of another client it first makes that line harmless: a PMX would take both for one command.
+        Within a line of another client it first makes that line harmless: a drive may take both for one command.
         """
         waited = {number: each.overtaken() for number, each in self.clients.items()}
         if others and self.writer is not None:

@@ -198,7 +198,7 @@ def _odd(reading: Reading) -> bool:
         return False
     joints = (each for segment in profile.segments for each in (segment.start, segment.end))
     speeds = [abs(profile.velocity(min(max(each, at - NEAR), at + NEAR))) / count for each in (-inf, *joints, inf)]
-    speed = abs(reading.velocity)  # a PMX says no direction
+    speed = abs(reading.velocity)  # not every drive says the direction
     edge = 1 + UNEVEN * speed
     return not min(speeds) - edge <= speed <= max(speeds) + edge
 

@@ -1,4 +1,4 @@
-"""The Performax controllers on the USB of this machine, found through libusb (the extra `usb`).
+"""The controllers on the USB of this machine, found through libusb (the extra `usb`).
 
 A controller is known by its device number and by the socket that it is plugged into: after it was unplugged, another
 one in its place is not taken for it.
@@ -16,7 +16,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-from multidrop.features.usb import performax
+from multidrop.features.usb import interface
 from multidrop.transports import Unreachable
 from multidrop.transports.port_users import holder
 from multidrop.transports.serial_ports import PortInfo, natural
@@ -27,7 +27,7 @@ UNREAD = "unread"
 """In place of a device number that cannot be read."""
 _ACCESS, _NO_DEVICE, _BUSY, _TIMED_OUT, _STALL = -3, -4, -6, -7, -9
 """libusb's errors."""
-STATUS = {_NO_DEVICE: performax.GONE, _TIMED_OUT: performax.TIMEOUT, _STALL: performax.STALLED}
+STATUS = {_NO_DEVICE: interface.GONE, _TIMED_OUT: interface.TIMEOUT, _STALL: interface.STALLED}
 OTHER = -5
 """The status of any other error."""
 ASKING = 100
@@ -69,7 +69,7 @@ def library() -> ModuleType:
 def controllers(usb1: ModuleType, context: Any) -> list[Found]:
     found = []
     for device in context.getDeviceIterator(skip_on_error=True):
-        if (device.getVendorID(), device.getProductID()) == (performax.VENDOR, performax.PRODUCT):
+        if (device.getVendorID(), device.getProductID()) == (interface.VENDOR, interface.PRODUCT):
             bus, ports = device.getBusNumber(), ".".join(map(str, device.getPortNumberList())) or "0"
             path = f"/dev/bus/usb/{bus:03}/{device.getDeviceAddress():03}"
             try:
@@ -85,13 +85,13 @@ def _asked(usb1: ModuleType, device: Any) -> str:
     handle = device.open()
     try:
         handle.claimInterface(0)
-        for value in (performax.Control.OPEN, performax.Control.FLUSH):
-            handle.controlWrite(performax.REQUEST_TYPE, performax.REQUEST, value, 0, b"", ASKING)
+        for value in (interface.Control.OPEN, interface.Control.FLUSH):
+            handle.controlWrite(interface.REQUEST_TYPE, interface.REQUEST, value, 0, b"", ASKING)
         with contextlib.suppress(usb1.USBErrorTimeout):
-            handle.bulkRead(performax.IN, performax.PACKET, ASKING)  # what an earlier session has left
-        handle.bulkWrite(performax.OUT, b"DN\0", ASKING)
-        reply = bytes(handle.bulkRead(performax.IN, performax.PACKET, ASKING)).partition(b"\0")[0].decode("latin-1")
-        handle.controlWrite(performax.REQUEST_TYPE, performax.REQUEST, performax.Control.CLOSE, 0, b"", ASKING)
+            handle.bulkRead(interface.IN, interface.PACKET, ASKING)  # what an earlier session has left
+        handle.bulkWrite(interface.OUT, b"DN\0", ASKING)
+        reply = bytes(handle.bulkRead(interface.IN, interface.PACKET, ASKING)).partition(b"\0")[0].decode("latin-1")
+        handle.controlWrite(interface.REQUEST_TYPE, interface.REQUEST, interface.Control.CLOSE, 0, b"", ASKING)
         return reply if re.fullmatch(r"\w+", reply, re.ASCII) else UNREAD
     finally:
         handle.close()
@@ -114,7 +114,7 @@ def ports() -> list[PortInfo]:
     except Unreachable:
         found = []
     return [
-        PortInfo(each.url, description=permission() if each.number == UNREAD else "Performax controller")
+        PortInfo(each.url, description=permission() if each.number == UNREAD else interface.MODULE.module)
         for each in found
     ]
 

@@ -1,4 +1,4 @@
-"""The USB side of a simulated PMX controller: the descriptors, requests and packets of a Performax module.
+"""The USB side of a simulated controller: its descriptors, requests and packets.
 
 Source: manual 6.1 (64 characters each way; a reply that was not read comes first, 6.1.3) and 7 (DN is the identity).
 Class, speed and strings are assumed. It hears its own traffic, never the wire. Bytes come in, bytes go out; no clock.
@@ -11,8 +11,19 @@ from collections import deque
 from dataclasses import dataclass, field
 from weakref import WeakKeyDictionary
 
-from multidrop.families.pmx.simulator.device import PmxDevice
-from multidrop.features.usb.performax import IN, OUT, PACKET, PRODUCT, REQUEST, REQUEST_TYPE, STALLED, VENDOR, Control
+from multidrop.features.usb.interface import (
+    IN,
+    MODULE,
+    OUT,
+    PACKET,
+    PRODUCT,
+    REQUEST,
+    REQUEST_TYPE,
+    STALLED,
+    VENDOR,
+    Control,
+)
+from multidrop.simulator.family import Device, UsbSide
 from multidrop.simulator.floor import Floor
 
 HELD = 16
@@ -31,7 +42,8 @@ _CONFIGURATION = struct.pack("<BBHBBBBB", 9, CONFIGURATION, 9 + len(_BODY), 1, 1
 class UsbController:
     """One controller as a USB device."""
 
-    device: PmxDevice
+    device: Device
+    pipe: UsbSide
     replies: deque[bytes] = field(default_factory=lambda: deque(maxlen=HELD))
     """Replies that the host has not read."""
     _configured: int = 1
@@ -49,7 +61,7 @@ class UsbController:
         """Take a packet: one command up to its NUL. The reply waits to be read."""
         text, _, _ = data.partition(b"\0")
         if text:
-            reply = self.device.execute(text.decode("latin-1"), now).encode("latin-1")
+            reply = self.pipe.execute(text.decode("latin-1"), now).encode("latin-1")
             self.replies.append((reply[: PACKET - 1] + b"\0").ljust(PACKET, b"\0"))
         return b""
 
@@ -77,8 +89,8 @@ class UsbController:
         return STALLED, b""
 
     def _descriptor(self, kind: int, index: int) -> bytes:
-        number = f"2ED{self.device.controller.settings.number}"
-        texts = {1: "Arcus", 2: "Performax USB", 3: number}
+        maker, product = MODULE.texts
+        texts = {1: maker, 2: product, 3: self.pipe.serial()}
         if kind == DEVICE:
             return _DEVICE
         if kind == CONFIGURATION and index == 0:
@@ -96,6 +108,6 @@ def sides(floor: Floor, bus: str) -> list[UsbController]:
     """The USB sides of the controllers of a bus, in their order: the same ones for everyone who asks."""
     buses = _SIDES.setdefault(floor, {})
     if bus not in buses:
-        devices = [each.device for each in floor.drives if each.bus == bus]
-        buses[bus] = [UsbController(each) for each in devices if isinstance(each, PmxDevice)]
+        units = [each.unit for each in floor.drives if each.bus == bus]
+        buses[bus] = [UsbController(each.device, each.usb) for each in units if each.usb is not None]
     return buses[bus]

@@ -14,7 +14,7 @@ from typing import cast
 from urllib.parse import urlsplit
 
 from multidrop.features.usb.device import UsbController, sides
-from multidrop.features.usb.performax import CANCELLED, IN, OUT, PACKET, STALLED
+from multidrop.features.usb.interface import CANCELLED, IN, OUT, PACKET, STALLED
 from multidrop.features.usb.usbip import (
     BUS_ID,
     INTERFACE,

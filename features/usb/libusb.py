@@ -11,7 +11,7 @@ import contextlib
 import threading
 from typing import Any
 
-from multidrop.features.usb import performax
+from multidrop.features.usb import interface
 from multidrop.features.usb.controllers import ASKING, OTHER, STATUS, chosen, controllers, library, refusal
 from multidrop.features.usb.pipe import Broken, Done, TransferFailed, UsbPipe, open_usb
 from multidrop.transports import Unreachable
@@ -60,19 +60,19 @@ class LibusbCarrier:
         self._thread = threading.Thread(target=self._watch, name=f"{self.name} events", daemon=True)
         self._thread.start()
 
-    def control(self, value: performax.Control) -> int:
-        return self._begin("setControl", performax.REQUEST_TYPE, performax.REQUEST, value, 0, b"")
+    def control(self, value: interface.Control) -> int:
+        return self._begin("setControl", interface.REQUEST_TYPE, interface.REQUEST, value, 0, b"")
 
     def send(self, data: bytes) -> int:
-        return self._begin("setBulk", performax.OUT, data)
+        return self._begin("setBulk", interface.OUT, data)
 
     def receive(self) -> int:
-        return self._begin("setBulk", performax.IN, performax.PACKET)
+        return self._begin("setBulk", interface.IN, interface.PACKET)
 
     def _begin(self, kind: str, *arguments: object) -> int:
         with self._guard:
             if self._ending:
-                raise TransferFailed(performax.GONE)
+                raise TransferFailed(interface.GONE)
             self._last += 1
             number = self._last
             transfer = self._spare.pop() if self._spare else self._handle.getTransfer()
@@ -108,7 +108,7 @@ class LibusbCarrier:
             for endpoint in self._stalled:
                 self._handle.clearHalt(endpoint)
             self._handle.controlWrite(
-                performax.REQUEST_TYPE, performax.REQUEST, performax.Control.CLOSE, 0, b"", ASKING
+                interface.REQUEST_TYPE, interface.REQUEST, interface.Control.CLOSE, 0, b"", ASKING
             )
         self._handle.close()
         self._opened.close()
@@ -130,15 +130,15 @@ class LibusbCarrier:
         usb1, number = self._usb1, transfer.getUserData()
         ends = {
             usb1.TRANSFER_COMPLETED: 0,
-            usb1.TRANSFER_CANCELLED: performax.CANCELLED,
-            usb1.TRANSFER_STALL: performax.STALLED,
-            usb1.TRANSFER_NO_DEVICE: performax.GONE,
-            usb1.TRANSFER_TIMED_OUT: performax.TIMEOUT,
+            usb1.TRANSFER_CANCELLED: interface.CANCELLED,
+            usb1.TRANSFER_STALL: interface.STALLED,
+            usb1.TRANSFER_NO_DEVICE: interface.GONE,
+            usb1.TRANSFER_TIMED_OUT: interface.TIMEOUT,
         }
         status = ends.get(transfer.getStatus(), OTHER)
-        if status == performax.STALLED:
-            self._stalled |= {transfer.getEndpoint()} & {performax.IN, performax.OUT}
-        incoming = transfer.getEndpoint() == performax.IN and status == 0
+        if status == interface.STALLED:
+            self._stalled |= {transfer.getEndpoint()} & {interface.IN, interface.OUT}
+        incoming = transfer.getEndpoint() == interface.IN and status == 0
         data = bytes(transfer.getBuffer()[: transfer.getActualLength()]) if incoming else b""
         with self._guard:
             self._transfers.pop(number, None)

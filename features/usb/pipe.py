@@ -1,4 +1,4 @@
-"""The USB interface of a Performax controller as a pipe of lines: commands out, replies in, and the flush request.
+"""The USB interface of a controller as a pipe of lines: commands out, replies in, and the flush request.
 
 Source: PMX-2ED-SA manual 6.1 (64 characters each way, the late reply of 6.1.3); the vendor requests are those of the
 maker's driver for Linux. On USB a NUL ends a command and a reply. This pipe takes and delivers CR in its place, so that
@@ -22,7 +22,7 @@ from math import inf
 from typing import Protocol
 
 from multidrop.base.errors import TransportLost
-from multidrop.features.usb.performax import CANCELLED, GONE, STALLED, TIMEOUT, Control
+from multidrop.features.usb.interface import CANCELLED, GONE, STALLED, TIMEOUT, Control
 from multidrop.transports import Undelivered, Unreachable
 from multidrop.transports.pipe import Pipe
 from multidrop.transports.sockets import explain

@@ -8,6 +8,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from multidrop.base.errors import Diagnostic
+from multidrop.dialects.usb import usb_module
 from multidrop.shell.connect.scheme import Connection, Open, Scheme, last_part
 
 if TYPE_CHECKING:
@@ -15,8 +16,7 @@ if TYPE_CHECKING:
     from multidrop.transports import Transport
     from multidrop.transports.serial_ports import PortInfo
 
-FAMILY = "pmx"
-"""The family of the drives that have USB, on both sides."""
+MODULE = usb_module()
 TARGET = r"(?:[!-?A-~]+(?:@\d+-\d+(?:\.\d+)*)?)?"
 """A controller on USB: its device number with the socket that it is plugged into, or its place in the list."""
 ALL = "usb:"
@@ -26,7 +26,7 @@ ALL = "usb:"
 class OnUsb(Scheme):
     """A way to one controller."""
 
-    direct, direct_on = FAMILY, "on USB"
+    direct, direct_on = MODULE.dialect, "on USB"
     alone = True
 
 
@@ -34,7 +34,7 @@ class Usb(OnUsb):
     """A controller on the USB of this machine."""
 
     name, prefix, example = "usb", "usb:", "usb:2ED01"
-    meaning = "a PMX controller on USB, by its device number; usb: alone is the only one"
+    meaning = f"{MODULE.title} on USB, by its device number; usb: alone is the only one"
     after = "ssh"
 
     def parse(self, base: Connection, body: str) -> Connection:
@@ -81,7 +81,7 @@ class Usbip(OnUsb):
     """A controller on the USB of another machine, or of a simulated one."""
 
     name, prefix, example = "usbip", "usbip://", "usbip://HOST:3240/BUSID"
-    meaning = "a PMX controller on the USB of another machine"
+    meaning = f"{MODULE.title} on the USB of another machine"
     port = 3240
     after = "usb"
 

@@ -15,7 +15,7 @@ import threading
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from multidrop.features.usb.performax import IN, OUT, PACKET, PRODUCT, REQUEST, REQUEST_TYPE, VENDOR, Control
+from multidrop.features.usb.interface import IN, MODULE, OUT, PACKET, PRODUCT, REQUEST, REQUEST_TYPE, VENDOR, Control
 from multidrop.features.usb.pipe import Broken, Done, TransferFailed
 from multidrop.transports import Unreachable
 from multidrop.transports.sockets import connected, explain, host_port
@@ -170,7 +170,7 @@ async def imported(host: str, port: int, bus_id: str, within: float | None = Non
             device = Exported.read(await _asked(name, made, bus_id))
         if (device.vendor, device.product) != (VENDOR, PRODUCT):
             what = f"{device.vendor:04x}:{device.product:04x}"
-            raise Unreachable(f"{name}: {what} is no Performax controller ({VENDOR:04x}:{PRODUCT:04x})")
+            raise Unreachable(f"{name}: {what} is no {MODULE.module} ({VENDOR:04x}:{PRODUCT:04x})")
     except BaseException as error:
         made.close()
         if isinstance(error, TimeoutError):

@@ -186,7 +186,7 @@ class AsyncDrive(DriveFacts):
             await shell.run(f"@{self._target} {line}", By.SCRIPT)
 
     async def read(self, name: str | int) -> Value:
-        """Read the value of a word of the drive, such as `VM`; of TMCL a parameter by number or name.
+        """Read the value of a word of the drive, such as `VM`; of a parameter by number or name.
 
         `[LINE]` asks with a line that prints one value.
         """
@@ -225,7 +225,7 @@ class AsyncDrive(DriveFacts):
     async def run_at(self, velocity: float, unit: str = "") -> None:
         """Begin to run at a velocity, negative for minus: whole steps a second, or a number of a unit. 0 ends it.
 
-        On a PMX the axis's `HSPD` stays at it, and a unit is refused.
+        Where the language has no such line, the setting of the velocity stays at it, and a unit is refused.
         """
         await self._move(self._actions.run(_first(self), _amount(velocity, unit)), False)
 

@@ -1,4 +1,4 @@
-"""A simulated cell served in this process, for tests of other programs: on TCP, Modbus/TCP and pseudo-terminals."""
+"""A simulated cell served in this process, for tests of other programs: TCP, own ports of drives, pseudo-terminals."""
 
 from __future__ import annotations
 
@@ -70,7 +70,7 @@ class SimulatedCell:
         return [bus.name for bus in self._cell.buses]
 
     def url(self, bus: str = "", scheme: str = "tcp") -> str:
-        """The URL of a bus, by default of the first: `tcp`, `pty`, or `modbus` of an Ethernet drive.
+        """The URL of a bus, by default of the first: `tcp`, `pty`, or the scheme of a port that only its drive has.
 
         Raises Diagnostic for a bus or a scheme that it does not have.
         """

@@ -1,7 +1,7 @@
 """The search for drives on a port: language by language, baud rate by baud rate, one opening of the port for each.
 
-It begins with the given baud rate and MCode, and ends with the first of these at which a drive replies, unless all are
-asked for. Anything else may be an error to a drive that is set to another baud rate or speaks another language, so a
+It begins with the given baud rate and the default language, and ends with the first of these at which a drive replies,
+unless all are asked for. Anything else may be an error to a drive that is set to another baud rate or speaks another language, so a
 person is asked before it is tried. A language with a hazard of its own is searched only by its name, after a question.
 """
 
@@ -472,7 +472,7 @@ async def extend(workspace: Workspace, bus: Bus) -> list[str]:
 
 
 def listed(stages: Iterable[Stage]) -> str:
-    """Stages in words: `MCode at 4800, 19200 baud and PMX at 9600 baud`."""
+    """Stages in words: `LANGUAGE at 4800, 19200 baud and OTHER at 9600 baud`."""
     by_family: dict[str, list[str]] = {}
     for each in stages:
         by_family.setdefault(each.scan.title, []).extend([str(each.baud)] if each.baud else [])

@@ -33,6 +33,13 @@ a line has one; in brackets none is needed. Functions read the tables of familie
 """
 
 
+class Examples(NamedTuple):
+    """More examples of a command, without `multidrop` in front."""
+
+    command: str
+    lines: tuple[str, ...]
+
+
 class Operation(NamedTuple):
     """A task of the product: a verb in a session, a command, or both."""
 

@@ -93,7 +93,7 @@ class DriveSpec:
     world: WorldSpec = WorldSpec()
     further: tuple[WorldSpec, ...] = ()
     any_address: bool = False
-    """A TMCL module that replies to every address."""
+    """It replies to every address."""
     cse: bool = False
     units: Mapping[str, Scale] = field(default_factory=lambda: MappingProxyType({}))
     """The scales of its axes, by their names; the empty name is an only axis."""

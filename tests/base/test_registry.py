@@ -130,14 +130,27 @@ def test_packages_are_read_once_until_the_environment_changes(tmp_path: Path, mo
 
     def entry_points(group: str) -> list[Any]:
         reads.append(group)
-        return [package("gauge", "package_gauge:FEATURE")]
+        return [package("gauge", "package_gauge:FEATURE")] if group == registry.GROUP else []
 
     monkeypatch.setattr(importlib.metadata, "entry_points", entry_points)
     first = registry.entries()
     assert first == [registry.Entry("gauge", "multidrop-gauge", "2.0", "package_gauge:FEATURE")]
-    assert registry.entries() == first and reads == ["multidrop.features"]
+    assert registry.entries() == first and reads == ["multidrop.features", "multidrop.families"]
     os.utime(site, ns=(1, 1))
-    assert registry.entries() == first and len(reads) == 2
+    assert registry.entries() == first and len(reads) == 4
+
+
+@pytest.mark.parametrize("value", ["package_knock:FAMILY", "package_knock"])
+def test_a_package_brings_a_family_by_an_entry_point_of_its_own(
+    value: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "package_knock.py").write_text(GOOD.replace("{name}", "knock").replace("FEATURE", "FAMILY"))
+    monkeypatch.syspath_prepend(str(tmp_path))
+    found = {registry.FAMILY_GROUP: [package("knock", value)]}
+    monkeypatch.setattr(importlib.metadata, "entry_points", lambda group: found.get(group, []))
+    registry.load_others()
+    assert registry.warnings() == [] and state("knock") == ("multidrop-knock", "ready")
+    assert [each.name for each in registry.families()][-1] == "knock"
 
 
 def test_what_is_kept_of_packages_may_be_damaged(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -150,7 +163,8 @@ def test_what_is_kept_of_packages_may_be_damaged(tmp_path: Path, monkeypatch: py
 def test_a_package_is_loaded_by_its_entry_point(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "package_clamp.py").write_text(GOOD.replace("{name}", "clamp"))
     monkeypatch.syspath_prepend(str(tmp_path))
-    monkeypatch.setattr(importlib.metadata, "entry_points", lambda group: [package("clamp", "package_clamp:FEATURE")])
+    found = {registry.GROUP: [package("clamp", "package_clamp:FEATURE")]}
+    monkeypatch.setattr(importlib.metadata, "entry_points", lambda group: found.get(group, []))
     registry.load_others()
     assert registry.warnings() == []
     assert state("clamp") == ("multidrop-clamp", "ready")
@@ -160,12 +174,19 @@ def test_a_package_is_loaded_by_its_entry_point(tmp_path: Path, monkeypatch: pyt
 
 def test_the_word_of_a_feature_that_was_deleted_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(registry, "IN_WHEEL", {"gone_away": ("gone", "/gone", "relay usb:")})
+    monkeypatch.setattr(registry, "FAMILIES", {})
     with pytest.raises(Diagnostic, match="gone: the feature gone_away is not there; install multidrop again, whole"):
         registry.with_word("gone")
     with pytest.raises(Diagnostic, match="^relay usb: the feature gone_away is not there"):
         registry.with_word("relay usb:")
     assert list(registry.wheels()) == [] and registry.with_word("other") is None
     assert [(entry.name, said) for entry, _, said in registry.states("1.2")] == [("gone_away", "not there")]
+
+
+def test_the_language_of_a_family_that_was_deleted_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(registry, "FAMILIES", {"gone_too": ("dialect=gone", "gone:")})
+    with pytest.raises(Diagnostic, match="^dialect=gone: the family gone_too is not there; install multidrop again"):
+        registry.with_word("dialect=gone")
 
 
 @pytest.mark.parametrize(
@@ -185,6 +206,7 @@ def test_a_feature_of_the_wheel_whose_module_raises_is_one_warning_and_its_word_
         raise failure
 
     monkeypatch.setattr(registry, "IN_WHEEL", {"twins": ("/twin",)})
+    monkeypatch.setattr(registry, "FAMILIES", {})
     monkeypatch.setattr(registry, "wheel", cache(registry._wheel))
     monkeypatch.setattr(registry.importlib, "import_module", raising)
     assert list(registry.wheels()) == [] == list(registry.wheels())

@@ -6,22 +6,19 @@ import ast
 
 import pytest
 
-from multidrop.dialects.families import DEFAULT, FAMILIES, TABLE, family_of, languages, program_languages, seen
+from multidrop.dialects.families import DEFAULT, FAMILIES, dialects, family_of, languages, program_languages, seen
 from multidrop.dialects.family import Hints
 from multidrop.shell.connect import urls
 from multidrop.shell.connect.schemes import schemes
 from tests.support.paths import sources
 
-ROOMS = ("drives", "shell", "tui", "macros", "multidrop")
-SCHEMES = {"shell/connect/schemes.py"}
-"""The table of URL schemes, where `modbus` is a scheme."""
+ROOMS = ("drives", "shell", "simulator", "dialects", "transports", "tui", "macros", "multidrop")
 
 
 def test_no_front_end_names_a_family() -> None:
     named = {
         f"{name}:{node.lineno}: {node.value}"
         for name, path in sources(*ROOMS)
-        if name not in SCHEMES
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
         if isinstance(node, ast.Constant) and node.value in FAMILIES
     }
@@ -36,7 +33,7 @@ def test_codec_and_state_lead_to_their_record(family) -> None:
 
 @pytest.mark.parametrize("family", FAMILIES.values(), ids=FAMILIES)
 def test_a_url_names_a_family_by_its_scheme_or_by_dialect(family) -> None:
-    if scheme := TABLE[family.name].scheme:
+    if scheme := dialects()[family.name].scheme:
         assert scheme in schemes() and urls.parse(f"{scheme}://h").hints == Hints(family=family.name)
     else:
         assert urls.parse(f"/dev/ttyUSB0?dialect={family.name}").hints == Hints(family=family.name)
@@ -47,7 +44,7 @@ def test_an_unknown_line_is_of_the_default_family_and_no_other() -> None:
 
 
 def test_each_row_leads_to_the_record_of_its_name_and_to_a_language_of_files() -> None:
-    for name, row in TABLE.items():
+    for name, row in dialects().items():
         assert FAMILIES[name].name == name
         assert (row.files is None) == (FAMILIES[name].programs is None)
         if row.files is not None:

@@ -9,6 +9,7 @@ import pytest
 from multidrop.api.notebooks import Pictures
 from multidrop.base import registry
 from multidrop.base.registry import IN_WHEEL
+from multidrop.dialects.families import Dialect
 from multidrop.shell.connect.scheme import NoLine, Scheme
 from multidrop.shell.hooks import AtSession, Options
 from multidrop.shell.operations.operation import Forms, Operation
@@ -19,7 +20,19 @@ from multidrop.shell.sections import Section
 from multidrop.simulator.cell.endpoint_kinds import EndpointKind
 from tests.support.paths import ROOT, THERE
 
-KINDS = (Operation, AtSession, Options, Forms, PlotTargets, Pictures, Section, Scheme, NoLine, EndpointKind, Lent)
+KINDS: tuple[type, ...] = (
+    Operation,
+    AtSession,
+    Options,
+    Forms,
+    PlotTargets,
+    Pictures,
+    Section,
+    Scheme,
+    NoLine,
+    EndpointKind,
+    Lent,
+)
 FUNCTIONS: dict[type, tuple[str, ...]] = {PlotTargets: ("multidrop.read_rrd",), Pictures: ("Session.live",)}
 """The functions of the Python API that need a record of a kind."""
 
@@ -49,6 +62,17 @@ def test_the_table_has_the_words_that_the_record_answers_to(name: str) -> None:
     for each in operations:
         assert each.meaning if each.command else each.help
         assert callable(each.run) or not each.run, "a feature names its functions, not their places"
+
+
+@pytest.mark.parametrize("name", registry.FAMILIES)
+def test_the_table_has_the_words_of_a_family(name: str) -> None:
+    record = registry.wheel(name)
+    if record is None:
+        pytest.skip(f"the family {name} is not in this copy of the tree")
+    assert record.name == name and record.meaning
+    words = {f"dialect={each.name}" for each in record.adds if isinstance(each, Dialect)}
+    words |= {f"{each.name}:" for each in record.adds if isinstance(each, Scheme)}
+    assert words == set(registry.FAMILIES[name])
 
 
 @pytest.mark.parametrize("forms", [each for record in registry.wheels() for each in record.adds if type(each) is Forms])

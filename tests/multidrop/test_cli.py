@@ -9,7 +9,8 @@ import pytest
 import multidrop
 from multidrop import cli
 from multidrop.shell.operations import table
-from multidrop.simulator.families import PROGRAMS, TABLE
+from multidrop.simulator.declared import simulated
+from multidrop.simulator.families import PROGRAMS
 from tests.support.paths import ROOT
 from tests.support.until import PATIENCE
 
@@ -79,7 +80,7 @@ def test_the_table_of_commands_names_functions(run):
 
 def test_the_help_names_each_personality_that_runs_programs(multidrop):
     told = multidrop("program", "test", "--help").stdout
-    for name, row in TABLE.items():
+    for name, row in simulated().items():
         for personality in row.personalities:
             assert (personality in told) == (name in PROGRAMS)
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 import multidrop as package
-from multidrop.base.registry import IN_WHEEL
+from multidrop.base.registry import FAMILIES, IN_WHEEL
 from tests.support.front_door import Command
 from tests.support.own_features import forget_loaded, own
 
@@ -26,7 +26,7 @@ def test_a_persons_own_features_follow_those_of_the_wheel(multidrop: Command, tm
     done = multidrop("features", "--json")
     rows = [json.loads(line) for line in done.stdout.splitlines()]
     assert done.returncode == 0 and done.stderr == ""
-    assert [each["name"] for each in rows if each["source"] == "multidrop"] == [*IN_WHEEL]
+    assert [each["name"] for each in rows if each["source"] == "multidrop"] == [*FAMILIES, *IN_WHEEL]
     assert {each["version"] for each in rows if each["source"] == "multidrop"} == {package.__version__}
     assert [each for each in rows if each["source"] == str(clamp)] == [
         {"name": "clamp", "source": str(clamp), "version": "", "state": "ready", "meaning": "holds things"}

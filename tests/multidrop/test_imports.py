@@ -6,8 +6,8 @@ import sys
 
 import pytest
 
-from multidrop.dialects.families import TABLE as FAMILIES
-from multidrop.simulator.families import TABLE as SIMULATED
+from multidrop.dialects.families import dialects
+from multidrop.simulator.declared import simulated
 from tests.support.paths import ROOT
 from tests.support.processes import environment, names_of_packages
 from tests.support.until import PATIENCE
@@ -17,11 +17,11 @@ PLOTS = {"rerun", "numpy", "pyarrow"}
 EDITORS = {"pygls", "lsprotocol", "attrs", "cattrs"}
 HEAVY = SCREENS | PLOTS | EDITORS | {"pymodbus", "tomlkit", "importlib.metadata"}
 LOOP = {"asyncio", "socket", "ssl", "logging", "subprocess", "concurrent.futures"}
-HOSTS = {place.record.partition(":")[0] for place in FAMILIES.values()} | {
+HOSTS = {place.record.partition(":")[0] for place in dialects().values()} | {
     "multidrop.drives.bus",
     "multidrop.shell.session",
 }
-SIMULATORS = {place.record.partition(":")[0] for place in SIMULATED.values()} | {"multidrop.simulator.floor"}
+SIMULATORS = {place.record.partition(":")[0] for place in simulated().values()} | {"multidrop.simulator.floor"}
 NO_LINE = HEAVY | LOOP | HOSTS | SIMULATORS | {"serial"}
 MCODE = {"multidrop.families.lexium.host.mcode.family"}
 OTHERS = HOSTS - MCODE - {"multidrop.drives.bus", "multidrop.shell.session"}

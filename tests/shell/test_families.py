@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from multidrop.dialects.families import FAMILIES, TABLE
+from multidrop.dialects.families import FAMILIES, dialects
 from multidrop.shell.connect.schemes import schemes
 from multidrop.shell.connect.urls import parse
 from tests.support.cases import for_each
@@ -29,7 +29,7 @@ def test_no_family_is_named(file: Path) -> None:
 
 @pytest.mark.parametrize("family", FAMILIES.values(), ids=lambda family: family.name)
 def test_every_family_is_opened_by_its_scheme_or_by_dialect(family) -> None:
-    if scheme := TABLE[family.name].scheme:
+    if scheme := dialects()[family.name].scheme:
         assert scheme in schemes()
         assert parse(f"{scheme}://host").hints.family == family.name
     else:

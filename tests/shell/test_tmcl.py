@@ -8,7 +8,7 @@ import itertools
 import pytest
 
 from multidrop.base.errors import DriveError, Inexpressible, NoAnswer, Refused, Stopped
-from multidrop.dialects.families import TABLE
+from multidrop.dialects.families import dialects
 from multidrop.drives.events import Sample, Unsolicited
 from multidrop.drives.stop_forms import stop_forms
 from multidrop.families.tmcl.manual import instructions
@@ -106,7 +106,7 @@ async def test_help_and_completion_are_those_of_the_module(session):
 
 
 def test_nothing_leads_to_it_but_its_name():
-    assert TABLE["tmcl"].scheme == ""
+    assert dialects()["tmcl"].scheme == ""
     assert parse_url("tcp://127.0.0.1:4001").hints.family != "tmcl"
     assert parse_url("tcp://127.0.0.1:4001?dialect=tmcl&drives=1,7").hints.drives == ("1", "7")
 

@@ -15,7 +15,8 @@ from multidrop.simulator.cell.drive_keys import WORLD_KEYS, common_keys, read_wo
 from multidrop.simulator.cell.spec import DriveSpec, WorldSpec
 from multidrop.simulator.cell.table import Table
 from multidrop.simulator.cells import Reader
-from multidrop.simulator.families import BY_PERSONALITY, FAMILIES, PROGRAMS, TABLE, family_of
+from multidrop.simulator.declared import simulated
+from multidrop.simulator.families import BY_PERSONALITY, FAMILIES, PROGRAMS, family_of
 from multidrop.simulator.family import Family, Place, Unit
 from multidrop.simulator.wire import Transmission, Wire
 from multidrop.simulator.world import World
@@ -163,13 +164,13 @@ def test_every_family_reads_and_builds_its_drives() -> None:
 
 def test_every_default_drive_of_a_program_test_is_of_its_family() -> None:
     for name, programs in PROGRAMS.items():
-        assert programs.drive.personality in TABLE[name].personalities
+        assert programs.drive.personality in simulated()[name].personalities
 
 
 def test_each_row_has_the_name_and_the_products_of_its_family() -> None:
-    assert {name: family.name for name, family in FAMILIES.items()} == {name: name for name in TABLE}
+    assert {name: family.name for name, family in FAMILIES.items()} == {name: name for name in simulated()}
     assert [name for name in BY_PERSONALITY if family_of(name) is FAMILIES["mcode"]] == list(MODELS)
-    assert len(BY_PERSONALITY) == sum(len(row.personalities) for row in TABLE.values())
+    assert len(BY_PERSONALITY) == sum(len(row.personalities) for row in simulated().values())
 
 
 def test_nothing_of_the_simulator_but_the_table_and_the_families_names_a_family() -> None:

@@ -23,6 +23,7 @@ from multidrop.base.errors import Diagnostic
 from multidrop.base.feature import Feature
 from multidrop.base.foreign import guarded
 from multidrop.base.registry import Entry
+from multidrop.dialects.families import Dialect
 from multidrop.shell import configuration, hooks, plot_targets, relaying
 from multidrop.shell.configuration import Settings
 from multidrop.shell.connect.scheme import NoLine, Scheme
@@ -36,6 +37,7 @@ from multidrop.shell.relaying import Lent
 from multidrop.shell.sections import Section, sections
 from multidrop.simulator import cells
 from multidrop.simulator.cell.endpoint_kinds import EndpointKind, kind_of
+from multidrop.simulator.declared import Demo, Simulated
 from multidrop.simulator.floor import Floor
 from multidrop.simulator.serving.endpoints import serve_bus
 from multidrop.simulator.serving.running import RunningFloor
@@ -70,6 +72,9 @@ PLAIN: Mapping[type, Any] = MappingProxyType(
         AtSession: AtSession(lambda session: None),
         EndpointKind: EndpointKind("slow", _served),
         Forms: Forms("/plot", "--slow", "Plot."),
+        Demo: Demo("x"),
+        Dialect: Dialect("slow", "x:SLOW"),
+        Simulated: Simulated("slow", "x:SLOW", ("SLOW",)),
         Lent: Lent("slow:", "what is slow", lambda rest: None),
         NoLine: NoLine(("slow",), "it leads to no drives", "try another one"),
         Operation: Operation(

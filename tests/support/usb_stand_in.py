@@ -18,7 +18,7 @@ from unittest import mock
 from multidrop.features.usb import libusb
 from multidrop.features.usb.controllers import Found, chosen
 from multidrop.features.usb.device import UsbController, sides
-from multidrop.features.usb.performax import CANCELLED, GONE, PACKET, STALLED, Control
+from multidrop.features.usb.interface import CANCELLED, GONE, PACKET, STALLED, Control
 from multidrop.features.usb.pipe import Broken, Done, TransferFailed
 from multidrop.features.usb.usbip import setup
 from multidrop.simulator.serving.running import Listener, RunningFloor

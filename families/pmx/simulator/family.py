@@ -39,7 +39,7 @@ from multidrop.simulator.cell.spec import DriveSpec
 from multidrop.simulator.cell.spec import Value as Setting
 from multidrop.simulator.cell.table import Folder, Table, quoted
 from multidrop.simulator.cell.writer import DriveText, Entry, plain, remark
-from multidrop.simulator.family import Effort, Family, Place, Shadow, Snapshots, StoredProgram, Unit
+from multidrop.simulator.family import Effort, Family, Place, Shadow, Snapshots, StoredProgram, Unit, UsbSide
 
 NAMES_OF_AXES = ("x", "y")
 INPUTS, COUNTS = range(1, 9), 5000
@@ -153,6 +153,7 @@ def build(spec: DriveSpec, place: Place) -> Unit:
         shadow=_shadow(device),
         inputs=INPUTS,
         counts=COUNTS,
+        usb=UsbSide(lambda: f"2ED{device.controller.settings.number}", device.execute),
     )
 
 

@@ -13,7 +13,7 @@ from typing import Any
 import pytest
 
 from multidrop.features.usb import controllers as here
-from multidrop.features.usb import performax
+from multidrop.features.usb import interface
 from multidrop.features.usb.controllers import (
     RULE,
     UNREAD,
@@ -25,7 +25,7 @@ from multidrop.features.usb.controllers import (
     ports,
     refusal,
 )
-from multidrop.features.usb.performax import IN, OUT, PRODUCT, VENDOR, Control
+from multidrop.features.usb.interface import IN, OUT, PRODUCT, VENDOR, Control
 from multidrop.transports import Unreachable
 from tests.support.cases import for_each
 
@@ -105,10 +105,10 @@ def test_the_holder_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_the_numbers_are_those_of_the_makers_driver_and_the_ends_those_of_linux() -> None:
     assert (VENDOR, PRODUCT) == (0x1589, 0xA101)
-    assert (OUT, IN, performax.PACKET) == (0x02, 0x82, 64)
-    assert (performax.REQUEST_TYPE, performax.REQUEST) == (0x40, 0x02)
+    assert (OUT, IN, interface.PACKET) == (0x02, 0x82, 64)
+    assert (interface.REQUEST_TYPE, interface.REQUEST) == (0x40, 0x02)
     assert {each.name: int(each) for each in Control} == {"FLUSH": 1, "OPEN": 2, "CLOSE": 4}
-    assert (performax.CANCELLED, performax.STALLED, performax.GONE, performax.TIMEOUT) == (-104, -32, -19, -110)
+    assert (interface.CANCELLED, interface.STALLED, interface.GONE, interface.TIMEOUT) == (-104, -32, -19, -110)
     assert (here.STATUS, here.OTHER) == ({-4: -19, -7: -110, -9: -32}, -5)
 
 

@@ -12,7 +12,7 @@ import pytest
 
 from multidrop.base.errors import Diagnostic
 from multidrop.features.usb.exports import attaching
-from multidrop.features.usb.performax import CANCELLED, STALLED, Control
+from multidrop.features.usb.interface import CANCELLED, STALLED, Control
 from multidrop.features.usb.usbip import (
     INTERFACE,
     OPERATION,

@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from multidrop.features.usb import libusb, performax
+from multidrop.features.usb import interface, libusb
 from multidrop.features.usb.libusb import LibusbCarrier, open_libusb
 from multidrop.features.usb.pipe import TransferFailed
 from multidrop.transports import Unreachable
@@ -168,10 +168,10 @@ class Desk:
         self.carrier.start(lambda *given: self.done.append(given), self.broken.append)
 
 
-END = (performax.REQUEST_TYPE, performax.REQUEST, performax.Control.CLOSE, 0, b"", 100)
+END = (interface.REQUEST_TYPE, interface.REQUEST, interface.Control.CLOSE, 0, b"", 100)
 OTHER = -5
 """The end for an error of libusb that has no number of Linux."""
-ENDS = [(-4, performax.GONE), (-7, performax.TIMEOUT), (-9, performax.STALLED), (-12, OTHER)]
+ENDS = [(-4, interface.GONE), (-7, interface.TIMEOUT), (-9, interface.STALLED), (-12, OTHER)]
 """Errors of libusb, and the ends that they are reported as."""
 
 
@@ -195,11 +195,11 @@ def test_a_bus_that_cannot_be_read_and_a_controller_that_cannot_be_claimed_are_n
 async def test_each_transfer_has_its_number_and_ends_with_its_status_and_what_came(bus: Bus) -> None:
     desk = Desk()
     carrier = desk.carrier
-    assert [carrier.control(performax.Control.OPEN), carrier.send(b"ID"), carrier.receive()] == [1, 2, 3]
+    assert [carrier.control(interface.Control.OPEN), carrier.send(b"ID"), carrier.receive()] == [1, 2, 3]
     assert [each.set for each in bus.submitted] == [
-        ("control", performax.REQUEST_TYPE, performax.REQUEST, performax.Control.OPEN, 0, b""),
-        ("bulk", performax.OUT, b"ID"),
-        ("bulk", performax.IN, performax.PACKET),
+        ("control", interface.REQUEST_TYPE, interface.REQUEST, interface.Control.OPEN, 0, b""),
+        ("bulk", interface.OUT, b"ID"),
+        ("bulk", interface.IN, interface.PACKET),
     ]
     bus.submitted[0].end()
     bus.submitted[1].end(buffer=b"ID")
@@ -216,10 +216,10 @@ async def test_each_transfer_has_its_number_and_ends_with_its_status_and_what_ca
 @pytest.mark.parametrize(
     ("status", "end"),
     [
-        (Bus.TRANSFER_CANCELLED, performax.CANCELLED),
-        (Bus.TRANSFER_STALL, performax.STALLED),
-        (Bus.TRANSFER_NO_DEVICE, performax.GONE),
-        (Bus.TRANSFER_TIMED_OUT, performax.TIMEOUT),
+        (Bus.TRANSFER_CANCELLED, interface.CANCELLED),
+        (Bus.TRANSFER_STALL, interface.STALLED),
+        (Bus.TRANSFER_NO_DEVICE, interface.GONE),
+        (Bus.TRANSFER_TIMED_OUT, interface.TIMEOUT),
         (99, OTHER),
     ],
 )
@@ -228,13 +228,13 @@ async def test_a_transfer_that_fails_has_no_bytes_and_a_halted_endpoint_is_freed
 ) -> None:
     desk = Desk()
     desk.carrier.receive()
-    desk.carrier.control(performax.Control.OPEN)
+    desk.carrier.control(interface.Control.OPEN)
     for each in bus.submitted:
         each.end(status, b"what came")
     await until(lambda: len(desk.done) == 2)
     assert desk.done == [(1, end, b""), (2, end, b"")]
     desk.carrier.close()
-    halted = [("clear", performax.IN)] if end == performax.STALLED else []
+    halted = [("clear", interface.IN)] if end == interface.STALLED else []
     assert bus.calls[1:] == [*halted, END, "closed", "context closed"]
 
 
@@ -256,7 +256,7 @@ async def test_a_transfer_is_cancelled_once_and_one_that_has_ended_or_has_just_e
     number = desk.carrier.receive()
     desk.carrier.cancel(number)
     await until(lambda: bool(desk.done))
-    assert desk.done == [(number, performax.CANCELLED, b"")]
+    assert desk.done == [(number, interface.CANCELLED, b"")]
     desk.carrier.cancel(number)
     desk.carrier.cancel(99)
     other = desk.carrier.receive()
@@ -273,7 +273,7 @@ async def test_after_the_end_nothing_begins_and_nothing_is_reported(bus: Bus) ->
     desk.carrier.halt()
     with pytest.raises(TransferFailed) as failure:
         desk.carrier.send(b"x")
-    assert failure.value.args == TransferFailed(performax.GONE).args
+    assert failure.value.args == TransferFailed(interface.GONE).args
     desk.carrier.close()
     thread = desk.carrier._thread
     assert thread is not None and thread.daemon and not thread.is_alive()
@@ -304,7 +304,7 @@ async def test_an_end_of_either_endpoint_that_is_halted_is_freed_though_the_cont
         await until(lambda: len(desk.done) == len(bus.submitted))
     bus.broken_end = True
     desk.carrier.close()
-    assert sorted(bus.calls[1:3]) == [("clear", performax.OUT), ("clear", performax.IN)]
+    assert sorted(bus.calls[1:3]) == [("clear", interface.OUT), ("clear", interface.IN)]
     assert bus.calls[3:] == ["closed", "context closed"]
 
 
@@ -365,7 +365,7 @@ async def test_a_transfer_is_known_until_it_has_ended(bus: Bus) -> None:
     assert bus.submitted[1].cancelled == 0
     desk.carrier.cancel(second)
     await until(lambda: len(desk.done) == 2)
-    assert desk.done[1] == (second, performax.CANCELLED, b"")
+    assert desk.done[1] == (second, interface.CANCELLED, b"")
     desk.carrier.close()
 
 
@@ -374,9 +374,9 @@ async def test_a_controller_is_opened_by_its_target_and_given_back(bus: Bus) -> 
     pipe = await open_libusb("00")
     assert pipe.name == "usb:00"
     assert [each[3] if each[0] == "control" else each[1] for each in bus.begun] == [
-        performax.Control.OPEN,
-        performax.Control.FLUSH,
-        performax.IN,
+        interface.Control.OPEN,
+        interface.Control.FLUSH,
+        interface.IN,
     ]
     await pipe.close()
     assert bus.calls == [("claim", 0), END, "closed", "context closed"]

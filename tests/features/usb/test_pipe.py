@@ -11,7 +11,7 @@ from collections.abc import Callable
 import pytest
 
 from multidrop.base.errors import TransportLost
-from multidrop.features.usb.performax import CANCELLED, GONE, STALLED, Control
+from multidrop.features.usb.interface import CANCELLED, GONE, STALLED, Control
 from multidrop.features.usb.pipe import LATE, REPLY, TAKEN, Broken, Done, TransferFailed, UsbPipe, open_usb
 from multidrop.transports import Undelivered, Unreachable
 from tests.support.cases import for_each

@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from multidrop.features.usb import usbip
-from multidrop.features.usb.performax import CANCELLED, PRODUCT, VENDOR, Control
+from multidrop.features.usb.interface import CANCELLED, PRODUCT, VENDOR, Control
 from multidrop.features.usb.pipe import Broken, Done
 from multidrop.features.usb.usbip import (
     OPERATION,

@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 
 from multidrop.features.usb import usbip
-from multidrop.features.usb.performax import CANCELLED, Control
+from multidrop.features.usb.interface import CANCELLED, Control
 from multidrop.features.usb.pipe import explain_usb
 from multidrop.features.usb.usbip import (
     OPERATION,

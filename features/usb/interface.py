@@ -1,11 +1,13 @@
-"""The USB interface of every Performax module: its numbers, as in the maker's driver for Linux."""
+"""The USB interface of the controllers: its numbers, as in the maker's driver for Linux."""
 
 from __future__ import annotations
 
 from enum import IntEnum
 
-VENDOR, PRODUCT = 0x1589, 0xA101
-"""Every Performax USB module."""
+from multidrop.dialects.usb import usb_module
+
+MODULE = usb_module()
+VENDOR, PRODUCT = MODULE.vendor, MODULE.product
 OUT, IN = 0x02, 0x82
 """The bulk endpoints."""
 PACKET = 64
