@@ -1,8 +1,9 @@
 """The stop that another thread writes ahead of the event loop: its first bytes at once, the rest piece by piece.
 
 On a line whose drives reply to a stop (`Codec.stop_replies`) each drive gets its stop by itself, and a gap for its
-reply behind it. The thread that reads the keys writes the first bytes and goes on reading. `PACER` writes the other pieces while the
-loop does not: before it has taken the stop over, and where it is held up after that. Each line has its own times.
+reply behind it. The thread that reads the keys writes the first bytes and goes on reading. `PACER` writes the other
+pieces while the loop does not: before it has taken the stop over, and where it is held up after that. Each line has its
+own times.
 
 A key that comes meanwhile (one that is held down repeats 30 times a second) drops nothing and begins nothing again: it
 moves the stop on by a piece once the gap is over, and every piece has its turn again.

@@ -1,8 +1,9 @@
 """The search for drives on a port: language by language, baud rate by baud rate, one opening of the port for each.
 
 It begins with the given baud rate and the default language, and ends with the first of these at which a drive replies,
-unless all are asked for. Anything else may be an error to a drive that is set to another baud rate or speaks another language, so a
-person is asked before it is tried. A language with a hazard of its own is searched only by its name, after a question.
+unless all are asked for. Anything else may be an error to a drive that is set to another baud rate or speaks another
+language, so a person is asked before it is tried. A language with a hazard of its own is searched only by its name,
+after a question.
 """
 
 from __future__ import annotations
