@@ -279,6 +279,10 @@ class Codec(ABC):
         """Whether a drive can send this line without a question: its program prints it, or it reports by itself."""
         return True
 
+    def replied(self, sent: bytes, received: bytes) -> bool | None:
+        """Whether what came has the reply to a whole message, as its frames show; None: they do not show it."""
+        return None
+
     def answers_host(self, line: str) -> bool:
         """Whether an unsolicited line is a late reply: only a question of multidrop has this form."""
         return False

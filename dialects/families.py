@@ -63,6 +63,8 @@ def program_languages() -> dict[str, ProgramFiles]:
 def program_language_of(path: str | os.PathLike[str]) -> str:
     """The family of a program file, by the ending of its name; the default family's where none fits."""
     ending = os.path.splitext(path)[1].lower()
+    if not any(ending in files.endings for files in program_languages().values()):
+        registry.load_others()
     found = (name for name, files in program_languages().items() if ending in files.endings)
     return next(found, DEFAULT)
 

@@ -1,7 +1,7 @@
 """The host's knowledge of one drive, changed by named transitions only.
 
 A conversation reads a `DriveState` and records each thing that it learns by calling a transition. A family with more to
-know extends the class (`mcode.host.state.MCodeState`). No other module assigns to a field: a test holds that.
+know extends the class. No other module assigns to a field: a test holds that.
 """
 
 from __future__ import annotations

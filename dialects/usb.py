@@ -13,9 +13,9 @@ class UsbModule(NamedTuple):
     dialect: str
     """The language that they speak there."""
     title: str
-    """One of them, for a person: `a PMX controller`."""
+    """One of them, for a person: `an X controller`."""
     module: str
-    """What its interface is called: `Performax controller`."""
+    """What its interface is called: `X controller`."""
     vendor: int
     product: int
     texts: tuple[str, str] = ("", "")

@@ -111,6 +111,8 @@ class Reader:
 
     def _drive(self, table: Table, folder: Folder) -> DriveSpec:
         name = table.values.get("personality")
+        if name not in self._families:
+            registry.load_others()
         own = self._families[name].keys if isinstance(name, str) and name in self._families else ()
         table.only(*DRIVE_KEYS, *own)
         personality = table.choice("personality", tuple(self._families))

@@ -15,6 +15,7 @@ from multidrop.base.errors import Diagnostic
 from multidrop.base.text import whole
 from multidrop.simulator import USAGES
 from multidrop.simulator.cell.spec import BusSpec, Cell, DriveSpec
+from multidrop.simulator.declared import own_ports
 from multidrop.simulator.families import BY_PERSONALITY, family_of
 from multidrop.simulator.family import Connection, Device, Place, Unit
 from multidrop.simulator.wire import Wire
@@ -170,7 +171,7 @@ class Floor:
     def delays(self, bus: str) -> Iterator[float]:
         """Yield the reply delays of a connection to a bus, s, without an end; an equal seed gives equal delays."""
         low, high = next(each.faults.delay for each in self.cell.buses if each.name == bus)
-        rng = Random(f"{self.cell.seed} {bus} modbus")
+        rng = Random(" ".join((str(self.cell.seed), bus, *own_ports())))
         while True:
             yield rng.uniform(low, high) if high else 0.0
 

@@ -1,8 +1,9 @@
-"""Delete features in a copy of the tree, one at a time and all at once: everything else works. Run: `make seams`.
+"""Delete features and families in a copy of the tree, one at a time and together: all else works. Run: `make seams`.
 
 In each copy every module is imported, and the front ends run on a simulated cell: `send`, the prompt, a script, a
 Python program, the screen. Where all features are gone, the quick tests of the core run, too. The quick tests of each
-feature run in one more copy, which has no other feature. `--cheap` leaves these tests out.
+feature run in one more copy, which has no other feature. `--cheap` leaves these tests out. The family of the language
+of drives of which nothing is said stays.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
 
-from multidrop.base.registry import IN_WHEEL
+from multidrop.base.registry import DEFAULT, FAMILIES, IN_WHEEL
 from tests.support.paths import ROOMS
 
 ROOT = Path(__file__).parents[1]
@@ -34,6 +35,9 @@ OF_THE_WHOLE = [f"--ignore=tests/{each}" for each in ("docs", "packaging", "soak
 QUICK = "not process and not tui and not wide and not slow"
 PYTEST = ("-m", "pytest", "-q", "-p", "no:cacheprovider", "--no-header", "--tb=short", "--hypothesis-profile=quick",
           "--dist", "worksteal", "-m", QUICK)  # fmt: skip
+OPTIONAL = [name for name, words in FAMILIES.items() if f"dialect={DEFAULT}" not in words]
+TOGETHER = {"families": OPTIONAL, "all": [*IN_WHEEL]}
+NAMES = (*IN_WHEEL, *OPTIONAL, *TOGETHER)
 WHOLE = "whole"
 """The copy that all others are made of, by hard links: nothing writes into a copy."""
 IMPORTS = """
@@ -85,11 +89,11 @@ asyncio.run(main())
 def main(arguments: Sequence[str] | None = None) -> int:
     """Try all copies, or those that are named; return the number of those that do not work."""
     parser = argparse.ArgumentParser(prog="make seams", description=__doc__)
-    parser.add_argument("names", nargs="*", help="features, or `all` (default: each, and all)")
+    parser.add_argument("names", nargs="*", choices=(*NAMES, []), help="default: each of them")
     parser.add_argument("--cheap", action="store_true", help="run no tests")
     parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1)
     chosen = parser.parse_args(arguments)
-    names = chosen.names or [*IN_WHEEL, "all"]
+    names = chosen.names or NAMES
     began = time.monotonic()
     with tempfile.TemporaryDirectory(prefix="seams-") as made:
         folder, tests = Path(made), not chosen.cheap
@@ -97,7 +101,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         for room in ROOMS:
             compileall.compile_dir(folder / WHOLE / room, quiet=1, workers=0)
         tried = [partial(_without, name, folder, tests) for name in reversed(names)]
-        tried += [partial(_alone, name, folder) for name in names if name != "all" and tests]
+        tried += [partial(_alone, name, folder) for name in names if name in IN_WHEEL and tests]
         with ThreadPoolExecutor(chosen.jobs) as pool:
             wrong = sum(not fine for fine in pool.map(lambda work: work(), tried))
     print(f"{len(tried) - wrong} of {len(tried)} copies work, {time.monotonic() - began:.0f} s")
@@ -106,13 +110,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 @contextmanager
 def _copy(folder: Path, name: str, gone: Iterable[str]) -> Iterator[Path]:
-    """A copy of the tree without features, and without the tests that need one of them."""
+    """A copy of the tree without features or families, and without the tests that need one of them."""
     tree = folder / name.replace(" ", "-")
     shutil.copytree(folder / WHOLE, tree, symlinks=True, copy_function=os.link)
     for each in gone:
         for found in (tree / "features" / each, *(tree / "tests/features").glob(f"*/with_{each}")):
             shutil.rmtree(found, ignore_errors=True)
-        shutil.rmtree(tree / "tests/features" / each, ignore_errors=True)
+        for room in ("families", "tests/features", "tests/families"):
+            shutil.rmtree(tree / room / each, ignore_errors=True)
     yield tree
     shutil.rmtree(tree, ignore_errors=True)
 
@@ -123,8 +128,8 @@ def _told(name: str, wrong: Sequence[str]) -> bool:
 
 
 def _without(name: str, folder: Path, tests: bool) -> bool:
-    """Delete a feature, or all, in a copy; say what does not work there."""
-    gone = [*IN_WHEEL] if name == "all" else [name]
+    """Delete a feature or a family, or several, in a copy; say what does not work there."""
+    gone = TOGETHER.get(name, [name])
     with _copy(folder, f"without {name}", gone) as tree:
         wrong = [f"{what}: {said}" for what, command, typed in _steps(tree) if (said := _run(command, tree, typed))]
         if tests and name == "all" and (said := _run([*PYTEST, "-n", str(os.cpu_count() or 1), *OF_THE_WHOLE], tree)):

@@ -37,6 +37,7 @@ FAMILY = Feature(
         ),
         Demo(f"{HERE}.simulator"),
         Modbus(),
+        Examples("program convert", ("program convert shuttle.mxt --to lexium -o shuttle-lmd.mxt",)),
         Examples("rescue", ("rescue COM3 --baud 9600 --dialect mcode",)),
     ),
 )

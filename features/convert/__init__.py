@@ -23,7 +23,6 @@ FEATURE = Feature(
             command="program convert",
             meaning="make a program file into one for other drives, name each change, and run both beside each other",
             run=_convert,
-            examples=("program convert shuttle.mxt --to lexium -o shuttle-lmd.mxt",),
             arguments={
                 "FILE": arguments.titles,
                 "--to DRIVES": arguments.converted,

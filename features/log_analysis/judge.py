@@ -14,6 +14,7 @@ from datetime import UTC, datetime, timedelta
 from typing import NamedTuple
 
 from multidrop.base.errors import Diagnostic
+from multidrop.dialects.families import FAMILIES
 from multidrop.features.log_analysis.moments import BACK
 from multidrop.shell.events import By
 from multidrop.shell.line_syntax import EVERYONE, DriveLine, parse
@@ -38,8 +39,6 @@ AT_ONCE = timedelta(seconds=5)
 MOMENT = timedelta(seconds=0.1)
 """The time after a stop in which the confirmation of an earlier one may still be said."""
 NAK = "\x15"
-MBAP, FRAME = 7, 9
-"""The bytes of the head of a Modbus/TCP message, and those of a TMCL frame."""
 UNSENT = re.compile(
     r"'(.+?)'(?: was typed; it| was stopped; it)? was not sent|^not sent, as (?:'.*?' failed|.*?): (.*)$"
 )
@@ -288,12 +287,10 @@ def _target(typed: str, entry: Entry) -> tuple[str, str, str]:
 
 def _named(sent: str, received: str, printed: str) -> set[str] | None:
     """The drives that a reply names beside a printed line; empty: it names none. None: there is no such reply."""
-    if len(sent) > MBAP and sent[2:4] == "\0\0" and (ord(sent[4]) << 8) + ord(sent[5]) == len(sent) - MBAP + 1:
-        return set() if sent[:4] in received else None
-    if len(sent) == FRAME and sum(map(ord, sent[:-1])) & 0xFF == ord(sent[-1]):
-        frames = (received[at : at + FRAME] for at in range(len(received) - FRAME + 1))
-        own = any(frame[1] == sent[0] and frame[3] == sent[1] for frame in frames)
-        return set() if own or printed in received else None
+    raw = sent.encode("latin-1"), received.encode("latin-1")
+    for family in FAMILIES.values():
+        if (replied := family.codec.replied(*raw)) is not None:
+            return set() if replied else None
     if printed not in received:
         return None
     if '"~"' in sent:  # the mark of a drive alone: a value may follow it

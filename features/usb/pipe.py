@@ -1,14 +1,12 @@
 """The USB interface of a controller as a pipe of lines: commands out, replies in, and the flush request.
 
-Source: PMX-2ED-SA manual 6.1 (64 characters each way, the late reply of 6.1.3); the vendor requests are those of the
-maker's driver for Linux. On USB a NUL ends a command and a reply. This pipe takes and delivers CR in its place, so that
-the codec of the serial line serves both.
-
-A command leaves whole or not at all. There is one command at a time: where a reply is missing, the next command
-waits a little for it, then the pipe flushes both buffers and drops what comes before the flush is confirmed. A stop
-waits for nothing: it cancels the transfer that waits and leaves from the thread that calls. If the controller does not
-take it within 100 ms, the pipe flushes and sends it once more; if that is not taken either, the pipe is lost
-(`Undelivered`).
+Source: the manual of the controllers, 6.1 (64 characters each way, the late reply of 6.1.3); the vendor requests are
+those of the maker's driver for Linux. On USB a NUL ends a command and a reply. This pipe takes and delivers CR in its
+place, so that the codec of the serial line serves both.  A command leaves whole or not at all. There is one command at
+a time: where a reply is missing, the next command waits a little for it, then the pipe flushes both buffers and drops
+what comes before the flush is confirmed. A stop waits for nothing: it cancels the transfer that waits and leaves from
+the thread that calls. If the controller does not take it within 100 ms, the pipe flushes and sends it once more; if
+that is not taken either, the pipe is lost (`Undelivered`).
 """
 
 from __future__ import annotations

@@ -121,6 +121,13 @@ class Tmcl(Codec):
     def encode(self, request: Request) -> bytes:
         return request.body
 
+    def replied(self, sent: bytes, received: bytes) -> bool | None:
+        """By address and command of a frame; a text in reply to one has neither."""
+        if len(sent) != LENGTH or sum(sent[:-1]) & 0xFF != sent[-1]:
+            return None
+        frames = (received[at : at + LENGTH] for at in range(len(received) - LENGTH + 1))
+        return any(frame[1] == sent[0] and frame[3] == sent[1] for frame in frames) or None
+
     def decode(self, request: Request, buffer: bytes) -> Decoded | None:
         """The first reply with the address and the command of the request; None while the count of nine may be lost."""
         found = self._reply_in(request, buffer)

@@ -43,6 +43,10 @@ def pdu_codec() -> PduCodec:
     return PduCodec()
 
 
+HEAD = 7
+"""Bytes of the head of a message: number, protocol, length, unit."""
+
+
 @dataclass(frozen=True)
 class Modbus(Codec):
     """One Ethernet drive. It replies to any unit identifier."""
@@ -55,6 +59,12 @@ class Modbus(Codec):
 
     def encode(self, request: Request) -> bytes:
         return pdu_codec().message(request.tag % NUMBERS, request.body, self.unit)
+
+    def replied(self, sent: bytes, received: bytes) -> bool | None:
+        """By the number of the message, where it is one: a head with the number, zeros and the length of the rest."""
+        if len(sent) <= HEAD or sent[2:4] != b"\0\0" or int.from_bytes(sent[4:6]) != len(sent) - HEAD + 1:
+            return None
+        return sent[:4] in received
 
     def decode(self, request: Request, buffer: bytes) -> Decoded | None:
         """Find the reply with the request's number and function; skip late replies.
