@@ -411,7 +411,7 @@ complete -c multidrop -n '_shtab_multidrop_using scan' -s h -l help -d 'show thi
 complete -c multidrop -n '_shtab_multidrop_using scan' -l baud -x -d 'this baud rate only'
 complete -c multidrop -n '_shtab_multidrop_using scan' -l dialect -xka "mcode pmx tmcl" -d 'this language only'
 complete -c multidrop -n '_shtab_multidrop_using scan' -l json -d 'print one JSON object a drive'
-complete -c multidrop -n '_shtab_multidrop_using scan' -l all -d 'go on after the first drives that reply; with --dialect tmcl, ask every address and not only 1'
+complete -c multidrop -n '_shtab_multidrop_using scan' -l all -d 'go on after the first drives that reply; with --dialect, ask also the addresses at which its drives are not expected'
 complete -c multidrop -n '_shtab_multidrop_using scan' -l yes -d 'answer every question with yes beforehand'
 complete -c multidrop -n '_shtab_multidrop_using scan' -l save -x -d 'save what was found as a connection of this name'
 complete -c multidrop -n '_shtab_multidrop_using scan' -l no-config -d 'read no configuration file'

@@ -16,8 +16,8 @@ import pytest
 from multidrop import Diagnostic, Session, TransportLost, connect, read_rrd
 from multidrop.api import threads
 from multidrop.api.threads import Ended, LoopThread
-from multidrop.base import registry
 from tests.support.cell_session import bus, moves, party
+from tests.support.foreign_features import delete_features
 from tests.support.virtual import VirtualLoop
 
 
@@ -96,7 +96,7 @@ def test_an_interrupted_cell_stops_what_the_session_moves(session: Session, kern
 
 
 def test_without_its_feature_an_object_is_its_text(session: Session, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(registry, "wheel", lambda name: None)
+    delete_features(monkeypatch)
     assert session._repr_html_() is None and session.drive("a")._repr_html_() is None and repr(session)
     with pytest.raises(Diagnostic, match="the feature notebook is not there; install multidrop again, whole"):
         session.live()

@@ -232,3 +232,9 @@ def functions_of(kind: type) -> set[str]:
     if hasattr(kind, "_fields"):
         return {name for name, about in kind.__annotations__.items() if "Callable" in str(about)}
     return {name for name, found in vars(kind).items() if callable(found) and not name.startswith("_")} - DATA
+
+
+def delete_features(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let no feature of the wheel be there."""
+    there = registry.wheel
+    monkeypatch.setattr(registry, "wheel", lambda name: there(name) if name in registry.FAMILIES else None)

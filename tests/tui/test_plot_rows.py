@@ -10,7 +10,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from multidrop.base import registry
 from multidrop.base.errors import Diagnostic, TransportLost
 from multidrop.drives.events import Lost, Sample, Valued
 from multidrop.shell.events import By, OnBus
@@ -23,6 +22,7 @@ from multidrop.tui.screens.dialogs import Field
 from multidrop.tui.screens.plot_page import PlotPage, cursor_rows, parse_trigger, typed_trigger
 from multidrop.tui.widgets.lines import width_of
 from tests.support.fake_session import FakeBus, FakeDrive, FakeSession, a_move, demo_session, on_screen, press, settle
+from tests.support.foreign_features import delete_features
 from tests.support.panel_rows import plain, view
 
 
@@ -403,7 +403,7 @@ async def test_what_cannot_be_saved_has_one_line(
 
 @pytest.mark.tui
 async def test_without_the_feature_of_files_nothing_is_asked_for(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(registry, "wheel", lambda name: None)
+    delete_features(monkeypatch)
     async with on_screen() as (pilot, app, session):
         session.emit(*wave("a", session))
         await press(pilot, "ctrl+g", "ctrl+s")

@@ -8,7 +8,6 @@ from typing import Any
 
 import pytest
 
-from multidrop.base import registry
 from multidrop.base.errors import Diagnostic, Refused
 from multidrop.drives.events import Valued
 from multidrop.drives.telemetry import Value
@@ -16,6 +15,7 @@ from multidrop.shell.events import OnBus
 from multidrop.shell.plots.series import parse_series
 from multidrop.shell.roles import Series
 from tests.support.cell_session import ETHERNET, CellSession, bus, party, pmx
+from tests.support.foreign_features import delete_features
 
 pytestmark = pytest.mark.virtual
 
@@ -96,7 +96,7 @@ async def test_a_plot_on_the_screen_reads_each_value_once_and_shows_the_page(tmp
 async def test_without_its_feature_a_target_is_one_line(
     tmp_path: Path, line: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(registry, "wheel", lambda name: None)
+    delete_features(monkeypatch)
     async with two_lines(tmp_path) as cell:
         with pytest.raises(Diagnostic, match="the feature plot_files is not there; install multidrop again, whole"):
             await cell.session.run(line)

@@ -66,7 +66,7 @@ def simulated(session):
         ("/open r", "rfc2217://"),
         ("/open m", "modbus://"),
         ("/open sim:", "sim:"),
-        ("/open sim:simulator/d", "sim:simulator/demo.toml"),
+        ("/open sim:families/pmx/simulator/dem", "sim:families/pmx/simulator/demo.toml"),
         ("/record s", "shuttle"),
         ("/record s", "stop"),
         ("/record shuttle -", "--replace"),
