@@ -80,6 +80,46 @@ class Options(NamedTuple):
         return tuple(f"{self.command} {each.partition(' ')[0]}" for each in self.arguments)
 
 
+class Switch(NamedTuple):
+    """What a person turns on and off on the screen: an entry of the list of everything, which can have a key.
+
+    It types `LINE on` or `LINE off` for the selected line of drives.
+    """
+
+    name: str
+    """The function in `[keys]` of the settings; with a capital, the title of the entry."""
+    line: str
+    """The verb: `/twin`."""
+    meaning: str
+    """What it is, in the list of everything."""
+    keyed: str
+    """What its key does, in the help of the screen."""
+    is_on: Callable[[Session], bool]
+
+    def claims(self) -> tuple[str, ...]:
+        """What only one feature can add."""
+        return (f"the key of {self.name}",)
+
+    def typed(self, session: Session) -> str:
+        """The line that changes it. Raises Diagnostic where a switch by others fails."""
+        return f"{self.line} {self._next(session)}"
+
+    def title(self, session: Session) -> str:
+        """`Twin on`: what the entry does; empty where the switch fails, which is then not offered."""
+        try:
+            return f"{self.name.capitalize()} {self._next(session)}"
+        except Diagnostic:  # by others
+            return ""
+
+    def _next(self, session: Session) -> str:
+        return "off" if self.is_on(session) else "on"
+
+
+def switches() -> Iterator[Switch]:
+    """All switches of features."""
+    return registry.added(Switch)
+
+
 def begin(session: Session) -> list[str]:
     """Load the features by others, and let every feature begin in a session.
 

@@ -13,6 +13,7 @@ from textual.app import App
 from textual.widgets import Input, TextArea
 
 from multidrop.macros import Macro
+from multidrop.shell.hooks import switches
 from multidrop.shell.line_syntax import showing
 from multidrop.shell.session import Session
 from multidrop.tui.assist import Assist
@@ -256,9 +257,9 @@ class Actions:
         else:
             await self._begin_recording()
 
-    def action_twin(self) -> None:
-        """Type the line that runs a twin beside each drive of the selected bus, or ends the twins."""
-        self._parts.outbox.type("/twin off" if self._parts.model.bus("").twinned else "/twin on")
+    def action_switch(self, name: str) -> None:
+        """Type the line that changes a switch of a feature."""
+        self._parts.outbox.type(next(each.typed(self._parts.session) for each in switches() if each.name == name))
 
     def action_units(self) -> None:
         """Type the line that shows the drives' own numbers, or units again."""
@@ -277,7 +278,7 @@ class Actions:
         parts = self._parts
         front = parts.app.screen
         sheet = front.SHEET if isinstance(front, Page) else ""
-        switches = {"polling": parts.purpose.polling.on, "mouse": parts.mouse_on, "twin": parts.model.bus("").twinned}
+        switches = {"polling": parts.purpose.polling.on, "mouse": parts.mouse_on}
         found = all_commands(parts.session, parts.macros, parts.assist.verbs(), parts.keymap, switches, sheet)
         return ordered(list(found), parts.recent)
 

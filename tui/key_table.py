@@ -4,7 +4,8 @@ Bindings, footers, the keys named in boxes, F1 and the table in docs/screen.md a
 name a key that does nothing. A key has one word, the same wherever it works (docs/decisions/0099); its line says what
 that is here.
 
-To add a key, add a row to `keys.csv`, and its action to the page. A sheet is a row of `sheets.csv`.
+To add a key, add a row to `keys.csv`, and its action to the page. A sheet is a row of `sheets.csv`. Features add
+`shell.hooks.Switch`es.
 """
 
 from __future__ import annotations
@@ -16,6 +17,8 @@ from typing import Any, ClassVar, NamedTuple
 from textual.binding import Binding, BindingType
 
 from multidrop.base.files import rows
+from multidrop.shell.hooks import switches
+from multidrop.shell.operations.table import join_others
 from multidrop.tui.text import key_words
 
 NONE = "no-key-"
@@ -110,6 +113,9 @@ def _sheets() -> dict[str, Sheet]:
     for row in rows(__file__, "keys.csv"):
         key = Key(row["keys"], row["action"], row["about"], row["word"], row["name"], bool(row["first"]))
         groups.setdefault(row["sheet"], {}).setdefault(row["group"], []).append(key)
+    join_others()  # their keys are bound as the classes of the screen are made
+    for each in switches():
+        groups["main"]["Lines of drives"].append(Key("", f"act.switch('{each.name}')", each.keyed, name=each.name))
     return {
         row["sheet"]: Sheet(
             row["title"], row["about"], groups[row["sheet"]], row["below"].split(), row["foot"].split(" | ")

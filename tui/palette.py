@@ -10,6 +10,7 @@ from rich.text import Text
 from textual.fuzzy import Matcher
 
 from multidrop.base.files import rows
+from multidrop.shell.hooks import switches as added
 from multidrop.shell.session import Session
 from multidrop.tui.key_table import SHEETS, all_groups
 from multidrop.tui.keymap import FunctionKeys, Keymap
@@ -77,6 +78,9 @@ def all_commands(
         title = f"Panel {panel.name} on or off"
         yield Command(title, panel.about, _call("act.panel", panel.name), keys.shown(f"panel-{panel.name}"))
     yield from _choices(session, macros, keys)
+    for each in added():
+        if title := each.title(session):
+            yield Command(title, each.meaning, _call("act.switch", each.name), keys.shown(each.name))
     switched = {name: "off" if on else "on" for name, on in switches.items()}
     for row in rows(__file__, "commands.csv"):
         shown = row["key"] if row["key"].startswith("/") else keys.shown(row["key"])

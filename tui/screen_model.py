@@ -221,10 +221,6 @@ class BusFacts:
     def readout(self, address: str) -> Readout:
         return self.readouts.setdefault(address, Readout())
 
-    @property
-    def twinned(self) -> bool:
-        return any(axis.twin is not None for readout in self.readouts.values() for axis in readout.axes)
-
 
 class ScreenModel:
     """All facts on the screen, by bus.

@@ -6,7 +6,7 @@ import argparse
 from typing import TYPE_CHECKING
 
 from multidrop.base.feature import Feature
-from multidrop.shell.hooks import AtSession, Options
+from multidrop.shell.hooks import AtSession, Options, Switch
 from multidrop.shell.operations.operation import Operation
 
 if TYPE_CHECKING:
@@ -27,6 +27,11 @@ def _begin(session: Session) -> None:
     from multidrop.features.twins.twins import begin
 
     begin(session)
+
+
+def _runs(session: Session) -> bool:
+    """Whether twins run beside drives of the selected line."""
+    return session.buses.get(session.selected_bus) in session.predicted
 
 
 def _want(session: Session, chosen: argparse.Namespace) -> None:
@@ -72,6 +77,13 @@ its twin moves on. `/twin` alone lists the twins.
             group="Settings and values",
         ),
         AtSession(_begin),
+        Switch(
+            "twin",
+            "/twin",
+            "simulated drives that run beside those of this line; every difference shows",
+            "a twin beside each drive of the line, or none",
+            _runs,
+        ),
         Options("tui", TWIN, "--raw", prepare=_want),
         Options("shell", TWIN, "--raw", prepare=_want, opened=_start),
     ),

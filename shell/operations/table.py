@@ -264,13 +264,13 @@ def _wrong(added: Operation) -> str:
 
 def load_others() -> list[str]:
     """Load all features; return a warning, once, for each that cannot be loaded or whose words are taken."""
-    _load_others()
+    join_others()
     for _ in registry.wheels():
         """One whose module raises is a warning."""
     return registry.warnings()
 
 
-def _load_others() -> None:
+def join_others() -> None:
     """Load the features by others, and take out those that add what the core has, or what it cannot use."""
     registry.load_others()
     for feature in registry.by_others():
@@ -312,7 +312,7 @@ def find(name: str) -> Operation:
     Raises Diagnostic with similar names.
     """
     if name not in VERBS and name not in SCRIPT_WORDS:
-        _load_others()
+        join_others()
     if name in VERBS:
         return VERBS[name]
     import difflib

@@ -218,6 +218,7 @@ class FakeSession:
         self.front = Front()
         self.plots: list[RunningPlot] = []
         self.plotted: tuple[Series, ...] = ()
+        self.predicted: set[object] = set()
         self.openable: dict[str, FakeBus] = {}
         self._callbacks: list[Callable[[SessionEvent], None]] = []
         self._tasks: set[asyncio.Task[bool]] = set()

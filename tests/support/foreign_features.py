@@ -29,7 +29,7 @@ from multidrop.shell.configuration import Settings
 from multidrop.shell.connect.scheme import NoLine, Scheme
 from multidrop.shell.connect.schemes import local_ports
 from multidrop.shell.connect.urls import parse
-from multidrop.shell.hooks import AtSession, Options
+from multidrop.shell.hooks import AtSession, Options, Switch
 from multidrop.shell.operations.operation import Forms, Operation
 from multidrop.shell.operations.table import COMMANDS, VERBS
 from multidrop.shell.plot_targets import PlotTargets
@@ -93,6 +93,7 @@ PLAIN: Mapping[type, Any] = MappingProxyType(
             max,
         ),
         Scheme: Slow(),
+        Switch: Switch("slow", "/slow", "be slow", "be slow, or not", lambda session: False),
         Section: Section("slow", ("key",), "[slow]", lambda table, where: table, lambda found: found),
     }
 )
@@ -140,6 +141,7 @@ CALLS: Mapping[tuple[type, str], Call] = {
     (Options, "around"): _around,
     (Pictures, "html"): lambda session, record: notebooks.picture("Session", session),
     (Pictures, "live"): lambda session, record: notebooks.live(None),
+    (Switch, "is_on"): lambda session, record: record.typed(session),
     (PlotTargets, "begin"): lambda session, record: session.run("/plot x.slow"),
     (PlotTargets, "save"): lambda session, record: plot_targets.needed().save("x.slow"),
     (PlotTargets, "read"): lambda session, record: read_rrd("x.slow"),

@@ -228,17 +228,19 @@ def test_rows_with_a_twin_stay_in_their_room(width: int, height: int, places: li
 @pytest.mark.tui
 async def test_the_palette_begins_and_ends_the_twins_of_the_line_as_typed_lines_do() -> None:
     async with on_screen(width=200, height=50) as (pilot, app, session):
-        await app.run_action("act.twin")
+        await app.run_action("act.switch('twin')")
         await pilot.pause()
+        session.predicted.add(session.buses["press"])
         await emit(pilot, *beside(session.time, 0, 0, 8112), isolated(session))
         assert "≠" in app.main.lines("side").plain + app.main.lines("far").plain
         assert "≠ twin" in app.main.lines("top").plain
         assert "Twin off" in {each.title for each in app.act.commands()}
-        await app.run_action("act.twin")
+        await app.run_action("act.switch('twin')")
         await pilot.pause()
+        session.predicted.clear()
         session.emit(OnBus("press", TwinEnded(session.time, "a")))
         await press(pilot, "ctrl+pagedown")
-        await app.run_action("act.twin")
+        await app.run_action("act.switch('twin')")
         await pilot.pause()
         assert session.sent == ["press:a /twin on", "press:a /twin off", "eth: /twin on"]
         assert "≠" not in app.main.lines("top").plain and "Twin on" in {each.title for each in app.act.commands()}
