@@ -109,7 +109,7 @@ class FakeTelemetry:
         return {address: held.period for held in self.held for address in held.addresses}
 
 
-@dataclass
+@dataclass(eq=False)
 class FakeBus:
     name: str
     drives: dict[str, FakeDrive]

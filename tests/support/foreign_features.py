@@ -24,13 +24,14 @@ from multidrop.base.feature import Feature
 from multidrop.base.foreign import guarded
 from multidrop.base.registry import Entry
 from multidrop.dialects.families import Dialect
+from multidrop.dialects.usb import UsbModule
 from multidrop.shell import configuration, hooks, plot_targets, relaying
 from multidrop.shell.configuration import Settings
 from multidrop.shell.connect.scheme import NoLine, Scheme
 from multidrop.shell.connect.schemes import local_ports
 from multidrop.shell.connect.urls import parse
 from multidrop.shell.hooks import AtSession, Options, Switch
-from multidrop.shell.operations.operation import Forms, Operation
+from multidrop.shell.operations.operation import Examples, Forms, Operation
 from multidrop.shell.operations.table import COMMANDS, VERBS
 from multidrop.shell.plot_targets import PlotTargets
 from multidrop.shell.relaying import Lent
@@ -75,6 +76,8 @@ PLAIN: Mapping[type, Any] = MappingProxyType(
         Demo: Demo("x"),
         Dialect: Dialect("slow", "x:SLOW"),
         Simulated: Simulated("slow", "x:SLOW", ("SLOW",)),
+        Examples: Examples("send", ("send sim: slow",)),
+        UsbModule: UsbModule("slow", "a slow one", "slow controller", 1, 2),
         Lent: Lent("slow:", "what is slow", lambda rest: None),
         NoLine: NoLine(("slow",), "it leads to no drives", "try another one"),
         Operation: Operation(
