@@ -5,15 +5,12 @@ A table has one question in a row: the lines that are sent, what they may do, an
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Generic, NamedTuple, TypeVar
+from typing import ClassVar, NamedTuple
 
 from multidrop.base.files import rows
 from multidrop.dialects.codec import Procedure
-from multidrop.dialects.state import DriveState
+from multidrop.dialects.state import OfDrive
 
-S = TypeVar("S", bound=DriveState)
 NOTHING, ERROR, MODE, MOVES = "nothing", "error", "mode", "moves"
 DOES = (NOTHING, MODE, ERROR, MOVES)
 """What a question may do: only read; also change a setting for a while; also raise an error; also move the motor."""
@@ -50,35 +47,42 @@ class Occupied(NamedTuple):
         return "" if does == NOTHING else self.changes or (self.errors if does in (ERROR, MOVES) else "")
 
 
-@dataclass(frozen=True)
-class Certifying(Generic[S]):
-    """The questions to the drives of a family."""
+class Certifying(OfDrive):
+    """The questions to a drive."""
 
-    module: str
+    module: ClassVar[str]
     """The `__file__` of the module beside which `questions.csv` is."""
-    reads: str
+    reads: ClassVar[str]
     """The line that prints a setting."""
-    writes: str
+    writes: ClassVar[str]
     """The line that gives a setting a value."""
-    traits: Callable[[S], set[str]] = lambda state: set()
-    """What a drive has that some questions need."""
-    occupied: Callable[[S], Procedure[Occupied]] | None = None
-    """Find out what must not be asked of a drive at rest without a running program; raises no error and clears none."""
-    refused: str = "error {code}"
+    refused: ClassVar[str] = "error {code}"
     """The answer of a drive that refuses: its error number, or the text of its reply (`{text}`)."""
-    masked: Callable[[str, bytes], str] = lambda address, raw: raw.decode("latin-1")
-    """The bytes of a reply of the drive at an address as a text, without its name."""
 
-    def questions(self, state: S) -> list[Question]:
-        """The questions for a drive, in order; of several with one name the first."""
-        own, found = self.traits(state), dict[str, Question]()
-        for each in self.table:
+    def traits(self) -> set[str]:
+        """What the drive has that some questions need."""
+        return set()
+
+    def occupied(self) -> Procedure[Occupied]:
+        """Find out what must not be asked of it at rest without a running program; raises no error and clears none."""
+        return Occupied()
+        yield  # a conversation
+
+    def masked(self, raw: bytes) -> str:
+        """The bytes of a reply as a text, without the drive's name."""
+        return raw.decode("latin-1")
+
+    def questions(self) -> list[Question]:
+        """The questions for the drive, in order; of several with one name the first."""
+        own, found = self.traits(), dict[str, Question]()
+        for each in self.table():
             if each.asks <= own:
                 found.setdefault(each.name, each)
         return list(found.values())
 
-    @property
-    def table(self) -> list[Question]:
+    @classmethod
+    def table(cls) -> list[Question]:
+        """All questions."""
         return [
             Question(
                 row["name"],
@@ -89,5 +93,5 @@ class Certifying(Generic[S]):
                 tuple(row["lines"].split(" // ")),
                 row["ruled"],
             )
-            for row in rows(self.module, "questions.csv")
+            for row in rows(cls.module, "questions.csv")
         ]

@@ -7,75 +7,78 @@ before the reply to the mark is late. The host never repeats a command.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import Generic, TypeVar
+from typing import TypeVar
 
 from multidrop.base.errors import NoAnswer, Refused, Stopped
 from multidrop.base.text import visible
 from multidrop.dialects.codec import End, Kind, Procedure, Reply, Request
-from multidrop.dialects.state import DriveState
+from multidrop.dialects.state import OfDrive
 
-S = TypeVar("S", bound=DriveState)
 T = TypeVar("T")
 
 
-def _once(request: Request) -> Procedure[Reply]:
-    return (yield request)
+class Exchange(OfDrive, ABC):
+    """The exchange with a drive; its methods record in the state what they show."""
 
+    @property
+    def _who(self) -> str:
+        return self.state.who
 
-@dataclass(frozen=True)
-class Exchange(Generic[S]):
-    """The exchange of a family; its functions record in the state what they show."""
+    @abstractmethod
+    def mark(self, request: Request, after: bool) -> Procedure[tuple[str, ...] | None]:
+        """Send a sync mark before a request, or after it; None without the mark's reply.
 
-    who: Callable[[S], str]
-    """Name a drive in a message."""
-    mark: Callable[[S, Request, bool], Procedure[tuple[str, ...] | None]]
-    """Send a sync mark before a request, or after it (True); None without the mark's reply.
+        Return the lines before that reply; after a request only those that can be its reply.
+        """
 
-    Return the lines before that reply; after a request only those that can be its reply.
-    """
-    lost: Callable[[S, Request], None]
-    """Record that the reply to a request may arrive late."""
-    refusal: Callable[[S, Request, Reply], Refused | NoAnswer]
-    """Describe a refusal; NoAnswer: that of another line."""
-    send: Callable[[S, Request], Procedure[Reply]] = lambda state, request: _once(request)
-    """Send a request once."""
+    def lost(self, request: Request) -> None:
+        """Record that the reply to a request may arrive late."""
+        self.state.reply_outstanding()
 
-    def answered(self, state: S, request: Request, doubts: list[Request] | None = None) -> Procedure[Reply]:
+    @abstractmethod
+    def refusal(self, request: Request, reply: Reply) -> Refused | NoAnswer:
+        """Describe a refusal; NoAnswer: that of another line."""
+
+    def send(self, request: Request) -> Procedure[Reply]:
+        """Send a request once."""
+        return (yield request)
+
+    def answered(self, request: Request, doubts: list[Request] | None = None) -> Procedure[Reply]:
         """Send a request once; return the reply. Raises Refused or NoAnswer.
 
         `doubts`: a list for a request whose reply may belong to another; without it a sync mark follows at once.
         """
-        yield from self.synchronised(state, request)
-        reply = yield from self.send(state, request)
+        yield from self.synchronised(request)
+        reply = yield from self.send(request)
         if reply.end in (End.TIMEOUT, End.DAMAGED):
-            self.lost(state, request)
-            raise unanswered(self.who(state), request, reply)
+            self.lost(request)
+            raise unanswered(self._who, request, reply)
         if reply.doubtful and doubts is not None:
             doubts.append(request)
         elif reply.doubtful:
-            yield from self.beyond_doubt(state, request)
-        state.settings_confirmed()
+            yield from self.beyond_doubt(request)
+        self.state.settings_confirmed()
         if reply.end is End.REFUSED:
-            if request.kind is Kind.COMMAND and not (reply.doubtful or state.programming):
-                yield from self.beyond_doubt(state, request)  # the refusal of another program's line has no other sign
-            raise self.refusal(state, request, reply)
+            if request.kind is Kind.COMMAND and not (reply.doubtful or self.state.programming):
+                yield from self.beyond_doubt(request)  # the refusal of another program's line has no other sign
+            raise self.refusal(request, reply)
         return reply
 
-    def synchronised(self, state: S, request: Request) -> Procedure[None]:
+    def synchronised(self, request: Request) -> Procedure[None]:
         """Make sure that no reply is outstanding before a request. Raises NoAnswer."""
-        if not state.reply_pending:
+        if not self.state.reply_pending:
             return
-        if (yield from unsent_if_stopped(self.who(state), request, self.mark(state, request, False))) is None:
-            raise NoAnswer(f"{self.who(state)} does not reply: '{request.text}' was not sent")
+        if (yield from unsent_if_stopped(self._who, request, self.mark(request, False))) is None:
+            raise NoAnswer(f"{self._who} does not reply: '{request.text}' was not sent")
 
-    def beyond_doubt(self, state: S, request: Request) -> Procedure[None]:
+    def beyond_doubt(self, request: Request) -> Procedure[None]:
         """Prove that a reply was not the outstanding one of another request. Raises NoAnswer."""
-        late = yield from self.mark(state, request, True)
+        late = yield from self.mark(request, True)
         if late is None or late:
             raise NoAnswer(
-                f"{self.who(state)}: a late reply came, perhaps to '{request.text}': it is not known whether that was "
+                f"{self._who}: a late reply came, perhaps to '{request.text}': it is not known whether that was "
                 "executed; it was sent once"
             )
 

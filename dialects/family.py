@@ -1,27 +1,28 @@
-"""The record of a family of drives: everything that a front end, a bus or a drive must know of it.
+"""The class of a family of drives: everything that a front end, a bus or a drive must know of one.
 
-Conversations belong here, not to the codec: each takes the `DriveState` of its own family. What a family lacks is None.
+An instance is of one drive, and knows its state; the class is the family. Conversations belong here, not to the codec.
 """
 
 from __future__ import annotations
 
 import re
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Generic, NamedTuple, Protocol, TypeVar
+from types import MappingProxyType
+from typing import TYPE_CHECKING, ClassVar, NamedTuple, Protocol
 
 from multidrop.base.comments import unsent
-from multidrop.base.errors import Inexpressible
+from multidrop.base.errors import Diagnostic, Inexpressible
 from multidrop.base.files import SourceLine, lines_of_text
-from multidrop.base.on_demand import imported, imported_if
 from multidrop.dialects.codec import Codec, Priority, Procedure
-from multidrop.dialects.state import DriveState, Owed, Remembered
+from multidrop.dialects.program_files import Difference, Held
+from multidrop.dialects.state import DriveState, OfDrive, Owed, Remembered
 
 if TYPE_CHECKING:
     from multidrop.dialects.certifying import Certifying
     from multidrop.dialects.debugging import Debugging
     from multidrop.dialects.motions import Motions
-    from multidrop.dialects.program_files import Difference, Held
     from multidrop.dialects.scanning import Scan
     from multidrop.dialects.units import Units
     from multidrop.dialects.values import Values
@@ -94,7 +95,6 @@ Printed = Procedure[tuple[str, ...]]
 """A conversation that returns lines to print."""
 Progress = Callable[[int, int], None]
 """Called with lines done and lines in all."""
-S = TypeVar("S", bound=DriveState)
 
 
 class Language(Protocol):
@@ -122,96 +122,147 @@ class Language(Protocol):
         """The word at the end of a line that may be completed; empty where none may."""
 
 
-@dataclass(frozen=True)
-class Programs(Generic[S]):
-    """Programs in the drives of a family."""
+class NoLanguage:
+    """A language of which nothing is known."""
 
-    listing: Callable[[S, str], Printed]
-    """List the drive's program from a label or an address; empty: all of it."""
-    readable: Callable[[Held], Sequence[str]]
-    """List what the drive holds in its most readable form."""
-    who: Callable[[S], str]
-    """Name a drive for a person."""
-    read: Callable[[S, Sequence[SourceLine], Progress], Procedure[Held]]
-    """Read what the drive holds, at least where these lines would go."""
-    file: Callable[[S, Held, bool], Sequence[str]]
-    """Return the lines of a file that reproduces what a drive holds; True: in its stored form."""
-    size: Callable[[Sequence[SourceLine]], int]
-    """Count the lines of a file that the drive stores."""
-    end: Callable[[S], Procedure[bool]]
-    """Begin to end running programs and their motion; whether one ran. Raises Refused where it moves without one."""
-    download: Callable[[S, Sequence[SourceLine], Held | None, Progress], Procedure[Sequence[SourceLine]]]
-    """Send a program file, and verify that the drive took every line. Return the lines sent.
+    def names(self) -> list[str]:
+        return []
 
-    They are lines that the drive held and that stay (number 0), and the file's. The third: what was just read from the
-    drive, so that the host need not read it again.
-    """
-    differences: Callable[[S, Sequence[SourceLine], Held, Held | None], Sequence[Difference]]
-    """Compare the lines of a file with what a drive holds. The last: what it held before the file was sent to it."""
-    to_send: Callable[[S, Sequence[SourceLine], Held], Procedure[str]]
-    """Return why a file must be sent; empty where the drive holds all of it."""
-    start: Callable[[Sequence[SourceLine], str], str]
-    """Return the line that executes a program of a file, by its label. Raises Diagnostic for an unknown one."""
-    annotated: Callable[[str, Held], Sequence[str]]
-    """List what the drive holds with the remarks and the layout of its file; empty where `readable` is better."""
-    refreshed: Callable[[str, Held], Sequence[str]] = lines_of_text
-    """Return the lines of a file with the present values of variables."""
-    executed: Callable[[Sequence[SourceLine]], Sequence[SourceLine]] = lambda lines: ()
-    """Return the lines of a file that the drive executes as they come, and does not store."""
-    acts: Callable[[str], bool] = lambda line: False
-    """Whether one of those lines starts motion or a program; a setting does not."""
-    save: str = ""
+    def knows(self, word: str) -> bool:
+        return False
+
+    def describe(self, word: str, product: str = "") -> list[str]:
+        raise Diagnostic(f"no help on {word}", hint="its drives have no help here")
+
+    def describe_error(self, code: int, product: str = "") -> list[str]:
+        raise Diagnostic(f"no error {code} is known", hint="its drives have no help here")
+
+    def complete(self, prefix: str, product: str = "") -> list[tuple[str, str]]:
+        return []
+
+    def hint(self, text: str, product: str = "") -> str:
+        return ""
+
+    def typing(self, text: str) -> str:
+        return ""
+
+
+class Programs(OfDrive, ABC):
+    """The programs in a drive, and the files that they come from."""
+
+    save: ClassVar[str] = ""
     """The line that makes a download last; empty: it lasts at once."""
-    remark: str = ";"
+    remark: ClassVar[str] = ";"
     """Begins a remark in a file."""
-    clearing: str = ""
+    clearing: ClassVar[str] = ""
     """The line that erases all programs; empty: there is none."""
-    begins: tuple[str, ...] = ()
+    begins: ClassVar[tuple[str, ...]] = ()
     """The words of lines that begin or end a program, or erase it with everything else."""
-    names: Callable[[S], Procedure[Held]] | None = None
-    """Read labels and variables without the program; None: the drives give none."""
-    offered: Callable[[Held, str], Sequence[tuple[str, str]]] = lambda held, line: ()
-    """Return the labels and variables that may end a line being typed, each with its meaning."""
 
-    def upload(self, state: S, raw: bool) -> Procedure[Sequence[str]]:
+    @abstractmethod
+    def listing(self, place: str) -> Printed:
+        """List the drive's program from a label or an address; empty: all of it."""
+
+    @abstractmethod
+    def readable(self, held: Held) -> Sequence[str]:
+        """List what the drive holds in its most readable form."""
+
+    @abstractmethod
+    def read(self, lines: Sequence[SourceLine], progress: Progress) -> Procedure[Held]:
+        """Read what the drive holds, at least where these lines would go."""
+
+    @abstractmethod
+    def file(self, held: Held, raw: bool) -> Sequence[str]:
+        """Return the lines of a file that reproduces what a drive holds; `raw`: in its stored form."""
+
+    @abstractmethod
+    def size(self, lines: Sequence[SourceLine]) -> int:
+        """Count the lines of a file that the drive stores."""
+
+    @abstractmethod
+    def end(self) -> Procedure[bool]:
+        """Begin to end running programs and their motion; whether one ran. Raises Refused where it moves without one."""
+
+    @abstractmethod
+    def download(
+        self, lines: Sequence[SourceLine], held: Held | None, progress: Progress
+    ) -> Procedure[Sequence[SourceLine]]:
+        """Send a program file, and verify that the drive took every line. Return the lines sent.
+
+        They are lines that the drive held and that stay (number 0), and the file's. `held`: what was just read from the
+        drive, so that the host need not read it again.
+        """
+
+    @abstractmethod
+    def differences(self, lines: Sequence[SourceLine], held: Held, before: Held | None) -> Sequence[Difference]:
+        """Compare the lines of a file with what a drive holds. `before`: what it held before the file was sent to it."""
+
+    @abstractmethod
+    def to_send(self, lines: Sequence[SourceLine], held: Held) -> Procedure[str]:
+        """Return why a file must be sent; empty where the drive holds all of it."""
+
+    @abstractmethod
+    def start(self, lines: Sequence[SourceLine], label: str) -> str:
+        """Return the line that executes a program of a file, by its label. Raises Diagnostic for an unknown one."""
+
+    def annotated(self, text: str, held: Held) -> Sequence[str]:
+        """List what the drive holds with the remarks and the layout of its file; empty where `readable` is better."""
+        return ()
+
+    def refreshed(self, text: str, held: Held) -> Sequence[str]:
+        """Return the lines of a file with the present values of variables."""
+        return lines_of_text(text, held)
+
+    def executed(self, lines: Sequence[SourceLine]) -> Sequence[SourceLine]:
+        """Return the lines of a file that the drive executes as they come, and does not store."""
+        return ()
+
+    def acts(self, line: str) -> bool:
+        """Whether one of those lines starts motion or a program; a setting does not."""
+        return False
+
+    def names(self) -> Procedure[Held]:
+        """Read labels and variables without the program; a family that offers none has none to read."""
+        return Held()
+        yield  # a conversation
+
+    def offered(self, held: Held, line: str) -> Sequence[tuple[str, str]]:
+        """Return the labels and variables that may end a line being typed, each with its meaning."""
+        return ()
+
+    def upload(self, raw: bool) -> Procedure[Sequence[str]]:
         """Read the drive's program as a file that can be downloaded; `raw`: in its stored form. Raises Refused."""
-        held = yield from self.read(state, (), lambda done, total: None)
-        held.check_program(self.who(state))
-        return self.file(state, held, raw)
+        held = yield from self.read((), lambda done, total: None)
+        held.check_program(self.state.who)
+        return self.file(held, raw)
 
 
-@dataclass(frozen=True)
-class Registers(Generic[S]):
+class Registers(OfDrive, ABC):
     """Registers and outputs that a drive has beside its words; each conversation returns lines to print."""
 
-    read: Callable[[S, int, int | None], Printed]
-    """Raw registers from an address; None: as many as the value there has."""
-    write: Callable[[S, int, Sequence[int]], Printed]
-    """One value into all its registers, or several words into one register each."""
-    lines: Callable[[int, Sequence[int]], tuple[str, ...]]
-    """The typed lines that do the same as that write, as far as words have its registers."""
-    read_coil: Callable[[S, int], Printed]
-    """The state of an output, from 1."""
-    write_coil: Callable[[S, int, bool], Printed]
-    """Switch an output, from 1."""
-    device: Callable[[S], Printed]
-    """The drive's device identification."""
+    @abstractmethod
+    def read(self, address: int, count: int | None) -> Printed:
+        """Raw registers from an address; None: as many as the value there has."""
 
+    @abstractmethod
+    def write(self, address: int, values: Sequence[int]) -> Printed:
+        """One value into all its registers, or several words into one register each."""
 
-@dataclass(frozen=True)
-class Guards(Generic[S]):
-    """The lines of a family that a person must agree to before they are sent."""
+    @abstractmethod
+    def lines(self, address: int, values: Sequence[int]) -> tuple[str, ...]:
+        """The typed lines that do the same as that write, as far as words have its registers."""
 
-    names: Mapping[str, str]
-    """The name of each guard, as the configuration has it, and what its lines do."""
-    find: Callable[[S, str], Guard | None]
-    """The guard of a typed line for a drive; None: the line needs no agreement."""
-    word_of: Callable[[str], str]
-    """The word of a typed line by which the configuration guards others."""
-    only_ends: Callable[[str], bool]
-    """Whether a line is a command of motion that can only end it: a velocity of 0."""
-    only_reads: Callable[[str], bool]
-    """Whether a line only asks for a value, and asking changes nothing; False where that is not certain."""
+    @abstractmethod
+    def read_coil(self, number: int) -> Printed:
+        """The state of an output, from 1."""
+
+    @abstractmethod
+    def write_coil(self, number: int, on: bool) -> Printed:
+        """Switch an output, from 1."""
+
+    @abstractmethod
+    def device(self) -> Printed:
+        """The drive's device identification."""
 
 
 @dataclass(frozen=True)
@@ -226,133 +277,204 @@ class Protection:
     """Another cause of silence, which is named before it."""
 
 
-@dataclass(frozen=True)
-class Family(Generic[S]):
-    """One family of drives. Every conversation raises Refused, NoAnswer, Stopped or Inexpressible."""
+class Family(OfDrive, ABC):
+    """One drive of a family: everything that a front end, a bus or a drive must know of it, as methods of its class.
 
-    name: str
+    The class itself stands for the family. Every conversation raises Refused, NoAnswer, Stopped or Inexpressible. What
+    has a default need not be there: a first family has a codec, `identify`, `perform` and `motion`.
+    """
+
+    name: ClassVar[str]
     """Its name in `dialect=`, and in `Codec.family`."""
-    codec: Codec
+    codec: ClassVar[Codec]
     """The codec for a drive of which nothing is known; a stop of an unknown line uses it."""
-    new_state: Callable[[Any, str], S]
-    """The state of a drive with this codec of the family, at this address."""
-    identify: Callable[[Hints], Procedure[list[S]]]
-    """Find the drives on a line and their settings. Raises NoAnswer where none replies."""
-    perform: Callable[[S, str], Printed]
-    """Carry out a typed line, and make sure of the outcome."""
-    check: Callable[[S, str], object]
-    """Raise Inexpressible for a line that is wrong in the language; `check_line` asks more."""
-    motion: Callable[[S, Priority], Procedure[tuple[Motion, ...]]]
-    """Position and velocity of every axis, in as few bytes as the language allows.
-
-    Where one print has room, it also says whether a program runs; a poll leaves that out.
-    """
-    moving: Callable[[S], Procedure[bool]]
-    """Whether the drive reports motion. At rest: none in two readings, `drives.drive.REST` apart."""
-    busy: Callable[[S], Procedure[bool]]
-    """Whether a program runs, which can move the drive. A stop is confirmed by it; Refused or NoAnswer: not known."""
-    referencing: Callable[[S, str], Referencing | None]
-    """Find the axis to which a typed line gives a reference; None: the line gives none."""
-    homed: Callable[[S], Procedure[bool]]
-    """Whether a homing after which the drive is at rest ended well, as far as the drive shows it."""
-    language: Language
+    language: ClassVar[Language] = NoLanguage()
     """Help and completion for what a person types to it."""
-    rests_in_place: bool
+    rests_in_place: ClassVar[bool] = False
     """At rest the position, too, is the same in both readings: in motion the velocity may read 0."""
-    question: Callable[[str], str | None]
-    """The line that prints the value of a word; None: the word has no value to read."""
-    move: Callable[[str, int | str], tuple[str, ...]]
-    """The lines that move an axis by a distance, a quantity too. An axis is as in `Motion.axis`; empty: the first."""
-    move_to: Callable[[str, int | str], tuple[str, ...]]
-    """The lines that move an axis to a position."""
-    assign: Callable[[str, str], str | None]
-    """The line that gives a word a value; None: its values are not assigned by a word."""
-    values_at: str
-    """The place of its `Values`, as of the programs below; few commands need these."""
-    units_at: str
-    """The place of its `Units`."""
-    status: Callable[[S], Printed] | None = None
-    """The drive's state in words, one line for each part; None: its drives do not report it."""
-    programs_at: str = ""
-    """The place of its `Programs`; empty: the family has none. So of what follows."""
-    no_programs: str = "the host loads no programs into drives of this family"
-    """The reason to give a person where `programs` is None."""
-    debugging_at: str = ""
-    """The place of its `Debugging`."""
-    scan_at: str = ""
-    """The place of its `Scan`."""
-    certifying_at: str = ""
-    """The place of its `Certifying`."""
-    motions_at: str = "multidrop.dialects.motions:NO_MOTIONS"
-    """The place of its `Motions`. By default nothing is known of a motion but that it has ended."""
-    registers: Registers[S] | None = None
-    baud: int = 9600
+    no_programs: ClassVar[str] = "the host loads no programs into drives of this family"
+    """The reason to give a person where it offers no `programs`."""
+    baud: ClassVar[int] = 9600
     """The default baud of a serial line."""
-    repairs: bool = False
+    repairs: ClassVar[bool] = False
     """Its identification repairs what an interrupted session left (`Hints.cut`, `Hints.owed`)."""
-    remember: Callable[[S], Remembered | None] | None = None
-    """Return the memory of a drive, None where it is not certain. The field is None where that saves nothing."""
-    guards: Guards[S] | None = None
-    """None: the family has no line that a person must agree to."""
-    stop_bytes: re.Pattern[bytes] | None = None
+    guards: ClassVar[Mapping[str, str]] = MappingProxyType({})
+    """The name of each guard on lines, as the configuration has it, and what its lines do."""
+    stop_bytes: ClassVar[re.Pattern[bytes] | None] = None
     """Matches each piece of a stop, however its drives are set; None: several programs cannot share a line of them."""
-    message_moves: Callable[[bytes], bool] = lambda messages: False
-    """Whether messages that carry their length can start a motion or a program."""
-    in_frames: Callable[[bytes], Sequence[str]] = lambda data: ()
-    """The addresses of its drives whose replies, with their checksums, are in what an unknown line sent."""
-    vouched: Callable[[str, str], bool] = lambda text, product: False
-    """Whether the tables show nothing for which a drive of a product would refuse a line."""
-    protection: Protection | None = None
+    protection: ClassVar[Protection | None] = None
     """None: its drives have none."""
-    addressed: Callable[[str, str], tuple[str, str] | None] = lambda text, product: None
-    """A line that is one of the language only after an address at its head, as on the wire: the address, and the rest.
 
-    The second argument is the product of the drive for which it was typed. None: the line has no address.
-    """
-    prepare: Callable[[], object] | None = None
-    """Slow work before the first message, safe in any thread; None: there is none."""
+    # Of the family
 
-    def check_line(self, state: S, text: str) -> None:
+    @classmethod
+    def new_state(cls, codec: Codec, address: str) -> DriveState:
+        """The state of a drive with this codec of the family, at this address."""
+        return DriveState(codec, address)
+
+    @classmethod
+    @abstractmethod
+    def identify(cls, hints: Hints) -> Procedure[Sequence[DriveState]]:
+        """Find the drives on a line and their settings. Raises NoAnswer where none replies."""
+
+    @classmethod
+    def prepare(cls) -> None:
+        """Do slow work before the first message; safe in any thread."""
+
+    @classmethod
+    def scan(cls) -> Scan | None:
+        """What finds its drives; None: nothing shows them without harm, so no search tries them."""
+        return None
+
+    @classmethod
+    def question(cls, word: str) -> str | None:
+        """The line that prints the value of a word; None: the word has no value to read."""
+        return None
+
+    @classmethod
+    def assign(cls, word: str, value: str) -> str | None:
+        """The line that gives a word a value; None: its values are not assigned by a word."""
+        return None
+
+    @classmethod
+    def move(cls, axis: str, distance: int | str) -> tuple[str, ...]:
+        """The lines that move an axis by a distance, a quantity too. An axis is as in `Motion.axis`; empty: the first."""
+        raise Inexpressible(f"{cls.name}: no line moves by a distance; nothing was sent")
+
+    @classmethod
+    def move_to(cls, axis: str, position: int | str) -> tuple[str, ...]:
+        """The lines that move an axis to a position."""
+        raise Inexpressible(f"{cls.name}: no line moves to a position; nothing was sent")
+
+    @classmethod
+    def addressed(cls, text: str, product: str) -> tuple[str, str] | None:
+        """A line that is one of the language only after an address at its head: the address, and the rest.
+
+        `product`: of the drive for which it was typed. None: the line has no address.
+        """
+        return None
+
+    @classmethod
+    def vouched(cls, text: str, product: str) -> bool:
+        """Whether the tables show nothing for which a drive of a product would refuse a line."""
+        return False
+
+    @classmethod
+    def word_of(cls, text: str) -> str:
+        """The word of a typed line by which the configuration guards others."""
+        return text.strip().partition(" ")[0].upper()
+
+    @classmethod
+    def only_ends(cls, text: str) -> bool:
+        """Whether a line is a command of motion that can only end it: a velocity of 0."""
+        return False
+
+    @classmethod
+    def only_reads(cls, text: str) -> bool:
+        """Whether a line only asks for a value, and asking changes nothing; False where that is not certain."""
+        return False
+
+    @classmethod
+    def message_moves(cls, messages: bytes) -> bool:
+        """Whether messages that carry their length can start a motion or a program."""
+        return False
+
+    @classmethod
+    def in_frames(cls, data: bytes) -> Sequence[str]:
+        """The addresses of its drives whose replies, with their checksums, are in what an unknown line sent."""
+        return ()
+
+    # Of a drive
+
+    @abstractmethod
+    def perform(self, text: str) -> Printed:
+        """Carry out a typed line, and make sure of the outcome."""
+
+    @abstractmethod
+    def motion(self, priority: Priority) -> Procedure[tuple[Motion, ...]]:
+        """Position and velocity of every axis, in as few bytes as the language allows.
+
+        Where one print has room, it also says whether a program runs; a poll leaves that out.
+        """
+
+    def check(self, text: str) -> None:
+        """Raise Inexpressible for a line that is wrong in the language; `check_line` asks more."""
+
+    def check_line(self, text: str) -> None:
         """Raise Inexpressible for a typed line that would not be sent whole, or is wrong in the language."""
         if why := unsent(text):
             raise Inexpressible(f"'{text}': {why}; nothing was sent")
-        self.check(state, text)
+        self.check(text)
+
+    def moving(self) -> Procedure[bool]:
+        """Whether the drive reports motion. At rest: none in two readings, `drives.drive.REST` apart."""
+        axes = yield from self.motion(Priority.OPERATOR)
+        return any(each.velocity for each in axes)
+
+    def busy(self) -> Procedure[bool]:
+        """Whether a program runs, which can move the drive. A stop is confirmed by it; Refused or NoAnswer: not known."""
+        return False
+        yield  # a conversation
+
+    def referencing(self, text: str) -> Referencing | None:
+        """Find the axis to which a typed line gives a reference; None: the line gives none."""
+        return None
+
+    def homed(self) -> Procedure[bool]:
+        """Whether a homing after which the drive is at rest ended well, as far as the drive shows it."""
+        return True
+        yield
+
+    def status(self) -> Printed:
+        """The drive's state in words, one line for each part; a family that offers none reports none."""
+        raise Inexpressible(f"{self.state.who}: such drives do not report their state in words; nothing was sent")
+        yield
+
+    def guard(self, text: str) -> Guard | None:
+        """The guard of a typed line for the drive; None: the line needs no agreement."""
+        return None
+
+    def remember(self) -> Remembered | None:
+        """Return the memory of the drive, None where it is not certain, or where that saves nothing."""
+        return None
 
     @property
-    def programs(self) -> Programs[S] | None:
-        found: Programs[S] | None = imported_if(self.programs_at)
-        return found
+    def values(self) -> Values:
+        """What is read of it, its settings and its controls."""
+        from multidrop.dialects.values import Values
+
+        return Values(self.state)
 
     @property
-    def values(self) -> Values[S]:
-        found: Values[S] = imported(self.values_at)
-        return found
+    def units(self) -> Units:
+        """The quantities in its lines."""
+        from multidrop.dialects.units import Units
+
+        return Units(self.state)
 
     @property
-    def units(self) -> Units[S]:
-        found: Units[S] = imported(self.units_at)
-        return found
+    def motions(self) -> Motions:
+        """How its motions begin and end. By default nothing is known of a motion but that it has ended."""
+        from multidrop.dialects.motions import Motions
+
+        return Motions(self.state)
 
     @property
-    def motions(self) -> Motions[S]:
-        """How its motions begin and end."""
-        found: Motions[S] = imported(self.motions_at)
-        return found
+    def programs(self) -> Programs | None:
+        """Its programs; None: the host loads none into it."""
+        return None
 
     @property
-    def debugging(self) -> Debugging[S] | None:
-        """Observes the programs of its drives; None: they cannot be observed."""
-        found: Debugging[S] | None = imported_if(self.debugging_at)
-        return found
+    def debugging(self) -> Debugging | None:
+        """Observes its programs; None: they cannot be observed."""
+        return None
 
     @property
-    def certifying(self) -> Certifying[S] | None:
-        """The questions of a certificate to its drives; None: there are none."""
-        found: Certifying[S] | None = imported_if(self.certifying_at)
-        return found
+    def certifying(self) -> Certifying | None:
+        """The questions of a certificate to it; None: there are none."""
+        return None
 
     @property
-    def scan(self) -> Scan[S] | None:
-        """Finds its drives; None: nothing shows them without harm, so no search tries them."""
-        found: Scan[S] | None = imported_if(self.scan_at)
-        return found
+    def registers(self) -> Registers | None:
+        """Its registers; None: it has none beside its words."""
+        return None

@@ -6,16 +6,14 @@ ended a motion, and whether that is a failure, is decided once for all families 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import Enum
 from types import MappingProxyType
-from typing import Generic, TypeVar
 
 from multidrop.dialects.codec import Procedure
-from multidrop.dialects.state import DriveState
+from multidrop.dialects.state import OfDrive
 
-S = TypeVar("S", bound=DriveState)
 Signs = Mapping[str, int]
 """What was read of a drive that may show a failure, by the family's own names. It may hold more, such as a position."""
 NO_SIGNS: Signs = MappingProxyType({})
@@ -147,53 +145,46 @@ class Ending:
         return "is at rest" if self.outcome is Outcome.REACHED else "stopped"
 
 
-def _no_effect(state: DriveState, text: str) -> Effect:
-    return NOTHING
+class Motions(OfDrive):
+    """What a family says of the motions of a drive. Each conversation raises Refused, NoAnswer, Stopped or Inexpressible.
 
-
-def _no_signs(state: DriveState) -> Procedure[Signs]:
-    return NO_SIGNS
-    yield  # a conversation without a request
-
-
-def _nothing_old(state: DriveState, signs: Signs, own: bool) -> Procedure[Signs]:
-    return signs
-    yield
-
-
-def _reached(state: DriveState, axis: str, evidence: Evidence) -> Procedure[Ending | None]:
-    return Ending(Outcome.REACHED, axis)
-    yield
-
-
-@dataclass(frozen=True)
-class Motions(Generic[S]):
-    """What a family says of its motions. Each conversation raises Refused, NoAnswer, Stopped or Inexpressible.
-
-    The defaults know of no motion: such a family's waits end when its drives are at rest.
+    The defaults know of no motion: waits for such a drive end when it is at rest.
     """
 
-    effect: Callable[[S, str], Effect] = _no_effect
-    """What a typed line does to the motions of a drive. Asks nothing."""
-    signs: Callable[[S], Procedure[Signs]] = _no_signs
-    """Read the signs of a failure, and where the axes are; nothing that changes when it is read."""
-    old: Callable[[S, Signs, bool], Procedure[Signs]] = _nothing_old
-    """Report what `signs` show from before; return the signs from which the judgement is to count.
+    def effect(self, text: str) -> Effect:
+        """What a typed line does to the motions of the drive. Asks nothing."""
+        return NOTHING
 
-    True: an own motion follows, so what must be cleared before it may be cleared. False: nothing may be cleared.
-    """
-    place: Callable[[Signs, str], int | None] = lambda signs, axis: None
-    """The position of an axis at rest in `signs`; None: it moves, or its position was not read."""
-    runs: Callable[[Signs], bool] = lambda signs: False
-    """Whether `signs` show a program that runs, or that the drive may start itself: it may move any axis."""
-    judge: Callable[[S, str, Evidence], Procedure[Ending | None]] = _reached
-    """Judge the motion of an axis that two readings show at rest; None: it is not over yet (it settles).
+    def signs(self) -> Procedure[Signs]:
+        """Read the signs of a failure, and where the axes are; nothing that changes when it is read."""
+        return NO_SIGNS
+        yield  # a conversation without a request
 
-    Of an own motion it may read, for the reason, what reading clears. STOPPED: it ended short of its target, or was
-    endless; nothing shows a failure, and nothing in the drive explains it. The caller knows who stopped it.
-    """
-    fails: Callable[[int], bool] = lambda code: False
-    """Whether an error number, once read, is that of a motion or of the machine, and not the refusal of a line."""
+    def old(self, signs: Signs, own: bool) -> Procedure[Signs]:
+        """Report what `signs` show from before; return the signs from which the judgement is to count.
 
+        `own`: an own motion follows, so what must be cleared before it may be cleared. Else nothing may be cleared.
+        """
+        return signs
+        yield
 
-NO_MOTIONS: Motions[DriveState] = Motions()
+    def place(self, signs: Signs, axis: str) -> int | None:
+        """The position of an axis at rest in `signs`; None: it moves, or its position was not read."""
+        return None
+
+    def runs(self, signs: Signs) -> bool:
+        """Whether `signs` show a program that runs, or that the drive may start itself: it may move any axis."""
+        return False
+
+    def judge(self, axis: str, evidence: Evidence) -> Procedure[Ending | None]:
+        """Judge the motion of an axis that two readings show at rest; None: it is not over yet (it settles).
+
+        Of an own motion it may read, for the reason, what reading clears. STOPPED: it ended short of its target, or was
+        endless; nothing shows a failure, and nothing in the drive explains it. The caller knows who stopped it.
+        """
+        return Ending(Outcome.REACHED, axis)
+        yield
+
+    def fails(self, code: int) -> bool:
+        """Whether an error number, once read, is that of a motion or of the machine, and not the refusal of a line."""
+        return False

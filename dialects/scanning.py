@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Generic, TypeVar
+from typing import ClassVar
 
 from multidrop.dialects.codec import Procedure, StopPiece
 from multidrop.dialects.state import DriveState
 
-S = TypeVar("S", bound=DriveState)
 WINDOW = 0.02
 """The silence after a question that shows that no drive has its address, s."""
 
@@ -48,42 +48,57 @@ class Outcome:
     """Replies that could not be read, in words."""
 
 
-Found = Callable[[S], None]
+Found = Callable[[DriveState], None]
 """Called with each drive as soon as it is identified."""
 Step = Callable[[], None]
 """Called after each address that was tried."""
 
 
-@dataclass(frozen=True)
-class Scan(Generic[S]):
+class Scan(ABC):
     """The search for the drives of a family. It moves nothing and raises no error in a drive of that family."""
 
-    title: str
+    title: ClassVar[str]
     """The name of the language for a person."""
-    bauds: tuple[int, ...]
+    bauds: ClassVar[tuple[int, ...]]
     """The baud rates that its drives can be set to."""
-    places: Callable[[Reach], int]
-    """The number of steps of a search."""
-    search: Callable[[Reach, Found[S], Step], Procedure[Outcome]]
-    """Search a line at its baud rate."""
-    clear: Callable[[], Procedure[None]] | None = None
-    """Clear what keeps drives from replying; it may be an error in them, and erases nothing. None: nothing does."""
-    clears: str = ""
-    """What `clear` does, for a person."""
-    erase: Callable[[], Procedure[None]] | None = None
-    """Set every drive on the line to its factory defaults; None: the language has no word for it."""
-    names: tuple[str, ...] = ()
+    names: ClassVar[tuple[str, ...]] = ()
     """The addresses that a stop names for drives that have not replied."""
-    asked: Callable[[Reach], str] = lambda reach: "all names, with and without a checksum"
-    """The addresses that a search asks, in words."""
-    hazard: str = ""
+    clears: ClassVar[str] = ""
+    """What `clear` does, for a person; empty: nothing keeps its drives from replying."""
+    erases: ClassVar[bool] = False
+    """The language has a word for `erase`."""
+    hazard: ClassVar[str] = ""
     """What its bytes may do in other drives, for the question before it: nothing else searches for its drives."""
-    waits: float = 0.0
+    waits: ClassVar[float] = 0.0
     """The time of a search beside that of its steps, s."""
-    slow: float = 0.0
+    slow: ClassVar[float] = 0.0
     """The time by which a step may take longer than the window and its bytes, s."""
-    stop: Callable[[Sequence[str]], Sequence[StopPiece]] = lambda asked: ()
-    """The stop for addresses that were asked and have not replied; where one replies, its whole stop follows."""
+
+    @abstractmethod
+    def places(self, reach: Reach) -> int:
+        """The number of steps of a search."""
+
+    @abstractmethod
+    def search(self, reach: Reach, found: Found, step: Step) -> Procedure[Outcome]:
+        """Search a line at its baud rate."""
+
+    def clear(self) -> Procedure[None]:
+        """Clear what keeps drives from replying; it may be an error in them, and erases nothing."""
+        return
+        yield  # a conversation
+
+    def erase(self) -> Procedure[None]:
+        """Set every drive on the line to its factory defaults."""
+        return
+        yield
+
+    def asked(self, reach: Reach) -> str:
+        """The addresses that a search asks, in words."""
+        return "all addresses"
+
+    def stop(self, asked: Sequence[str]) -> Sequence[StopPiece]:
+        """The stop for addresses that were asked and have not replied; where one replies, its whole stop follows."""
+        return ()
 
     def seconds(self, reach: Reach, baud: int | None) -> float:
         """Estimate the time of a search."""

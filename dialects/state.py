@@ -129,6 +129,11 @@ class DriveState:
     stranger: str = ""
     """Why this device may be no drive of its family: multidrop sends it only what a person types. Empty: it is one."""
 
+    @property
+    def who(self) -> str:
+        """The drive in a message."""
+        return self.label or self.address or "the drive"
+
     # Messages for a person
 
     def note(self, warning: str) -> None:
@@ -233,3 +238,18 @@ class DriveState:
     def owes_nothing(self) -> None:
         """Forget the settings to restore: they are restored, or restoring is given up."""
         self.restore = None
+
+
+class OfDrive:
+    """What a family says of one drive, in a class for each subject. A family's own class knows its own kind of state."""
+
+    state: DriveState
+
+    def __init__(self, state: DriveState) -> None:
+        self.state = state
+
+    @classmethod
+    def offers(cls, name: str) -> bool:
+        """Whether a family has something of its own in place of the default."""
+        having = [each for each in cls.__mro__ if name in vars(each)]
+        return having[0] is not having[-1]

@@ -11,17 +11,17 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
 from fractions import Fraction
 from functools import cached_property
-from typing import Any, Generic, NamedTuple, TypeVar
+from typing import Any, ClassVar, NamedTuple
 
 from multidrop.base.errors import Diagnostic
 from multidrop.base.text import DECIMAL
 from multidrop.dialects.codec import Procedure, Request
-from multidrop.dialects.state import DriveState
+from multidrop.dialects.state import OfDrive
 
 LENGTH, ANGLE, MOTOR = "length", "angle", "motor"
 """The kinds of units; each own word is a kind of its own."""
@@ -434,7 +434,6 @@ def with_numbers(text: str) -> str:
 # What the lines of a family take.
 
 
-S = TypeVar("S", bound=DriveState)
 VALUE = r"(\{[^{}]*\}|[+-]?\d+)"
 """A quantity or a whole number, in the pattern of a line that takes either."""
 
@@ -449,27 +448,46 @@ class Field(NamedTuple):
     moves: bool = False
 
 
-@dataclass(frozen=True)
-class Units(Generic[S]):
-    """The quantities in the lines of a family, and what the counting of its axes rests on."""
+class Units(OfDrive):
+    """The quantities in the lines of a family, and what the counting of an axis rests on. By default there are none."""
 
-    axes: Callable[[S], Sequence[str]]
-    """The axes of a drive, as in `Motion.axis`."""
-    fields: Callable[[S, str], Sequence[Field]]
-    """The places of a line that take a quantity; a whole number in them is found, too."""
-    words: str
+    words: ClassVar[str] = ""
     """The words that take one, for a person."""
-    basis: Callable[[S, str, int | None], Procedure[Basis]]
-    """Read what the counting of an axis rests on; the last: its full steps a turn, where a person gave them."""
-    disturbs: Callable[[S, str], Collection[str]]
-    """The axes whose positions may count from elsewhere, or otherwise, after a line."""
-    recounts: Callable[[Request], bool]
-    """Whether a request, once executed, may change what the counting of an axis rests on."""
-    reads: Callable[[S, str], tuple[str, Takes] | None]
-    """What a question prints: its axis, and how that counts; None: no quantity."""
-    setting: Callable[[S, str], tuple[str, Takes] | None] | None = None
-    """What a setting holds: its axis, and how that counts; None in place of it: as the line that assigns one."""
-    setting_name: Callable[[str, str], str] = lambda axis, name: name
-    """The name among the settings of a drive of one that the counting of an axis rests on."""
-    target: Callable[[S], Procedure[Takes]] | None = None
-    """Read what a field of `Takes.TARGET` means now."""
+
+    def axes(self) -> Sequence[str]:
+        """The axes of the drive, as in `Motion.axis`."""
+        return ("",)
+
+    def fields(self, text: str) -> Sequence[Field]:
+        """The places of a line that take a quantity; a whole number in them is found, too."""
+        return ()
+
+    def basis(self, axis: str, full_steps: int | None) -> Procedure[Basis]:
+        """Read what the counting of an axis rests on. `full_steps`: of a turn, where a person gave them."""
+        return Basis(missing="nothing tells how it counts")
+        yield  # a conversation
+
+    def disturbs(self, text: str) -> Collection[str]:
+        """The axes whose positions may count from elsewhere, or otherwise, after a line."""
+        return ()
+
+    def recounts(self, request: Request) -> bool:
+        """Whether a request, once executed, may change what the counting of an axis rests on."""
+        return False
+
+    def reads(self, text: str) -> tuple[str, Takes] | None:
+        """What a question prints: its axis, and how that counts; None: no quantity."""
+        return None
+
+    def setting(self, name: str) -> tuple[str, Takes] | None:
+        """What a setting holds: its axis, and how that counts; None: no quantity. By default as the line that assigns one."""
+        return None
+
+    def setting_name(self, axis: str, name: str) -> str:
+        """The name among the settings of a drive of one that the counting of an axis rests on."""
+        return name
+
+    def target(self) -> Procedure[Takes]:
+        """Read what a field of `Takes.TARGET` means now."""
+        return Takes.PLACE
+        yield

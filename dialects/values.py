@@ -14,13 +14,13 @@ from dataclasses import dataclass, field
 from functools import cache
 from math import isclose
 from types import MappingProxyType
-from typing import Any, Generic, TypeVar
+from typing import ClassVar
 
-from multidrop.base.errors import Refused
+from multidrop.base.errors import Diagnostic, Inexpressible, Refused
 from multidrop.base.files import rows
 from multidrop.base.text import real
 from multidrop.dialects.codec import Priority, Procedure
-from multidrop.dialects.state import DriveState
+from multidrop.dialects.state import OfDrive
 
 # Settings, and the steps that change them
 
@@ -121,9 +121,6 @@ class Plan:
         return len(self.changes)
 
 
-S = TypeVar("S", bound=DriveState)
-
-
 def read_each(
     names: Sequence[str], read: Callable[[str], Procedure[Reading]], progress: Progress, unread: Pairs = ()
 ) -> Procedure[Readings]:
@@ -139,33 +136,43 @@ def read_each(
     return Readings(tuple(found), tuple(refused))
 
 
-def no_conflict(plan: Plan, others: Collection[str]) -> str:
-    """Return no reason: the settings of the family give a drive no address."""
-    return ""
+class Parameters(OfDrive):
+    """The settings of a drive. By default it has none that can be read."""
 
-
-@dataclass(frozen=True)
-class Parameters(Generic[S]):
-    """Parameters of the drives of a family."""
-
-    read: Callable[[S, Progress], Procedure[Readings]]
-    """Read every setting."""
-    plan: Callable[[S, Readings, Mapping[str, Value], Permission], Plan]
-    """Order the steps from the present to the wanted values. Raises Diagnostic for a value that the drive refuses."""
-    ready: Callable[[S], Procedure[str]]
-    """Return the reason for which settings must not be changed now: it moves, a program runs; empty: there is none."""
-    write: Callable[[S, Change], Procedure[object]]
-    """Carry out a step, and make sure of it."""
-    save: Callable[[S], Procedure[object]]
-    """Keep the settings over power-off."""
-    language: str
+    language: ClassVar[str] = ""
     """The language whose names the settings bear; two families may share it."""
-    saving: str = "S"
+    saving: ClassVar[str] = "S"
     """The word that saves, for a message."""
-    conflict: Callable[[Plan, Collection[str]], str] = no_conflict
-    """The reason for which a plan cannot be carried out beside drives at these addresses; empty: there is none."""
-    later: frozenset[str] = frozenset()
+    later: ClassVar[frozenset[str]] = frozenset()
     """Settings that act once they are saved and the drive is switched off and on."""
+
+    def read(self, progress: Progress) -> Procedure[Readings]:
+        """Read every setting."""
+        raise Inexpressible(f"{self.state.who}: no settings of such drives are known; nothing was sent")
+        yield  # a conversation
+
+    def plan(self, present: Readings, wanted: Mapping[str, Value], permission: Permission) -> Plan:
+        """Order the steps from the present to the wanted values. Raises Diagnostic for a value that the drive refuses."""
+        return Plan()
+
+    def ready(self) -> Procedure[str]:
+        """Return the reason for which settings must not be changed now: it moves, a program runs; empty: there is none."""
+        return ""
+        yield
+
+    def write(self, change: Change) -> Procedure[object]:
+        """Carry out a step, and make sure of it."""
+        raise Inexpressible(f"{self.state.who}: no settings of such drives are known; nothing was sent")
+        yield
+
+    def save(self) -> Procedure[object]:
+        """Keep the settings over power-off."""
+        raise Inexpressible(f"{self.state.who}: such drives keep no settings, as far as is known; nothing was sent")
+        yield
+
+    def conflict(self, plan: Plan, others: Collection[str]) -> str:
+        """The reason for which a plan cannot be carried out beside drives at these addresses; empty: there is none."""
+        return ""
 
 
 def number(value: Value | None) -> float:
@@ -276,11 +283,11 @@ class Conditions:
 
 
 @dataclass(frozen=True)
-class Part(Generic[S]):
+class Part:
     """One short conversation that reads some facts, at the priority of polls. Raises Refused or NoAnswer."""
 
     name: str
-    read: Callable[[S], Procedure[Facts]]
+    read: Callable[[], Procedure[Facts]]
     slow: bool = False
 
 
@@ -380,50 +387,88 @@ def controls_of(module: str, axis: str = "", number: int = 1) -> Controls:
     return found
 
 
-@dataclass(frozen=True)
-class Actions:
+class Actions(OfDrive):
     """What a program asks of a drive of any family, as lines of this one. An axis is as in `Motion.axis`."""
 
-    homings: Callable[[str], Mapping[str, Mapping[str, str]]]
-    """The lines that home an axis, by mode (the first is the usual one), then by direction.
-
-    An empty direction: the drive's own settings fix it.
-    """
-    run: Callable[[str, int | str], tuple[str, ...]]
-    """The lines that run at a velocity with a sign; it may be a quantity. Raises Inexpressible."""
-    output: Callable[[int, bool], str]
-    """The line that switches an output."""
-    error: str = ""
+    error: ClassVar[str] = ""
     """The word that reads the number of the error and clears it."""
-    clear: Callable[[str], str] | None = None
-    """The line that clears the error of an axis, where reading does not."""
-    no_error: str = ""
+    no_error: ClassVar[str] = "such drives report no error by a number"
     """The reason for which no error can be read; empty: one can."""
-    word: Callable[[str, str], str] = lambda word, axis: word
-    """A word as the drive has it, for an axis."""
-    ports: Callable[[Any], Mapping[int, str]] = lambda state: {}
-    """The lines that read inputs which no conditions have, by number."""
+
+    def homings(self, axis: str) -> Mapping[str, Mapping[str, str]]:
+        """The lines that home an axis, by mode (the first is the usual one), then by direction.
+
+        An empty direction: the drive's own settings fix it.
+        """
+        return {}
+
+    def run(self, axis: str, velocity: int | str) -> tuple[str, ...]:
+        """The lines that run at a velocity with a sign; it may be a quantity. Raises Inexpressible."""
+        raise Inexpressible(f"{self.state.who}: no line of such drives runs at a velocity; nothing was sent")
+
+    def output(self, number: int, on: bool) -> str:
+        """The line that switches an output. Raises Inexpressible."""
+        raise Inexpressible(f"{self.state.who}: no line of such drives switches an output; nothing was sent")
+
+    def clear(self, axis: str) -> str:
+        """The line that clears the error of an axis, where reading does not; empty: reading does."""
+        return ""
+
+    def word(self, word: str, axis: str) -> str:
+        """A word as the drive has it, for an axis."""
+        return word
+
+    def ports(self) -> Mapping[int, str]:
+        """The lines that read inputs which no conditions have, by number."""
+        return {}
 
 
-@dataclass(frozen=True)
-class Values(Generic[S]):
-    """What a family reads of its drives for a person, the settings that it changes, and the controls of an axis."""
+class Values(OfDrive):
+    """What is read of a drive for a person, the settings that are changed, and the controls of an axis.
 
-    parameters: Parameters[S]
-    snapshot: Callable[[S, Progress], Procedure[Snapshot]]
-    """Read everything of a drive that a cell file needs. Raises Refused or NoAnswer."""
-    parts: Callable[[S, Facts], Sequence[Part[S]]]
-    """The parts of the conditions to read, where these facts are known; none where the drive's mode forbids it."""
-    fold: Callable[[S, Facts], tuple[Conditions, ...]]
-    """The conditions of each axis, from what the parts have read."""
-    check: Callable[[S, str], str]
-    """Return a word as the drive spells it; nothing is sent. Raises Diagnostic for a word that must not be polled."""
-    first: Callable[[S, str], Procedure[float]]
-    """Read the value of a word for a person; verify that the drive has it. Raises Refused, NoAnswer or Stopped."""
-    again: Callable[[S, str, Priority], Procedure[float]]
-    """Read a value that was read before. Raises NoAnswer or Stopped, and Refused where the drive lost the value."""
-    controls: Callable[[S, str], Controls]
-    """The controls of an axis."""
-    actions: Actions
-    own: Callable[[S, str], bool] = lambda state, word: True
-    """Whether a checked word belongs to the language; any other would be a name that a person gave."""
+    By default nothing is known but position and velocity.
+    """
+
+    @property
+    def parameters(self) -> Parameters:
+        """Its settings."""
+        return Parameters(self.state)
+
+    @property
+    def actions(self) -> Actions:
+        """What a program asks of it."""
+        return Actions(self.state)
+
+    def snapshot(self, progress: Progress) -> Procedure[Snapshot]:
+        """Read everything of a drive that a cell file needs. Raises Refused, NoAnswer or Inexpressible."""
+        raise Inexpressible(f"{self.state.who}: no settings of such drives are known; nothing was sent")
+        yield  # a conversation
+
+    def parts(self, facts: Facts) -> Sequence[Part]:
+        """The parts of the conditions to read, where these facts are known; none where the drive's mode forbids it."""
+        return ()
+
+    def fold(self, facts: Facts) -> tuple[Conditions, ...]:
+        """The conditions of each axis, from what the parts have read."""
+        return ()
+
+    def check(self, word: str) -> str:
+        """Return a word as the drive spells it; nothing is sent. Raises Diagnostic for a word that must not be polled."""
+        raise Diagnostic(f"{self.state.who}: no value {word}", "", "valid: position, velocity")
+
+    def first(self, word: str) -> Procedure[float]:
+        """Read the value of a word for a person; verify that the drive has it. Raises Refused, NoAnswer or Stopped."""
+        raise Inexpressible(f"{self.state.who}: no value {word}; nothing was sent")
+        yield
+
+    def again(self, word: str, priority: Priority) -> Procedure[float]:
+        """Read a value that was read before. Raises NoAnswer or Stopped, and Refused where the drive lost the value."""
+        return (yield from self.first(word))
+
+    def controls(self, axis: str) -> Controls:
+        """The controls of an axis."""
+        return {name: Control(absent="such drives have no line for it, as far as is known") for name in NAMES}
+
+    def own(self, word: str) -> bool:
+        """Whether a checked word belongs to the language; any other would be a name that a person gave."""
+        return True
