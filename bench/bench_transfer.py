@@ -88,16 +88,16 @@ async def transfer(where: str, baud: int, codec: MCode) -> list[float]:
         file = program_file.read("\n".join(PROGRAM), "bench.mxt")
         watched = Lines(drive)
         times = [time.perf_counter()]
-        held = await drive.run(MCODE.programs.read(drive.state, file, nothing))
+        held = await drive.run(MCODE.programs.read(file, nothing))
         times.append(time.perf_counter())
         sent = await drive.download(file, held)
         times.append(time.perf_counter())
         await drive.send("S")
         times.append(time.perf_counter())
-        found = await drive.run(MCODE.programs.read(drive.state, file, nothing))
-        assert not MCODE.programs.differences(drive.state, sent, found)
+        found = await drive.run(MCODE.programs.read(file, nothing))
+        assert not MCODE.programs.differences(sent, found)
         times.append(time.perf_counter())
-        made = await drive.run(MCODE.programs.upload(drive.state, True))
+        made = await drive.run(MCODE.programs.upload(True))
         times.append(time.perf_counter())
         assert [each for each in made if each in BODY] == BODY, made
         return [watched.last - watched.first, *(b - a for a, b in pairwise(times))]

@@ -81,7 +81,7 @@ class Counting:
         news = {}
         for axis in self.axes:
             before, recounts = self.changes(axis), state.recounts
-            found = yield from at_priority(units.basis(state, axis, None), priority)
+            found = yield from at_priority(units.basis(axis, None), priority)
             self.saw(axis, found.settings, recounts)
             if (changes := self.changes(axis)) and changes != before:
                 news[axis] = changes

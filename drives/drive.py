@@ -214,7 +214,7 @@ class Drive:
         check_quantities(self.shown, text)
         self.check_address(text)
         if self.state.address not in GLOBAL or self.codec.broadcasts:  # else each drive that the line is for checks it
-            self.family.check_line(self.state, text)
+            self.family.check_line(text)
 
     def check_address(self, text: str) -> None:
         """Raise Inexpressible for a line that begins with the address of a drive of this line, as on the wire."""
@@ -229,7 +229,7 @@ class Drive:
         if self.one_by_one:
             _refuse_while_stored(self.recipients, "end that mode first")
             return await _to_each(self.recipients, text, check)
-        procedure = self.family.perform(self.state, text)
+        procedure = self.family.perform(text)
         if check is not None:
             procedure = _checked(check(self), procedure, self)
         if to_all:
@@ -253,7 +253,7 @@ class Drive:
                 self._disturbed(text)
         self._values.took(known, text)
         asked = not stored and (self.state.unreferenced or self.starts(text))
-        found = self.family.referencing(self.state, text) if asked else None
+        found = self.family.referencing(text) if asked else None
         if found is not None and found.homing:
             self._homes(found.axis, before)
             if self.state.unreferenced:
@@ -284,7 +284,7 @@ class Drive:
         if axis in self.homed:
             return self.homed[axis]
         sent = self.homings.get(axis)
-        well = await self.run(self.family.homed(self.state))
+        well = await self.run(self.family.homed())
         if self.homings.get(axis) == sent:
             self.homed[axis] = well and sent == self._sent
             if self.homed[axis]:
@@ -295,8 +295,8 @@ class Drive:
         """Raise Unreferenced where a line must not start it, or a drive that the line is for, as `hold` says."""
         for each in [drive for drive in self._meant if drive.hold and drive.state.unreferenced]:
             guards, state = each.family.guards, each.state
-            moved = {field.axis for field in each.family.units.fields(state, text)}
-            ends = each.family.referencing(state, text) is not None or (guards is not None and guards.only_ends(text))
+            moved = {field.axis for field in each.family.units.fields(text)}
+            ends = each.family.referencing(text) is not None or (guards is not None and guards.only_ends(text))
             if not ends and (not moved or moved & state.unreferenced):
                 raise Unreferenced(
                     f"{each.shown}: {each.hold}: its position is not referenced, and '{text or 'this'}' was not sent; "
@@ -306,7 +306,7 @@ class Drive:
     def _disturbed(self, text: str) -> None:
         """Note the places of the machine that a line, which may have been executed, has left without a reference."""
         if self.anchored:
-            self.state.reference_lost(self.anchored.intersection(self.family.units.disturbs(self.state, text)))
+            self.state.reference_lost(self.anchored.intersection(self.family.units.disturbs(text)))
 
     def starts(self, text: str) -> bool:
         """Whether a line can start motion or a program in it; in program mode the line is stored."""
@@ -362,7 +362,7 @@ class Drive:
         """
         self.transferring = True
         try:
-            return await self.run(self.programs.download(self.state, lines, held, progress))
+            return await self.run(self.programs.download(lines, held, progress))
         finally:
             self.transferring = False
 
@@ -387,7 +387,7 @@ class Drive:
                 self.resting = (at, self.commands, {axis.axis: axis.position for axis in axes} if at_rest else {})
             on_over(outcome)
 
-        return self.start(family.motion(self.state, priority), over)
+        return self.start(family.motion(priority), over)
 
     def scale_holds(self, axis: str) -> bool:
         """Whether the scale of an axis rests on what was accepted, as far as is known."""
@@ -396,7 +396,7 @@ class Drive:
     async def rest(self) -> tuple[int, ...] | None:
         """Read whether it rests: None while it moves; else what a reading REST later must show again, too."""
         at = self.link.now()
-        if await self.run(self.family.moving(self.state)):
+        if await self.run(self.family.moving()):
             return None
         self.rested_at = at
         if not self.family.rests_in_place:
@@ -406,7 +406,7 @@ class Drive:
 
     async def busy(self) -> bool:
         at = self.link.now()
-        runs = await self.run(self.family.busy(self.state))
+        runs = await self.run(self.family.busy())
         self._program_read(at, runs)
         return runs
 

@@ -102,9 +102,9 @@ class Restarts:
         try:
             axes = await drive.motion()
             settings: dict[str, Value] = {}
-            for part in drive.family.values.parts(drive.state, {}) if before else ():
+            for part in drive.family.values.parts({}) if before else ():
                 if part.slow and part.name in drive.settings:
-                    settings |= await drive.run(part.read(drive.state))
+                    settings |= await drive.run(part.read())
         except (DriveError, TransportLost) as failure:
             drive.missing = isinstance(failure, NoAnswer)
             return

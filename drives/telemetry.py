@@ -117,7 +117,7 @@ class _ValuePoller(Poller[Value]):
         return self._roster.at(thing.address)
 
     def _begin(self, thing: Value, due: Due, drive: Drive) -> None:
-        procedure = drive.family.values.again(drive.state, thing.word, Priority.POLL)
+        procedure = drive.family.values.again(thing.word, Priority.POLL)
         self._converse(thing, due, partial(drive.start, procedure, typed=True), self._took)
 
     def _took(self, value: Value, at: float, read: float) -> None:
@@ -210,9 +210,9 @@ class _ConditionPoller(Poller[str]):
             known = self._known[address] = _Facts(drive, restarts=restarts)
         values = drive.family.values
         ready, begun, period = False, self._link.now(), self.periods[address]
-        parts = values.parts(drive.state, known.facts)
+        parts = values.parts(known.facts)
         for name in [part.name for part in parts]:
-            part = next((each for each in values.parts(drive.state, known.facts) if each.name == name), None)
+            part = next((each for each in values.parts(known.facts) if each.name == name), None)
             if part is None or not self._part_due(known, part, period):
                 continue
             if self._barred(drive) or not await self._read_part(known, due, part):
@@ -221,7 +221,7 @@ class _ConditionPoller(Poller[str]):
         if parts and drive.counting.axes and not self._barred(drive) and self._scale_due(known, period):
             await self._read_scales(known)
         if ready and known.facts:
-            conditions = values.fold(drive.state, known.facts)
+            conditions = values.fold(known.facts)
             if (runs := next((each.runs for each in conditions if each.runs is not None), None)) is not None:
                 drive.running = Running(begun, runs)
             self._link.publish(Conditioned(self._link.now(), drive.address, conditions))
@@ -255,7 +255,7 @@ class _ConditionPoller(Poller[str]):
         drive = known.drive
         commands = drive.commands
         try:
-            found = await drive.run(part.read(drive.state))
+            found = await drive.run(part.read())
             known.facts |= found
             if part.slow:
                 drive.settings[part.name] = (found, commands)

@@ -232,7 +232,7 @@ def _typed(text: str) -> None:
         family.language.hint(parsed.text)
         family.language.complete(parsed.text)
         try:
-            asked = next(family.perform(state, parsed.text), None)
+            asked = next(family.perform(parsed.text), None)
             if asked is not None:
                 assert family.codec.encode(asked)
         except DriveError as problem:

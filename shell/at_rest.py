@@ -25,7 +25,7 @@ async def excused(drive: Drive) -> bool:
     """Read whether a drive that was at rest still is, runs no program and has no trips enabled: it needs no stop."""
     try:
         async with asyncio.timeout(LIMIT):
-            ready = await drive.run(drive.family.values.parameters.ready(drive.state))
+            ready = await drive.run(drive.family.values.parameters.ready())
             return not ready and not await drive.busy()
     except LOST:
         return False
@@ -34,7 +34,7 @@ async def excused(drive: Drive) -> bool:
 async def active(drive: Drive) -> bool:
     """Read whether a drive runs a program or moves."""
     runs = await drive.busy()
-    moves = await drive.run(drive.family.moving(drive.state))
+    moves = await drive.run(drive.family.moving())
     drive.noted = (drive.link.now(), runs or moves)
     return runs or moves
 

@@ -89,7 +89,7 @@ class _Line:
     def __init__(self, workspace: Workspace, drive: Drive, lines: Sequence[str], check: Check | None) -> None:
         motions, state = _motions(drive), drive.state
         self.by = sequence(workspace)
-        self.effect = joined(() if drive.stores else [motions.effect(state, each) for each in lines])
+        self.effect = joined(() if drive.stores else [motions.effect(each) for each in lines])
         bus = workspace.buses.get(drive.link.name)
         to_all = bus is not None and drive.address in GLOBAL
         self.reached = bus.all_drives if bus is not None and to_all else [drive]
@@ -157,14 +157,14 @@ class _Line:
         motions, state = _motions(drive), drive.state
         unsent = f"'{self._text}' was not sent"
         try:
-            signs = yield from motions.signs(state)
+            signs = yield from motions.signs()
         except NoAnswer:
             raise NoAnswer(f"{drive.shown} does not reply: {unsent}") from None
         except Stopped:
             raise Stopped(f"{drive.shown}: stopped; {unsent}") from None
         if self._may_have_failed(drive):
             yield from self._judged_before(drive)
-        return (yield from motions.old(state, signs, True))
+        return (yield from motions.old(signs, True))
 
     def _record(self, drive: Drive, signs: Signs) -> None:
         motions, state = _motions(drive), drive.state
@@ -207,7 +207,7 @@ class _Line:
 def _sign_of(drive: Drive, course: Course) -> Procedure[Ending | None]:
     """Judge a motion that may be under way still: by a sign of failure only, not by where it is."""
     if (found := course.cut_off) is None:
-        found = yield from _motions(drive).judge(drive.state, course.move.axis, _evidence(drive, course))
+        found = yield from _motions(drive).judge(course.move.axis, _evidence(drive, course))
     if found is None or found.outcome in (Outcome.REACHED, Outcome.STOPPED):
         return None
     return _judged(drive, course, found)
@@ -252,8 +252,8 @@ class Watch:
         for drive in self.drives:
             if not self.own(drive) and not drive.programming:
                 motions, state = _motions(drive), drive.state
-                signs = await drive.run(motions.signs(state))
-                self._signs[drive] = await drive.run(motions.old(state, signs, False))
+                signs = await drive.run(motions.signs())
+                self._signs[drive] = await drive.run(motions.old(signs, False))
                 self._errors[drive] = state.errors.count
 
     async def judge(self, drive: Drive) -> bool:
@@ -274,7 +274,7 @@ class Watch:
             found = course.cut_off
             try:
                 if found is None:
-                    found = await drive.run(motions.judge(drive.state, axis, _evidence(drive, course)))
+                    found = await drive.run(motions.judge(axis, _evidence(drive, course)))
             except (Refused, NoAnswer) as error:
                 found = Ending(Outcome.UNKNOWN, axis, reason=f"its end could not be read ({error})")
             if found is None:
@@ -295,8 +295,8 @@ class Watch:
         endings: list[Ending] = []
         if motions is NO_MOTIONS:
             return endings
-        for axis in drive.family.units.axes(state):
-            found = await drive.run(motions.judge(state, axis, evidence))
+        for axis in drive.family.units.axes():
+            found = await drive.run(motions.judge(axis, evidence))
             if found is None:
                 return None
             bad = found.outcome not in (Outcome.REACHED, Outcome.STOPPED, Outcome.REPLACED, Outcome.UNKNOWN)

@@ -129,7 +129,7 @@ async def upload(workspace: Workspace, drive: Drive, raw: bool = False) -> list[
     held.check_program(name)
     source = None if raw else _source(workspace, drive, held)
     if source is None:
-        return list(drive.programs.file(drive.state, held, raw))
+        return list(drive.programs.file(held, raw))
     workspace.notify(f"{name}: remarks and layout are those of {source.file}, downloaded {source.at}", outcome=True)
     return list(drive.programs.refreshed(source.text, held))
 
@@ -149,7 +149,7 @@ def _source(workspace: Workspace, drive: Drive, held: Held) -> Copy | None:
         lines = drive.program_files.language.read(source.text, source.file)
     except Diagnostic:
         return None
-    same = not programs.differences(drive.state, lines, held, None) and programs.size(lines) == len(held.lines)
+    same = not programs.differences(lines, held, None) and programs.size(lines) == len(held.lines)
     return source if same else None
 
 
@@ -160,7 +160,7 @@ async def read(workspace: Workspace, drive: Drive, what: str, lines: Sequence[So
     """
     check_one(drive)
     with running(workspace, f"{workspace.display_name(drive)}: {what}") as job:
-        held = await transferring(drive, drive.programs.read(drive.state, lines, job))
+        held = await transferring(drive, drive.programs.read(lines, job))
     workspace.names.learn(drive, held)
     if drive.family.debugging is not None and not held.locked:
         listing = Listing(workspace.settings.state, drive.programs, drive.family.debugging.rows(held))

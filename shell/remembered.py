@@ -62,7 +62,7 @@ class KnownNames:
         programs = drive.family.programs
         assert programs is not None and programs.names is not None
         with contextlib.suppress(DriveError, TransportLost):  # completion goes without
-            self.learn(drive, await drive.run(at_priority(programs.names(drive.state), Priority.POLL)))
+            self.learn(drive, await drive.run(at_priority(programs.names(), Priority.POLL)))
 
 
 KEPT = 1000

@@ -16,9 +16,9 @@ def taken(drive: Drive, name: str) -> tuple[str, Takes] | None:
     """What a setting or a word of a drive takes: its axis, and how that counts; None: no quantity."""
     units = drive.family.units
     if units.setting is not None:
-        return units.setting(drive.state, name)
+        return units.setting(name)
     line = drive.family.assign(name, "1")
-    fields = units.fields(drive.state, line) if line is not None else ()
+    fields = units.fields(line) if line is not None else ()
     return (fields[0].axis, fields[0].takes) if fields else None
 
 

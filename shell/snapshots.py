@@ -60,7 +60,7 @@ async def save(workspace: Workspace, file: str, scales: Scales = lambda drive: {
 async def read(workspace: Workspace, drive: Drive) -> Snapshot:
     """Read one drive. Raises DriveError."""
     with running(workspace, f"{workspace.display_name(drive)}: snapshot") as progress:
-        found = await transferring(drive, drive.family.values.snapshot(drive.state, progress))
+        found = await transferring(drive, drive.family.values.snapshot(progress))
     program = Held(tuple(Stored(at, text) for at, text in found.program))
     if not program.lines:
         return found

@@ -28,9 +28,9 @@ async def ask(units: Units, drive: Drive, text: str, by: By) -> None:
         limited = {name: axis for name, axis in units.axes(each).items() if axis.scale.travel is not None}
         if not limited or not each.starts(text):
             continue
-        fields = [field for field in each.family.units.fields(each.state, text) if field.moves]
+        fields = [field for field in each.family.units.fields(text) if field.moves]
         ends = each.family.guards is not None and each.family.guards.only_ends(text)
-        if not fields and not ends and each.family.referencing(each.state, text) is None:
+        if not fields and not ends and each.family.referencing(text) is None:
             for name, axis in limited.items():
                 _unchecked(units, each, name, axis, f"the end of '{text}' is not known")
         for field in fields:
@@ -41,7 +41,7 @@ async def ask(units: Units, drive: Drive, text: str, by: By) -> None:
 def unchecked(units: Units, drive: Drive, text: str) -> None:
     """Say that the travel is not checked of what a verb starts: a program, or a line that begins one."""
     family = drive.family
-    if text and any(field.moves for field in family.units.fields(drive.state, text)):
+    if text and any(field.moves for field in family.units.fields(text)):
         return
     ends = bool(text) and family.guards is not None and family.guards.only_ends(text)
     for name, axis in units.axes(drive).items():

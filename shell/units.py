@@ -113,7 +113,7 @@ class Units:
             for line in event.event.lines:
                 text = line.strip().removeprefix("@").removeprefix(drive.address)
                 homing = (
-                    drive.family.referencing(drive.state, text) if text != line.strip() or not drive.address else None
+                    drive.family.referencing(text) if text != line.strip() or not drive.address else None
                 )
                 lost = drive.anchored & {homing.axis} if homing is not None else None
                 if lost:
@@ -139,7 +139,7 @@ class Units:
                     break
                 address, _, axis = key.partition(".")
                 if address in _names(drive):
-                    axes = [axis.lower()] if axis else drive.family.units.axes(drive.state)
+                    axes = [axis.lower()] if axis else drive.family.units.axes()
                     found |= {each: Axis(scale) for each in axes}
             _anchor(drive, found)
         return found
@@ -222,7 +222,7 @@ class Units:
                 if axis.problem:
                     workspace.notify(f"{bus.name}: {drive.shown}: {axis.problem}", bus=bus.name, warning=True)
         known = {name for drive in bus.drives.values() for name in _names(drive)}
-        axes = {axis for drive in bus.drives.values() for axis in (*drive.family.units.axes(drive.state), "")}
+        axes = {axis for drive in bus.drives.values() for axis in (*drive.family.units.axes(), "")}
         for drive in list(bus.drives.values())[:1]:
             for key in self._configured(drive):
                 address, _, name = key.partition(".")
@@ -230,7 +230,7 @@ class Units:
                     workspace.notify(f"{bus.name}: units has {key}, which no drive there is", warning=True)
 
     async def read(self, drive: Drive, axis: str, scale: Scale) -> Basis:
-        return await drive.run(drive.family.units.basis(drive.state, axis, scale.full_steps))
+        return await drive.run(drive.family.units.basis(axis, scale.full_steps))
 
     async def measure(self, drive: Drive, axis: str) -> Measure:
         """The measure of an axis; what it rests on is read where it was not. Raises Diagnostic where there is none."""
@@ -271,7 +271,7 @@ class Units:
             if unit[2].partition("/")[0] in (*PLACES, *SHORT, *self.own):
                 written = f"{{{unit[1].replace(',', '.')} {unit[2]}}}"
                 meant = text[: unit.start()] + written + text[unit.end() :]
-                if any(field.start == unit.start() for field in drive.family.units.fields(drive.state, meant)):
+                if any(field.start == unit.start() for field in drive.family.units.fields(meant)):
                     raise Diagnostic(f"{unit[0]} has a unit; nothing was sent", text.strip(), f"write {meant.strip()}")
         return await self._converted(drive, text, found) if found else Line(text)
 
@@ -318,7 +318,7 @@ class Units:
         """Read what a target means to each of these drives. Raises Diagnostic where they differ."""
         if not any(field.takes is Takes.TARGET for field in fields):
             return None
-        found = {await each.run(each.family.units.target(each.state)) for each in drives if each.family.units.target}
+        found = {await each.run(each.family.units.target()) for each in drives if each.family.units.target}
         if len(found) != 1:
             raise Diagnostic("targets are positions for some drives and distances for others; nothing was sent")
         return found.pop()
@@ -356,7 +356,7 @@ class Units:
                 if name in placed and not self.referenced(each, name):
                     raise Differs(f"{self.name(each, name)}: its reference was lost meanwhile; '{text}' was not sent")
             units = each.family.units
-            if target is not None and units.target is not None and (yield from units.target(each.state)) is not target:
+            if target is not None and units.target is not None and (yield from units.target()) is not target:
                 raise Differs(f"{each.shown}: ABS or INC was set meanwhile; '{text}' was not sent")
 
         if drive.address not in EVERYONE or not drive.codec.broadcasts:
@@ -375,7 +375,7 @@ class Units:
     def _same(self, drive: Drive, name: str, measure: Measure, text: str) -> Procedure[None]:
         """Read what a scale rests on. Raises Differs where it is not what a measure was made with."""
         recounts = drive.state.recounts
-        found = yield from drive.family.units.basis(drive.state, name, measure.scale.full_steps)
+        found = yield from drive.family.units.basis(name, measure.scale.full_steps)
         axis = self.axes(drive)[name]
         drive.counting.saw(name, found.settings, recounts)
         if axis.scale != measure.scale:
@@ -399,7 +399,7 @@ class Units:
 
     async def condition(self, drive: Drive, question: str, text: str, within: bool = False) -> Compared:
         """Convert a quantity that is compared with the value of a question; `within`: it is a tolerance."""
-        found = drive.family.units.reads(drive.state, question)
+        found = drive.family.units.reads(question)
         if found is None:
             raise Diagnostic(
                 f"{text}: '{question}' prints no quantity", self.name(drive, ""), "compare it with a number"
@@ -422,7 +422,7 @@ class Units:
 
         An empty axis is the first one. Raises Diagnostic, Differs where the scale must be confirmed again.
         """
-        axis = axis or drive.family.units.axes(drive.state)[0]
+        axis = axis or drive.family.units.axes()[0]
         measure, takes = await self.measure(drive, axis), Takes.PLACE if what == "position" else Takes.VELOCITY
         wanted = quantity(f"1 {unit}", self.own)
         measure.number(wanted, takes)  # of the same kind

@@ -194,13 +194,13 @@ class Asking:
             refuse_stranger(self._drive.state, self._who)
             raise NoAnswer(f"{self._who} was not found on this line; check its name, or give drives=NAMES in the URL")
         known = {"family": drive.family.name, "product": state.product, "version": state.version, "part": state.part}
-        known["traits"] = " ".join(sorted(found.traits(state)))
+        known["traits"] = " ".join(sorted(found.traits()))
         self.report = Report({key: text for key, text in known.items() if text})
 
     @property
     def questions(self) -> list[Question]:
         """The questions to this drive."""
-        return self._table.questions(self._drive.state)
+        return self._table.questions()
 
     async def all(self, wanted: Mapping[str, Any] | None = None) -> None:
         """Ask all questions, or those that are `wanted`; those that move the motor come last."""
@@ -226,7 +226,7 @@ class Asking:
         drive = self._drive
         if drive.programming:
             raise Refused(f"{self._who} is in program mode and would store every question; PG ends that")
-        if await drive.run(drive.family.moving(drive.state)):
+        if await drive.run(drive.family.moving()):
             return Occupied("it moved")
         if await drive.busy():
             return Occupied("its program ran")
@@ -331,9 +331,9 @@ class Asking:
         registers = drive.family.registers
         if registers is not None and verb == "/register":
             address, count = (int(each, 0) for each in numbers)
-            return await drive.run(registers.read(drive.state, address, count))
+            return await drive.run(registers.read(address, count))
         if registers is not None and verb == "/coil":
-            return await drive.run(registers.read_coil(drive.state, int(numbers[0])))
+            return await drive.run(registers.read_coil(int(numbers[0])))
         return await drive.send(line)
 
 

@@ -181,7 +181,7 @@ class Beside(Compared[Twin]):
             if disturbs and each.reply.acknowledged:
                 self._note_delay(each)
             self._acts(data, each.transmitted_at, disturbs)
-            found = self.drive.family.referencing(self.drive.state, each.request.text) if disturbs else None
+            found = self.drive.family.referencing(each.request.text) if disturbs else None
             if found is not None and found.homing:
                 self.comparison(found.axis).lose(HOMING, each.transmitted_at)
         if concluded.unproven:

@@ -72,7 +72,7 @@ async def conditions(drive: Drive, slow: bool = True) -> tuple[Conditions, ...]:
     """
     values, facts, asked = drive.family.values, dict[str, Fact](), set[str]()
     while left := [
-        each for each in values.parts(drive.state, facts) if each.name not in asked and (slow or not each.slow)
+        each for each in values.parts(facts) if each.name not in asked and (slow or not each.slow)
     ]:
         part = left[0]
         asked.add(part.name)
@@ -80,13 +80,13 @@ async def conditions(drive: Drive, slow: bool = True) -> tuple[Conditions, ...]:
         if at != drive.commands:
             commands = drive.commands
             with contextlib.suppress(Refused):
-                found = await drive.run(part.read(drive.state))
+                found = await drive.run(part.read())
                 if part.slow:
                     drive.settings[part.name] = (found, commands)
         facts.update(found)
     if not asked:
         raise Inexpressible(f"{drive.shown}: its state is not asked for as it is set to reply (EM=3)")
-    found_now: tuple[Conditions, ...] = values.fold(drive.state, facts)
+    found_now: tuple[Conditions, ...] = values.fold(facts)
     return found_now
 
 
@@ -146,7 +146,7 @@ class DriveFacts(Fixed):
 
 def _first(drive: DriveFacts) -> str:
     """Its axis as in `Motion.axis`."""
-    return drive.axis.lower() or drive._family.units.axes(drive._drive.state)[0]
+    return drive.axis.lower() or drive._family.units.axes()[0]
 
 
 def _of_axis(drive: DriveFacts, axes: Sequence[A]) -> A:
@@ -311,7 +311,7 @@ class AsyncDrive(DriveFacts):
     async def enable(self, on: bool = True) -> None:
         """Switch the current of the motor on. Raises Inexpressible where its family has no command for it."""
         name = ENABLE if on else DISABLE
-        control = self._family.values.controls(self._drive.state, _first(self))[name]
+        control = self._family.values.controls(_first(self))[name]
         if control.absent:
             raise Inexpressible(f"{self.name}: no {name}(): {control.absent}")
         self._check_executes()
@@ -336,7 +336,7 @@ class AsyncDrive(DriveFacts):
             if not lamp.output and lamp.on is not None:
                 found |= {int(lamp.name): lamp.on} if lamp.name.isdigit() else {}
                 found |= {lamp.function: lamp.on} if lamp.function else {}
-        for number, line in self._actions.ports(self._drive.state).items():
+        for number, line in self._actions.ports().items():
             found[number] = bool(await self.read(f"[{line}]"))
         return found
 

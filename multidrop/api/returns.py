@@ -86,11 +86,11 @@ class Returns:
     async def _settings(self, drive: Drive, *, every: bool = False) -> dict[str, Value]:
         """Read the settings of a drive, and with `every` all of its conditions. Raises NoAnswer."""
         found = dict[str, Value]()
-        for part in drive.family.values.parts(drive.state, {}):
+        for part in drive.family.values.parts({}):
             if (part.slow or every) and (drive, part.name) not in self._refused:
                 commands = drive.commands
                 try:
-                    facts = await drive.run(part.read(drive.state))
+                    facts = await drive.run(part.read())
                 except Refused:
                     self._refused.add((drive, part.name))
                     continue
@@ -102,7 +102,7 @@ class Returns:
         return found
 
     def _known(self, drive: Drive) -> Known:
-        parts = [part.name for part in drive.family.values.parts(drive.state, {}) if part.slow]
+        parts = [part.name for part in drive.family.values.parts({}) if part.slow]
         parts = [name for name in parts if (drive, name) not in self._refused]
         current = all(name in drive.settings and drive.settings[name][1] == drive.commands for name in parts)
         settings = {k: value for name in parts for k, value in drive.settings[name][0].items()} if current else None
@@ -150,7 +150,7 @@ class Returns:
                 return  # lost again: compared after the next return
             if trouble:
                 drive.hold = "; ".join(trouble)
-                drive.state.reference_lost(drive.family.units.axes(drive.state))
+                drive.state.reference_lost(drive.family.units.axes())
                 text = f"{self._shell.display_name(drive)}: {drive.hold}: nothing moves it until its position counts"
                 self._shell.notify(text, bus=bus.name, warning=True)
         del self._lost[bus]

@@ -65,7 +65,7 @@ class Rescue:
 
         def procedure() -> Procedure[None]:
             for line in lines:
-                yield from family_of(codec).perform(drive.state, line)
+                yield from family_of(codec).perform(line)
 
         async with self._scanning.stopping_all():
             await self._scanning.converse(drive.connection, procedure)

@@ -31,7 +31,7 @@ LISTED = 8
 async def read(workspace: Workspace, drive: Drive, what: str) -> Readings:
     """Read every setting of a drive. Raises DriveError; nothing is changed."""
     with running(workspace, f"{workspace.display_name(drive)}: {what}") as progress:
-        found = await transferring(drive, drive.family.values.parameters.read(drive.state, progress))
+        found = await transferring(drive, drive.family.values.parameters.read(progress))
     workspace.publish(SettingsRead(workspace.now(), drive.link.name, drive.address, found))
     return found
 

@@ -198,7 +198,7 @@ class _Replacement:
         allowed = Permission(self._wanted.named, communication)
         present = {*readings.values, *self._spec.variables}
         goal = {name: value for name, value in self._settings.items() if name in present}
-        return self._parameters.plan(self._drive.state, readings, goal, allowed)
+        return self._parameters.plan(readings, goal, allowed)
 
     # After the question
 
@@ -228,7 +228,7 @@ class _Replacement:
         return len(steps)
 
     async def _save(self, what: str) -> None:
-        await transferring(self._drive, self._parameters.save(self._drive.state))
+        await transferring(self._drive, self._parameters.save())
         self._done.append(f"{what} saved ({self._parameters.saving})")
 
     def _verify(self, here: DriveSpec) -> None:

@@ -160,7 +160,7 @@ async def save(workspace: Workspace, target: str) -> None:
     async def keep(drive: Drive) -> None:
         family, who = drive.family.values.parameters, workspace.display_name(drive)
         await workspace.questions.confirm(f"'{family.saving}' keeps all present settings over power-off", who)
-        await transferring(drive, family.save(drive.state))
+        await transferring(drive, family.save())
         workspace.notify(f"{who}: its settings are saved")
 
     await each(workspace, targets(workspace, target), keep)
@@ -281,7 +281,7 @@ async def restore(session: Session, drive: Drive, file: files.SettingsFile, opti
     wanted = _values(present, file, options, who)
     try:
         permission = Permission(options.named, options.communication)
-        plan = family.plan(drive.state, present, wanted.values, permission)
+        plan = family.plan(present, wanted.values, permission)
     except Diagnostic as problem:
         raise Diagnostic(f"{problem.message} (nothing was sent)", problem.where or file.path, problem.hint) from None
     others = {each.address for each in session.buses[drive.link.name].all_drives if each is not drive}
@@ -316,7 +316,7 @@ async def send(session: Session, drive: Drive, plan: Plan, options: Options, wha
         for number, change in enumerate(plan, 1):
             named = change.name in options.named
             async with session.path.starting(drive, change.text) if named else contextlib.nullcontext():
-                await transferring(drive, drive.family.values.parameters.write(drive.state, change))
+                await transferring(drive, drive.family.values.parameters.write(change))
             written.append(change)
             progress(number, len(plan))
 
@@ -363,7 +363,7 @@ def _show(workspace: Workspace, who: str, plan: Plan, wanted: Wanted) -> None:
 
 async def check_ready(drive: Drive) -> None:
     """Raise Refused where the drive is at work."""
-    if reason := await transferring(drive, drive.family.values.parameters.ready(drive.state)):
+    if reason := await transferring(drive, drive.family.values.parameters.ready()):
         raise Refused(f"{reason} (nothing was sent)")
 
 
@@ -418,7 +418,7 @@ async def _finish(workspace: Workspace, drive: Drive, plan: Plan, goal: Mapping[
     result = f"{who}: {counted(len(written), 'setting')} restored and read back{aside}"
     saving = drive.family.values.parameters.saving
     if options.save:
-        await transferring(drive, drive.family.values.parameters.save(drive.state))
+        await transferring(drive, drive.family.values.parameters.save())
         workspace.notify(f"{result}; saved ({saving})", outcome=True)
     else:
         workspace.notify(f"{result}; not saved, so lost at power-off: --save keeps it ({saving})", warning=True)

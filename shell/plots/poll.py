@@ -49,7 +49,7 @@ def poll(url: str, asked: Polling, reconnect: bool) -> int:
 async def _poll(session: Session, asked: Polling) -> None:
     wanted = _wanted(session, asked)
     for drive, word in wanted:
-        await drive.run(drive.family.values.first(drive.state, word), typed=True)
+        await drive.run(drive.family.values.first(word), typed=True)
     columns = [f"{address_of(session, drive).rstrip(':')}.{word}" for drive, word in wanted]
     if not asked.json:
         write(sys.stdout, f"{'time':<{STAMP}}" + "".join(f"  {name:>{WIDTH}}" for name in columns))
@@ -79,14 +79,14 @@ def _wanted(session: Session, asked: Polling) -> list[tuple[Drive, str]]:
         if not word:
             raise Diagnostic(f"no value in {name!r}", hint="valid: NAME or ADDR.NAME, as P, b.VM, press:b.I1")
         for drive in targets(session, target, "values") if target else drives:
-            found[drive, drive.family.values.check(drive.state, word)] = None
+            found[drive, drive.family.values.check(word)] = None
     return list(found)
 
 
 async def _value(session: Session, drive: Drive, word: str) -> float | None:
     """Read a value; None where the drive does not give it now. Raises TransportLost for a line that stays lost."""
     try:
-        return await drive.run(drive.family.values.again(drive.state, word, Priority.POLL), typed=True)
+        return await drive.run(drive.family.values.again(word, Priority.POLL), typed=True)
     except (DriveError, TransportLost) as failure:
         if gone := lost(session):
             raise gone from None

@@ -42,7 +42,7 @@ def _parse(workspace: Session, text: str) -> list[Series]:
     found = [_value(workspace, bus, address, word, text) for bus, address in drives]
     if not dot and found[0].word != DIFFERENCE:
         drive = workspace.buses[found[0].bus].drives[found[0].address]
-        if not drive.family.values.own(drive.state, found[0].word):  # a name that a person gave
+        if not drive.family.values.own(found[0].word):  # a name that a person gave
             hint = f"{_valid(workspace, text)}; .{text} is a user's variable"
             raise Diagnostic(f"no drive and no value {text}", hint=hint)
     return found
@@ -77,7 +77,7 @@ def _value(workspace: Session, bus: str, address: str, word: str, text: str) -> 
         if workspace.buses[bus] not in workspace.predicted:
             raise Diagnostic(f"{drive.shown}: no twin runs that it could differ from", hint="/twin on begins one")
         return Series(bus, address, DIFFERENCE)
-    return Series(bus, address, drive.family.values.check(drive.state, word))
+    return Series(bus, address, drive.family.values.check(word))
 
 
 async def read_first(workspace: Session, series: Sequence[Series]) -> None:
@@ -90,4 +90,4 @@ async def read_first(workspace: Session, series: Sequence[Series]) -> None:
         if not word:
             refuse_stranger(drive.state, workspace.display_name(drive))
         elif word != DIFFERENCE:
-            await drive.run(drive.family.values.first(drive.state, word), typed=True)
+            await drive.run(drive.family.values.first(word), typed=True)

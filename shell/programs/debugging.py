@@ -93,7 +93,7 @@ class Debugger:
         """Start a program, once it is known that it can be started."""
         await self._read_listing()
         place = place.upper() or self._debugging.entry(self._listing.rows)
-        await self._run(self._debugging.idle(self._drive.state, place, neighbours))
+        await self._run(self._debugging.idle(place, neighbours))
         self._place, self._last = place, None
         self._last_at = self._free_at = self._session.now()
         async with self._session.path.starting(self._drive, parts=True):
@@ -108,7 +108,7 @@ class Debugger:
         await self._read_listing()
         async with self._session.path.starting(self._drive, parts=True):
             self._waits = True
-            stepped = await self._run(self._debugging.step(self._drive.state, self._listing.rows))
+            stepped = await self._run(self._debugging.step(self._listing.rows))
         self._executed(stepped.row, stepped.hold)
         changed = ""
         try:
@@ -125,13 +125,13 @@ class Debugger:
         if left > 0 and self._last is not None:
             name = self._session.display_name(self._drive)
             raise Refused(f"{name}: '{self._last.text}' holds for another {left:.1f} s; no key was sent")
-        await self._run(self._debugging.waits(self._drive.state, self._place, self._last))
+        await self._run(self._debugging.waits(self._place, self._last))
 
     async def go_on(self) -> None:
         """Let the program run on at normal speed."""
         await self._check_waits()
         async with self._session.path.starting(self._drive, parts=True):
-            await self._run(self._debugging.go_on(self._drive.state, self._place))
+            await self._run(self._debugging.go_on(self._place))
         self._waits = False
         self._sight.seen(None)
         note = ", and shows no lines: /break now breaks it where it is" if self.break_point else ""
@@ -154,7 +154,7 @@ class Debugger:
             quiet = self._session.now() - max(self._last_at, self._free_at)
             if not self.break_point or self._last is None or quiet < QUIET:
                 continue  # a quiet trace without a hold may wait at its break point
-            procedure = self._debugging.broken(self._drive.state, self._listing.rows, self._last, self.break_point)
+            procedure = self._debugging.broken(self._listing.rows, self._last, self.break_point)
             address: int | None = await self._run(procedure)
             if address is not None:
                 return await self._show_waiting(address)
@@ -163,7 +163,7 @@ class Debugger:
                 self.say(f"no line since '{self._last.text}': {where}; /break now makes sure")
 
     async def _look(self) -> Look:
-        look: Look = await self._run(self._debugging.look(self._drive.state, self._place))
+        look: Look = await self._run(self._debugging.look(self._place))
         if not look.runs:
             await asyncio.sleep(PERIOD)  # its last lines may still be on the wire
             self._place, self._waits = "", False
@@ -195,7 +195,7 @@ class Debugger:
     # Break points
 
     async def break_at(self, place: str, passes: int) -> None:
-        await self._run(self._debugging.break_at(self._drive.state, place, passes))
+        await self._run(self._debugging.break_at(place, passes))
         self.break_point = place.upper()
         self._sight.breaks(self.break_point)
         count = f", at pass {passes}" if passes > 1 else ""
@@ -204,7 +204,7 @@ class Debugger:
         )
 
     async def break_off(self) -> None:
-        await self._run(self._debugging.break_off(self._drive.state))
+        await self._run(self._debugging.break_off())
         self.break_point = ""
         self._sight.breaks("")
         self.say("no break point")
@@ -212,7 +212,7 @@ class Debugger:
     async def break_now(self) -> None:
         """Break the running program where it is."""
         await self._read_listing()
-        await self._run(self._debugging.break_now(self._drive.state, self._place))
+        await self._run(self._debugging.break_now(self._place))
         self._last, self._free_at = MAYBE_HELD, float("-inf")
         await self._show_waiting((await self._look()).address)
 
@@ -221,7 +221,7 @@ class Debugger:
     async def watch(self, names: Sequence[str]) -> None:
         """Watch variables from now on, and show their values."""
         upper = tuple(dict.fromkeys(name.upper() for name in names))
-        self._debugging.names(self._drive.state, upper)
+        self._debugging.names(upper)
         self._watched, self._values = upper, {}
         if upper:
             shown = await self._changed()
@@ -233,7 +233,7 @@ class Debugger:
         """Read what is watched; return the values that changed, as a person reads them, with blanks before."""
         if not self._watched:
             return ""
-        values: Mapping[str, str] = await self._run(self._debugging.values(self._drive.state, self._watched))
+        values: Mapping[str, str] = await self._run(self._debugging.values(self._watched))
         changed = {name: text for name, text in values.items() if self._values.get(name) != text}
         self._values = values
         return "".join(f"   {name}={text}" for name, text in changed.items())
@@ -243,7 +243,7 @@ class Debugger:
     async def _read_listing(self) -> None:
         """Read the program of the drive, unless only we have commanded it since."""
         if self._commands != self._drive.commands:
-            rows = await self._drive.run(self._debugging.listing(self._drive.state))
+            rows = await self._drive.run(self._debugging.listing())
             self._listing = Listing(self._session.settings.state, self._drive.programs, rows)
             self._commands = self._drive.commands
             self._sight.read(self._listing)
@@ -262,7 +262,7 @@ class Debugger:
         if self._stops == link.stops:
             return
         self._stops = link.stops
-        self._debugging.forget(self._drive.state)
+        self._debugging.forget()
         self._last, self._free_at, self._waits = None, float("-inf"), False
         self._sight.seen(None)
         if self._place and link.away is None:
@@ -276,7 +276,7 @@ class Debugger:
             return
         self._commands, self._place, self.break_point = -1, "", ""
         self._last, self._free_at, self._waits = None, float("-inf"), False
-        self._debugging.forget(self._drive.state)
+        self._debugging.forget()
         self._sight.breaks("")
         self._sight.seen(None)
 
@@ -285,7 +285,7 @@ class Debugger:
         place, self._place = self._place, ""
         left = f"; {LEFT.format(self.break_point)}" if self.break_point else ""
         try:
-            look: Look = await self._run(self._debugging.look(self._drive.state, place))
+            look: Look = await self._run(self._debugging.look(place))
         except (DriveError, TransportLost):
             return self.say(f"stopped; it is not known whether its program waits for a key{left}", warning=True)
         if look.runs:

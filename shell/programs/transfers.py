@@ -88,7 +88,7 @@ async def differences(session: Session, drive: Drive, file: str, text: str | Non
     _, lines = await checked(session, drive, file, text)
     held = await read(session, drive, "diff", lines)
     held.check_listed(session.display_name(drive))
-    return drive.programs.differences(drive.state, lines, held, None)
+    return drive.programs.differences(lines, held, None)
 
 
 def in_words(file: str, found: Difference, drive: str) -> str:
@@ -156,7 +156,7 @@ class _Download:
             ends_program = False
         held = await read(self._session, self._drive, "backup", lines)
         if wanted.only_changed:
-            why = await transferring(self._drive, programs.to_send(self._drive.state, lines, held))
+            why = await transferring(self._drive, programs.to_send(lines, held))
             more = "the program is not sent again" if wanted.save or wanted.run else "nothing was sent"
             self._say(f"{self._file} is sent: {why}" if why else f"holds {self._file} already; {more}")
             if not why:
@@ -218,7 +218,7 @@ class _Download:
             "; ".join(each for each in parts[: 3 + bool(state.serial)] if each),
             *(["names in the drive:", *(f"  {name}" for name in held.names)] if held.names else ["no names"]),
         ]
-        program = self._programs.file(state, held, True)
+        program = self._programs.file(held, True)
         head += [] if program else ["the drive holds no program and no variable"]
         text = "".join(f"{line}\n" for line in (*(f"{self._programs.remark} {line}" for line in head), *program))
         ending = drive.program_files.endings[0]
@@ -229,7 +229,7 @@ class _Download:
     async def _end_program(self) -> None:
         """End a running program, with the motion that it has begun. Raises DriveError where it goes on."""
         drive = self._drive
-        if not await transferring(drive, self._programs.end(drive.state)):
+        if not await transferring(drive, self._programs.end()):
             return
         self._say("its program ran and was ended", warning=True)
         deadline = self._session.now() + LIMIT
@@ -283,7 +283,7 @@ class _Download:
         if held.locked:
             self._say("not verified: the program is locked now (LK=1)", warning=True)
             return
-        found = self._programs.differences(self._drive.state, sent, held, before)
+        found = self._programs.differences(sent, held, before)
         for each in found[:MOST]:
             self._session.notify(in_words(self._file, each, self._name), warning=True)
         if found:
@@ -291,7 +291,7 @@ class _Download:
             raise Differs(f"{self._name}: {count} from {self._file}; download it again")
         size = self._programs.size(lines)
         self._say(f"verified, {counted(size, 'line')}")
-        plain = " ".join(self._programs.file(self._drive.state, held, True))
+        plain = " ".join(self._programs.file(held, True))
         if size == len(held.lines) and text.split() != plain.split():
             workspace = self._session
             at = workspace.wall(workspace.now()).isoformat(" ", "seconds")

@@ -135,7 +135,7 @@ class _Planning:
         if value_names(line.text) <= dict.keys(values):
             try:
                 drive.check_address(text)
-                drive.family.check_line(drive.state, text)
+                drive.family.check_line(text)
             except Inexpressible as problem:
                 raise Diagnostic(str(problem), line.where) from None
         return drive if drive.starts(text) else None

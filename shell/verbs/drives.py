@@ -185,7 +185,7 @@ async def register(call: Call) -> None:
         raise call.wrong(f"no register {found[1]}; valid: 0 to 0xFFFF")
     if found[2] is None:
         count = _number(call, found[3]) if found[3] else None
-        await _show(call, drive, registers.read(drive.state, address, count))
+        await _show(call, drive, registers.read(address, count))
         return
     values = [_number(call, text.strip()) for text in found[2].split(",")]
     lines = registers.lines(address, values)
@@ -195,7 +195,7 @@ async def register(call: Call) -> None:
         await call.session.path.guard(drive, line, call.by)
     known = len(lines) == len(values) and len([line for line in lines if drive.starts(line)]) < 2
     writes = next(filter(drive.starts, lines), lines[0]) if known else ""
-    await _write(call, drive, registers.write(drive.state, address, values), writes, lines)
+    await _write(call, drive, registers.write(address, values), writes, lines)
 
 
 async def coil(call: Call) -> None:
@@ -205,11 +205,11 @@ async def coil(call: Call) -> None:
     if not 1 <= number <= 0x10000:
         raise call.wrong(f"no output {words[0]}; valid: from 1")
     if len(words) == 1:
-        await _show(call, drive, registers.read_coil(drive.state, number))
+        await _show(call, drive, registers.read_coil(number))
     elif words[1] in ("0", "1"):
         line = f"O{number}={words[1]}"
         writes = "" if drive.starts(line) else line
-        await _write(call, drive, registers.write_coil(drive.state, number, words[1] == "1"), writes)
+        await _write(call, drive, registers.write_coil(number, words[1] == "1"), writes)
     else:
         raise call.wrong()
 
@@ -217,7 +217,7 @@ async def coil(call: Call) -> None:
 async def device(call: Call) -> None:
     drive, registers = _registered(call)
     call.words()
-    await _show(call, drive, registers.device(drive.state))
+    await _show(call, drive, registers.device())
 
 
 async def snapshot(call: Call) -> None:

@@ -80,7 +80,7 @@ def _meant(call: Call, target: str) -> tuple[Drive, str]:
     drive = call.drive(address)
     if drive not in session.bus(drive.link.name).drives.values():
         raise Diagnostic(f"no drive {target}", "/units", "/drives lists them")
-    axes = drive.family.units.axes(drive.state)
+    axes = drive.family.units.axes()
     if axis.lower() not in axes:
         names = ", ".join(f"{drive.address}.{each}" for each in axes if each)
         raise Diagnostic(f"no axis {target}", "/units", f"valid: {names or drive.address}")

@@ -220,7 +220,7 @@ class ControlsPage(SendingPage):
             return {}
         chosen = self._chosen()
         first = self.host.model.bus(session.selected_bus).readout(drive.address).axes[0]
-        return drive.family.values.controls(drive.state, first.axis if chosen is None else chosen[1].axis)
+        return drive.family.values.controls(first.axis if chosen is None else chosen[1].axis)
 
     def _nothing(self) -> str:
         """Why a key other than the stop does nothing: there is no drive, or the person has not seen it yet."""

@@ -121,10 +121,10 @@ class Edit:
 
 def edit(parameters: Parameters[Any], state: Any, present: Readings, name: str, value: Value) -> Edit:
     """Plan the lines that set one value. Raises Diagnostic for a value that the drive refuses."""
-    made = parameters.plan(state, present, {name: value}, ORDINARY)
+    made = parameters.plan(present, {name: value}, ORDINARY)
     warning = "; ".join(reason for _, reason in made.withheld)
     if made.withheld:
-        made = parameters.plan(state, present, {name: value}, Permission(frozenset({name}), communication=True))
+        made = parameters.plan(present, {name: value}, Permission(frozenset({name}), communication=True))
     if made.impossible:
         raise Diagnostic("; ".join(reason for _, reason in made.impossible), name)
     if not made.changes:

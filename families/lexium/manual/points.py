@@ -157,9 +157,17 @@ def homings(axis: str) -> Mapping[str, Mapping[str, str]]:
     return {mode: {"-": f"{word} 1", "+": f"{word} 3"} for mode, word in (("home", "HM"), ("index", "HI"))}
 
 
-ACTIONS = Actions(
-    homings=homings,
-    run=lambda axis, velocity: (f"SL {velocity}",),
-    output=lambda number, on: f"O{number}={on:d}",
-    error="ER",
-)
+class LexiumActions(Actions):
+    """What a program asks of a Lexium drive."""
+
+    error = "ER"
+    no_error = ""
+
+    def homings(self, axis: str) -> Mapping[str, Mapping[str, str]]:
+        return homings(axis)
+
+    def run(self, axis: str, velocity: int | str) -> tuple[str, ...]:
+        return (f"SL {velocity}",)
+
+    def output(self, number: int, on: bool) -> str:
+        return f"O{number}={on:d}"

@@ -7,9 +7,28 @@ stays set.
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
-from multidrop.dialects.family import ADDRESSES, EVERYONE, Family, Guard, Guards, to_all
+from multidrop.dialects.certifying import Certifying
+from multidrop.dialects.codec import Codec, Priority, Procedure
+from multidrop.dialects.debugging import Debugging
+from multidrop.dialects.family import (
+    ADDRESSES,
+    EVERYONE,
+    Family,
+    Guard,
+    Hints,
+    Motion,
+    Printed,
+    Programs,
+    Referencing,
+    to_all,
+)
+from multidrop.dialects.motions import Motions
+from multidrop.dialects.scanning import Scan
+from multidrop.dialects.state import DriveState
+from multidrop.dialects.units import Units
+from multidrop.dialects.values import Values
 from multidrop.families.pmx.host import operations
 from multidrop.families.pmx.host.codec import STOP_BYTES, Pmx, PmxState
 from multidrop.families.pmx.host.operations import identify
@@ -70,33 +89,124 @@ def word_of(text: str) -> str:
     return row.name if row is not None else head(command)
 
 
-PMX = Family(
-    name=Pmx.family,
-    codec=Pmx(),
-    new_state=PmxState,
-    identify=identify,
-    perform=operations.perform,
-    check=operations.check,
-    motion=operations.motion,
-    moving=operations.moving,
-    busy=operations.busy,
-    status=operations.status,
-    referencing=operations.referencing,
-    homed=operations.homed,
-    language=help,
-    rests_in_place=False,
-    question=lambda word: word if reads(word) else None,
-    move=move,
-    move_to=move_to,
-    assign="{}={}".format,
-    programs_at="multidrop.families.pmx.host.programs:PROGRAM_FILES",
-    guards=Guards(GUARDS, lambda state, text: guarded(text, state.address), word_of, only_ends, reads),
-    scan_at="multidrop.families.pmx.host.operations:SCAN",
-    debugging_at="multidrop.families.pmx.host.programs:DEBUGGING",
-    certifying_at="multidrop.families.pmx.host.operations:CERTIFYING",
-    motions_at="multidrop.families.pmx.host.motions:MOTIONS",
-    values_at="multidrop.families.pmx.host.values:VALUES",
-    units_at="multidrop.families.pmx.host.units:UNITS",
-    stop_bytes=STOP_BYTES,
-    addressed=addressed,
-)
+class PmxFamily(Family):
+    """A Performax controller on a serial line or through a gateway."""
+
+    state: PmxState
+
+    guards = GUARDS
+
+    name = Pmx.family
+    codec = Pmx()
+    language = help
+    rests_in_place = False
+    stop_bytes = STOP_BYTES
+
+    @classmethod
+    def new_state(cls, codec: Codec, address: str) -> DriveState:
+        return PmxState(codec, address)
+
+    @classmethod
+    def identify(cls, hints: Hints) -> Procedure[Sequence[DriveState]]:
+        return identify(hints)
+
+    def guard(self, text: str) -> Guard | None:
+        return guarded(text, self.state.address)
+
+    @classmethod
+    def word_of(cls, text: str) -> str:
+        return word_of(text)
+
+    @classmethod
+    def only_ends(cls, text: str) -> bool:
+        return only_ends(text)
+
+    @classmethod
+    def only_reads(cls, text: str) -> bool:
+        return reads(text)
+
+    def perform(self, text: str) -> Printed:
+        return operations.perform(self.state, text)
+
+    def check(self, text: str) -> None:
+        operations.check(self.state, text)
+
+    def motion(self, priority: Priority) -> Procedure[tuple[Motion, ...]]:
+        return operations.motion(self.state, priority)
+
+    def moving(self) -> Procedure[bool]:
+        return operations.moving(self.state)
+
+    def busy(self) -> Procedure[bool]:
+        return operations.busy(self.state)
+
+    def status(self) -> Printed:
+        return operations.status(self.state)
+
+    def referencing(self, text: str) -> Referencing | None:
+        return operations.referencing(self.state, text)
+
+    def homed(self) -> Procedure[bool]:
+        return operations.homed(self.state)
+
+    @classmethod
+    def question(cls, word: str) -> str | None:
+        return word if reads(word) else None
+
+    @classmethod
+    def move(cls, axis: str, distance: int | str) -> tuple[str, ...]:
+        return move(axis, distance)
+
+    @classmethod
+    def move_to(cls, axis: str, position: int | str) -> tuple[str, ...]:
+        return move_to(axis, position)
+
+    @classmethod
+    def assign(cls, word: str, value: str) -> str | None:
+        return f"{word}={value}"
+
+    @property
+    def programs(self) -> Programs:
+        from multidrop.families.pmx.host.programs import PmxPrograms
+
+        return PmxPrograms(self.state)
+
+    @classmethod
+    def scan(cls) -> Scan:
+        from multidrop.families.pmx.host.operations import SCAN
+
+        return SCAN
+
+    @property
+    def debugging(self) -> Debugging:
+        from multidrop.families.pmx.host.programs import PmxDebugging
+
+        return PmxDebugging(self.state)
+
+    @property
+    def certifying(self) -> Certifying:
+        from multidrop.families.pmx.host.operations import PmxCertifying
+
+        return PmxCertifying(self.state)
+
+    @property
+    def motions(self) -> Motions:
+        from multidrop.families.pmx.host.motions import PmxMotions
+
+        return PmxMotions(self.state)
+
+    @property
+    def values(self) -> Values:
+        from multidrop.families.pmx.host.values import PmxValues
+
+        return PmxValues(self.state)
+
+    @property
+    def units(self) -> Units:
+        from multidrop.families.pmx.host.units import PmxUnits
+
+        return PmxUnits(self.state)
+
+    @classmethod
+    def addressed(cls, text: str, product: str) -> tuple[str, str] | None:
+        return addressed(text, product)

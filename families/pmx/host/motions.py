@@ -200,4 +200,25 @@ def _loop_failed(ending: Ending, loop: int, name: str) -> Ending:
     return replace(ending, outcome=outcome, reason=f"StepNLoop {words}; CLR{name} clears the error")
 
 
-MOTIONS = Motions(effect=effect, signs=signs, old=old, place=place, runs=runs, judge=judge)
+class PmxMotions(Motions):
+    """How the motions of a PMX begin and end."""
+
+    state: PmxState
+
+    def effect(self, text: str) -> Effect:
+        return effect(self.state, text)
+
+    def signs(self) -> Procedure[Signs]:
+        return signs(self.state)
+
+    def old(self, signs: Signs, own: bool) -> Procedure[Signs]:
+        return old(self.state, signs, own)
+
+    def place(self, signs: Signs, axis: str) -> int | None:
+        return place(signs, axis)
+
+    def runs(self, signs: Signs) -> bool:
+        return runs(signs)
+
+    def judge(self, axis: str, evidence: Evidence) -> Procedure[Ending | None]:
+        return judge(self.state, axis, evidence)

@@ -29,7 +29,7 @@ INTEGER = r"-?\d{1,19}"
 
 
 def who(state: PmxState) -> str:
-    return state.label or state.address or "the controller"
+    return state.who
 
 
 def _mark(state: PmxState, request: Request, sent: bool) -> Procedure[tuple[str, ...] | None]:
@@ -101,8 +101,29 @@ def _advice(text: str) -> str:
     return suggestion(text) if row is None else ""
 
 
-_EXCHANGE = Exchange(who, _mark, lambda state, request: state.reply_outstanding(), refusal)
-answered, beyond_doubt = _EXCHANGE.answered, _EXCHANGE.beyond_doubt
+class PmxExchange(Exchange):
+    """The exchange with a PMX."""
+
+    state: PmxState
+
+    def mark(self, request: Request, after: bool) -> Procedure[tuple[str, ...] | None]:
+        return _mark(self.state, request, after)
+
+    def lost(self, request: Request) -> None:
+        self.state.reply_outstanding()
+
+    def refusal(self, request: Request, reply: Reply) -> Refused | NoAnswer:
+        return refusal(self.state, request, reply)
+
+
+def answered(state: PmxState, request: Request, doubts: list[Request] | None = None) -> Procedure[Reply]:
+    """See `Exchange.answered`."""
+    return PmxExchange(state).answered(request, doubts)
+
+
+def beyond_doubt(state: PmxState, request: Request) -> Procedure[None]:
+    """See `Exchange.beyond_doubt`."""
+    return PmxExchange(state).beyond_doubt(request)
 
 
 OK = "OK"
@@ -345,15 +366,40 @@ def _clear() -> Procedure[None]:
 
 
 CLEARS = "ends half a command in a controller with a word that no controller knows. It moves and erases nothing"
-SCAN = Scan(
-    "PMX",
-    (9600, 19200, 38400, 57600, 115200),
-    lambda reach: len(_numbers(reach)),
-    search,
-    _clear,
-    CLEARS,
-    asked=lambda reach: "numbers 00 to 99",
-)
 
-CERTIFYING = Certifying[PmxState](__file__, "{}", "{}={}", refused="{text}")
+
+class PmxScan(Scan):
+    """The search for PMX controllers."""
+
+    title = "PMX"
+    bauds = (9600, 19200, 38400, 57600, 115200)
+    clears = CLEARS
+
+    def places(self, reach: Reach) -> int:
+        return len(_numbers(reach))
+
+    def search(self, reach: Reach, found: Found, step: Step) -> Procedure[Outcome]:
+        return search(reach, found, step)
+
+    def clear(self) -> Procedure[None]:
+        return _clear()
+
+    def asked(self, reach: Reach) -> str:
+        return "numbers 00 to 99"
+
+
+SCAN = PmxScan()
+
+
+class PmxCertifying(Certifying):
+    """The questions of a certificate to a PMX."""
+
+    state: PmxState
+
+    module = __file__
+    reads = "{}"
+    writes = "{}={}"
+    refused = "{text}"
+
+
 """A refused command runs nothing in a controller (7.19.4: only a running program has a subroutine for errors)."""

@@ -14,8 +14,8 @@ from multidrop.base.errors import Diagnostic, DriveError, NoAnswer, Refused, Sto
 from multidrop.base.files import SourceLine, lines_of_text
 from multidrop.base.text import whole
 from multidrop.dialects.codec import End, Procedure
-from multidrop.dialects.debugging import Debugging, Look, Neighbours, lacking
-from multidrop.dialects.family import Programs, Progress
+from multidrop.dialects.debugging import Debugging, Look, Neighbours, Stepped, lacking
+from multidrop.dialects.family import Printed, Programs, Progress
 from multidrop.dialects.program_files import Difference, Held, Stored, first_difference
 from multidrop.families.pmx.host.codec import PmxState
 from multidrop.families.pmx.host.operations import OK, PROGRAMS, answered, moving, number, perform, who
@@ -215,20 +215,45 @@ def file_of(_: PmxState, held: Held, raw: bool) -> tuple[str, ...]:
     return tuple(f"SA{line.at}={line.text}" for line in held.lines) if raw else readable(held)
 
 
-PROGRAM_FILES: Programs[PmxState] = Programs(
-    listing=listing,
-    readable=readable,
-    who=who,
-    read=read,
-    file=file_of,
-    size=lambda lines: len(program_file.compiled(lines)),
-    end=end,
-    download=download,
-    differences=differences,
-    to_send=to_send,
-    start=start,
-    annotated=annotated,
-)
+class PmxPrograms(Programs):
+    """The programs in a PMX."""
+
+    state: PmxState
+
+    def listing(self, place: str) -> Printed:
+        return listing(self.state, place)
+
+    def readable(self, held: Held) -> Sequence[str]:
+        return readable(held)
+
+    def read(self, lines: Sequence[SourceLine], progress: Progress) -> Procedure[Held]:
+        return read(self.state, lines, progress)
+
+    def file(self, held: Held, raw: bool) -> Sequence[str]:
+        return file_of(self.state, held, raw)
+
+    def size(self, lines: Sequence[SourceLine]) -> int:
+        return len(program_file.compiled(lines))
+
+    def end(self) -> Procedure[bool]:
+        return end(self.state)
+
+    def download(
+        self, lines: Sequence[SourceLine], held: Held | None, progress: Progress
+    ) -> Procedure[Sequence[SourceLine]]:
+        return download(self.state, lines, held, progress)
+
+    def differences(self, lines: Sequence[SourceLine], held: Held, before: Held | None) -> Sequence[Difference]:
+        return differences(self.state, lines, held, before)
+
+    def to_send(self, lines: Sequence[SourceLine], held: Held) -> Procedure[str]:
+        return to_send(self.state, lines, held)
+
+    def start(self, lines: Sequence[SourceLine], label: str) -> str:
+        return start(lines, label)
+
+    def annotated(self, text: str, held: Held) -> Sequence[str]:
+        return annotated(text, held)
 
 
 RUNNING, PAUSED = 1, 2
@@ -317,22 +342,57 @@ def watched(state: PmxState, names: Sequence[str]) -> Procedure[Mapping[str, str
     return found
 
 
-DEBUGGING = Debugging(
-    listing=stored_rows,
-    rows=lambda held: _rows(held.lines),
-    entry=lambda program: "0",
-    address=lambda program, place: None,
-    idle=idle,
-    trace=trace,
-    begin=no_step,
-    waits=waits,
-    step=no_step,
-    go_on=go_on,
-    look=look,
-    break_at=no_break,
-    break_off=no_break,
-    break_now=break_now,
-    names=check_names,
-    values=watched,
-    no_step=NO_STEP,
-)
+class PmxDebugging(Debugging):
+    """Observes the programs of a PMX."""
+
+    state: PmxState
+
+    no_step = NO_STEP
+
+    def listing(self) -> Procedure[tuple[Stored, ...]]:
+        return stored_rows(self.state)
+
+    def rows(self, held: Held) -> Sequence[Stored]:
+        return _rows(held.lines)
+
+    def entry(self, rows: Sequence[Stored]) -> str:
+        return "0"
+
+    def address(self, rows: Sequence[Stored], place: str) -> int | None:
+        return None
+
+    def idle(self, place: str, neighbours: Neighbours | None) -> Procedure[None]:
+        return idle(self.state, place, neighbours)
+
+    def trace(self, place: str) -> Procedure[None]:
+        return trace(self.state, place)
+
+    def begin(self, place: str) -> Procedure[None]:
+        return no_step(self.state, place)
+
+    def waits(self, place: str, last: Stored | None) -> Procedure[None]:
+        return waits(self.state, place, last)
+
+    def step(self, rows: Sequence[Stored]) -> Procedure[Stepped]:
+        return no_step(self.state, rows)
+
+    def go_on(self, place: str) -> Procedure[None]:
+        return go_on(self.state, place)
+
+    def look(self, place: str) -> Procedure[Look]:
+        return look(self.state, place)
+
+    def break_at(self, place: str, passes: int) -> Procedure[None]:
+        return no_break(self.state, place, passes)
+
+    def break_off(self) -> Procedure[None]:
+        return no_break(self.state)
+
+    def break_now(self, place: str) -> Procedure[None]:
+        return break_now(self.state, place)
+
+    def names(self, names: Sequence[str]) -> None:
+        check_names(self.state, names)
+
+    def values(self, names: Sequence[str]) -> Procedure[Mapping[str, str]]:
+        return watched(self.state, names)

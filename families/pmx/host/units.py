@@ -61,13 +61,30 @@ def basis(state: PmxState, axis: str, full_steps: int | None) -> Procedure[Basis
     return Basis(tuple(settings), missing="the controller does not report the steps of a turn")
 
 
-UNITS = Units(
-    lambda state: [axis.lower() for axis in AXES],
-    fields,
-    f"X, Y, I, PX, PY, {', '.join(f'{word}X, {word}Y' for word in SPEEDS)}",
-    basis,
-    disturbs,
-    recounts,
-    reads,
-    target=target,
-)
+class PmxUnits(Units):
+    """The quantities in lines of a PMX."""
+
+    state: PmxState
+
+    words = f"X, Y, I, PX, PY, {', '.join(f'{word}X, {word}Y' for word in SPEEDS)}"
+
+    def axes(self) -> Sequence[str]:
+        return [axis.lower() for axis in AXES]
+
+    def fields(self, text: str) -> Sequence[Field]:
+        return fields(self.state, text)
+
+    def basis(self, axis: str, full_steps: int | None) -> Procedure[Basis]:
+        return basis(self.state, axis, full_steps)
+
+    def disturbs(self, text: str) -> Collection[str]:
+        return disturbs(self.state, text)
+
+    def recounts(self, request: Request) -> bool:
+        return recounts(request)
+
+    def reads(self, text: str) -> tuple[str, Takes] | None:
+        return reads(self.state, text)
+
+    def target(self) -> Procedure[Takes]:
+        return target(self.state)

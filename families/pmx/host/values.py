@@ -212,17 +212,32 @@ def ready(state: PmxState) -> Procedure[str]:
     return ""
 
 
-PARAMETERS = Parameters(
-    read=read_settings,
-    plan=plan,
-    ready=ready,
-    write=lambda state, change: perform(state, change.text),
-    save=lambda state: perform(state, "STORE"),  # not speeds, times and variables below V32
-    language="PMX",
-    saving="STORE",
-    conflict=conflict,
-    later=frozenset(LATER),
-)
+class PmxParameters(Parameters):
+    """The settings of a PMX."""
+
+    state: PmxState
+
+    language = "PMX"
+    saving = "STORE"
+    later = frozenset(LATER)
+
+    def read(self, progress: Progress) -> Procedure[Readings]:
+        return read_settings(self.state, progress)
+
+    def plan(self, present: Readings, wanted: Mapping[str, Value], permission: Permission) -> Plan:
+        return plan(self.state, present, wanted, permission)
+
+    def ready(self) -> Procedure[str]:
+        return ready(self.state)
+
+    def write(self, change: Change) -> Procedure[object]:
+        return perform(self.state, change.text)
+
+    def save(self) -> Procedure[object]:
+        return perform(self.state, "STORE")
+
+    def conflict(self, plan: Plan, others: Collection[str]) -> str:
+        return conflict(plan, others)
 
 
 RUNNING, PAUSED = 1, 2
@@ -399,15 +414,56 @@ def run(axis: str, velocity: int | str) -> tuple[str, ...]:
     return (f"HSPD{name}={abs(velocity)}", f"J{name}{'-' if velocity < 0 else '+'}") if velocity else (f"STOP{name}",)
 
 
-ACTIONS = Actions(homings=homings, run=run, output=lambda number, on: f"DO{number}={on:d}", clear=clearing)
-VALUES = Values(
-    parameters=PARAMETERS,
-    snapshot=take,
-    parts=parts,
-    fold=fold,
-    check=check,
-    first=lambda state, word: again(state, word, Priority.OPERATOR),
-    again=again,
-    controls=controls,
-    actions=ACTIONS,
-)
+class PmxActions(Actions):
+    """What a program asks of a PMX."""
+
+    state: PmxState
+
+    no_error = ""
+
+    def homings(self, axis: str) -> Mapping[str, Mapping[str, str]]:
+        return homings(axis)
+
+    def run(self, axis: str, velocity: int | str) -> tuple[str, ...]:
+        return run(axis, velocity)
+
+    def output(self, number: int, on: bool) -> str:
+        return f"DO{number}={on:d}"
+
+    def clear(self, axis: str) -> str:
+        return clearing(axis)
+
+
+class PmxValues(Values):
+    """What is read of a PMX."""
+
+    state: PmxState
+
+    @property
+    def parameters(self) -> Parameters:
+        return PmxParameters(self.state)
+
+    def snapshot(self, progress: Progress) -> Procedure[Snapshot]:
+        return take(self.state, progress)
+
+    def parts(self, facts: Facts) -> Sequence[Part]:
+        return parts(self.state, facts)
+
+    def fold(self, facts: Facts) -> tuple[Conditions, ...]:
+        return fold(self.state, facts)
+
+    def check(self, word: str) -> str:
+        return check(self.state, word)
+
+    def first(self, word: str) -> Procedure[float]:
+        return again(self.state, word, Priority.OPERATOR)
+
+    def again(self, word: str, priority: Priority) -> Procedure[float]:
+        return again(self.state, word, priority)
+
+    def controls(self, axis: str) -> Controls:
+        return controls(self.state, axis)
+
+    @property
+    def actions(self) -> Actions:
+        return PmxActions(self.state)

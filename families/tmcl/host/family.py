@@ -7,10 +7,29 @@ the module is reached. A stop is never guarded. Values have numbers; a word is t
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 from multidrop.base.files import rows
-from multidrop.dialects.family import ADDRESSES, EVERYONE, Family, Guard, Guards, to_all
+from multidrop.dialects.certifying import Certifying
+from multidrop.dialects.codec import Codec, Priority, Procedure
+from multidrop.dialects.debugging import Debugging
+from multidrop.dialects.family import (
+    ADDRESSES,
+    EVERYONE,
+    Family,
+    Guard,
+    Hints,
+    Motion,
+    Printed,
+    Programs,
+    Referencing,
+    to_all,
+)
+from multidrop.dialects.motions import Motions
+from multidrop.dialects.scanning import Scan
+from multidrop.dialects.state import DriveState
+from multidrop.dialects.units import Units
+from multidrop.dialects.values import Values
 from multidrop.families.tmcl.host import codec, operations
 from multidrop.families.tmcl.host.codec import STOP_BYTES, Tmcl, TmclState
 from multidrop.families.tmcl.host.operations import identify
@@ -74,35 +93,129 @@ def only_reads(text: str) -> bool:
     return word_of(text) in (Command.GAP.name, Command.GGP.name, Command.GIO.name)
 
 
-TMCL = Family(
-    name=Tmcl.family,
-    codec=Tmcl(),
-    new_state=TmclState,
-    identify=identify,
-    perform=operations.perform,
-    check=operations.parsed,
-    motion=operations.motion,
-    moving=operations.moving,
-    busy=operations.busy,
-    status=operations.status,
-    referencing=operations.referencing,
-    homed=operations.homed,
-    language=help,
-    rests_in_place=True,
-    question=commands.asked,
-    move=move,
-    move_to=move_to,
-    assign=commands.assigned,
-    guards=Guards(GUARDS, lambda state, text: guarded(text, state.address), word_of, only_ends, only_reads),
-    programs_at="multidrop.families.tmcl.host.programs:PROGRAM_FILES",
-    debugging_at="multidrop.families.tmcl.host.programs:DEBUGGING",
-    repairs=True,
-    certifying_at="multidrop.families.tmcl.host.operations:CERTIFYING",
-    motions_at="multidrop.families.tmcl.host.motions:MOTIONS",
-    values_at="multidrop.families.tmcl.host.values:VALUES",
-    units_at="multidrop.families.tmcl.host.units:UNITS",
-    stop_bytes=STOP_BYTES,
-    message_moves=codec.moves,
-    in_frames=codec.replies_in,
-    scan_at="multidrop.families.tmcl.host.scan:SCAN",
-)
+class TmclFamily(Family):
+    """A Trinamic module in direct mode."""
+
+    state: TmclState
+
+    guards = GUARDS
+
+    name = Tmcl.family
+    codec = Tmcl()
+    language = help
+    rests_in_place = True
+    repairs = True
+    stop_bytes = STOP_BYTES
+
+    @classmethod
+    def new_state(cls, codec: Codec, address: str) -> DriveState:
+        return TmclState(codec, address)
+
+    @classmethod
+    def identify(cls, hints: Hints) -> Procedure[Sequence[DriveState]]:
+        return identify(hints)
+
+    def guard(self, text: str) -> Guard | None:
+        return guarded(text, self.state.address)
+
+    @classmethod
+    def word_of(cls, text: str) -> str:
+        return word_of(text)
+
+    @classmethod
+    def only_ends(cls, text: str) -> bool:
+        return only_ends(text)
+
+    @classmethod
+    def only_reads(cls, text: str) -> bool:
+        return only_reads(text)
+
+    def perform(self, text: str) -> Printed:
+        return operations.perform(self.state, text)
+
+    def check(self, text: str) -> None:
+        operations.parsed(self.state, text)
+
+    def motion(self, priority: Priority) -> Procedure[tuple[Motion, ...]]:
+        return operations.motion(self.state, priority)
+
+    def moving(self) -> Procedure[bool]:
+        return operations.moving(self.state)
+
+    def busy(self) -> Procedure[bool]:
+        return operations.busy(self.state)
+
+    def status(self) -> Printed:
+        return operations.status(self.state)
+
+    def referencing(self, text: str) -> Referencing | None:
+        return operations.referencing(self.state, text)
+
+    def homed(self) -> Procedure[bool]:
+        return operations.homed(self.state)
+
+    @classmethod
+    def question(cls, word: str) -> str | None:
+        return commands.asked(word)
+
+    @classmethod
+    def move(cls, axis: str, distance: int | str) -> tuple[str, ...]:
+        return move(axis, distance)
+
+    @classmethod
+    def move_to(cls, axis: str, position: int | str) -> tuple[str, ...]:
+        return move_to(axis, position)
+
+    @classmethod
+    def assign(cls, word: str, value: str) -> str | None:
+        return commands.assigned(word, value)
+
+    @property
+    def programs(self) -> Programs:
+        from multidrop.families.tmcl.host.programs import TmclPrograms
+
+        return TmclPrograms(self.state)
+
+    @property
+    def debugging(self) -> Debugging:
+        from multidrop.families.tmcl.host.programs import TmclDebugging
+
+        return TmclDebugging(self.state)
+
+    @property
+    def certifying(self) -> Certifying:
+        from multidrop.families.tmcl.host.operations import TmclCertifying
+
+        return TmclCertifying(self.state)
+
+    @property
+    def motions(self) -> Motions:
+        from multidrop.families.tmcl.host.motions import TmclMotions
+
+        return TmclMotions(self.state)
+
+    @property
+    def values(self) -> Values:
+        from multidrop.families.tmcl.host.values import TmclValues
+
+        return TmclValues(self.state)
+
+    @property
+    def units(self) -> Units:
+        from multidrop.families.tmcl.host.units import TmclUnits
+
+        return TmclUnits(self.state)
+
+    @classmethod
+    def message_moves(cls, messages: bytes) -> bool:
+        return codec.moves(messages)
+
+    @classmethod
+    def in_frames(cls, data: bytes) -> Sequence[str]:
+        return codec.replies_in(data)
+
+    @classmethod
+    def scan(cls) -> Scan:
+        from multidrop.families.tmcl.host.scan import SCAN
+
+        return SCAN

@@ -184,4 +184,19 @@ def runs(found: Signs) -> bool:
     return bool(found.get(PROGRAM))
 
 
-MOTIONS = Motions(effect=effect, signs=signs, runs=runs, judge=judge)
+class TmclMotions(Motions):
+    """How the motions of a TMCL module begin and end."""
+
+    state: TmclState
+
+    def effect(self, text: str) -> Effect:
+        return effect(self.state, text)
+
+    def signs(self) -> Procedure[Signs]:
+        return signs(self.state)
+
+    def runs(self, signs: Signs) -> bool:
+        return runs(signs)
+
+    def judge(self, axis: str, evidence: Evidence) -> Procedure[Ending | None]:
+        return judge(self.state, axis, evidence)

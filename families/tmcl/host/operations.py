@@ -58,7 +58,7 @@ END = "133 0, 0, 0"
 
 
 def who(state: TmclState) -> str:
-    return f"module {state.label or state.address}"
+    return state.who
 
 
 def answered(state: TmclState, request: Request) -> Procedure[Reply]:
@@ -82,7 +82,7 @@ def answered(state: TmclState, request: Request) -> Procedure[Reply]:
     if sets:
         state.search_mode_sent(call.motor)
     try:
-        reply = yield from _EXCHANGE.answered(state, request)
+        reply = yield from TmclExchange(state).answered(request)
     except NoAnswer as lost:
         if request.kind is not Kind.PRINT or call.changed_by_reading:
             raise
@@ -103,7 +103,7 @@ def _asked_again(state: TmclState, request: Request, lost: NoAnswer) -> Procedur
     if state.programming:  # it would store the request
         raise lost
     try:
-        return (yield from _EXCHANGE.answered(state, request))
+        return (yield from TmclExchange(state).answered(request))
     except NoAnswer:
         raise NoAnswer(f"{who(state)} does not reply: '{request.text}' only reads, and was sent twice") from None
 
@@ -184,8 +184,27 @@ def _asked(state: TmclState, call: Call, priority: Priority) -> Procedure[Reply 
     return reply
 
 
-_EXCHANGE = Exchange(who, _mark, _lost, refusal, _replied)
-synchronised = _EXCHANGE.synchronised
+class TmclExchange(Exchange):
+    """The exchange with a TMCL module."""
+
+    state: TmclState
+
+    def mark(self, request: Request, after: bool) -> Procedure[tuple[str, ...] | None]:
+        return _mark(self.state, request, after)
+
+    def lost(self, request: Request) -> None:
+        _lost(self.state, request)
+
+    def refusal(self, request: Request, reply: Reply) -> Refused | NoAnswer:
+        return refusal(self.state, request, reply)
+
+    def send(self, request: Request) -> Procedure[Reply]:
+        return _replied(self.state, request)
+
+
+def synchronised(state: TmclState, request: Request) -> Procedure[None]:
+    """See `Exchange.synchronised`."""
+    return TmclExchange(state).synchronised(request)
 
 
 def motors(state: TmclState, priority: Priority = Priority.OPERATOR) -> Procedure[int]:
@@ -435,7 +454,18 @@ def _end_download(state: TmclState, why: str) -> Procedure[None]:
     state.note(f"{who(state)}: {why}; it was ended with 133: check the program in the module")
 
 
-CERTIFYING = Certifying[TmclState](
-    __file__, "GAP {}", "SAP {}, {}", refused="status {code}", masked=lambda address, raw: raw[2:-1].hex(" ")
-)
+class TmclCertifying(Certifying):
+    """The questions of a certificate to a TMCL module."""
+
+    state: TmclState
+
+    module = __file__
+    reads = "GAP {}"
+    writes = "SAP {}, {}"
+    refused = "status {code}"
+
+    def masked(self, raw: bytes) -> str:
+        return raw[2:-1].hex(" ")
+
+
 """A refused command runs nothing in a module. Replies are shown without their two addresses and their checksum."""

@@ -18,7 +18,7 @@ from multidrop.base.files import SourceLine, lines_of_text
 from multidrop.base.text import counted, whole
 from multidrop.dialects.codec import Procedure
 from multidrop.dialects.debugging import Debugging, Look, Neighbours, Stepped, lacking
-from multidrop.dialects.family import Programs, Progress
+from multidrop.dialects.family import Printed, Programs, Progress
 from multidrop.dialects.program_files import Difference, Held, Stored, first_difference, numbered
 from multidrop.families.tmcl.host.codec import TmclState, call_of, line_in, parse_reply
 from multidrop.families.tmcl.host.operations import LACKS, answered, busy, moving, perform, read, store, who
@@ -226,21 +226,47 @@ def annotated(text: str, held: Held) -> tuple[str, ...]:
     return tuple(f"{places.get(number, ''):>{width}}  {line}".rstrip() for number, line in enumerate(lines, 1))
 
 
-PROGRAM_FILES: Programs[TmclState] = Programs(
-    listing=listing,
-    readable=readable,
-    who=who,
-    read=read_held,
-    file=file_of,
-    size=lambda lines: len(program_file.compiled(lines)),
-    end=end,
-    download=download,
-    differences=differences,
-    to_send=to_send,
-    start=start,
-    annotated=annotated,
-    remark="//",
-)
+class TmclPrograms(Programs):
+    """The program in a TMCL module."""
+
+    state: TmclState
+
+    remark = "//"
+
+    def listing(self, place: str) -> Printed:
+        return listing(self.state, place)
+
+    def readable(self, held: Held) -> Sequence[str]:
+        return readable(held)
+
+    def read(self, lines: Sequence[SourceLine], progress: Progress) -> Procedure[Held]:
+        return read_held(self.state, lines, progress)
+
+    def file(self, held: Held, raw: bool) -> Sequence[str]:
+        return file_of(self.state, held, raw)
+
+    def size(self, lines: Sequence[SourceLine]) -> int:
+        return len(program_file.compiled(lines))
+
+    def end(self) -> Procedure[bool]:
+        return end(self.state)
+
+    def download(
+        self, lines: Sequence[SourceLine], held: Held | None, progress: Progress
+    ) -> Procedure[Sequence[SourceLine]]:
+        return download(self.state, lines, held, progress)
+
+    def differences(self, lines: Sequence[SourceLine], held: Held, before: Held | None) -> Sequence[Difference]:
+        return differences(self.state, lines, held, before)
+
+    def to_send(self, lines: Sequence[SourceLine], held: Held) -> Procedure[str]:
+        return to_send(self.state, lines, held)
+
+    def start(self, lines: Sequence[SourceLine], label: str) -> str:
+        return start(lines, label)
+
+    def annotated(self, text: str, held: Held) -> Sequence[str]:
+        return annotated(text, held)
 
 
 # Observation
@@ -356,21 +382,55 @@ def watched(state: TmclState, names: Sequence[str]) -> Procedure[Mapping[str, st
     return found
 
 
-DEBUGGING = Debugging(
-    listing=stored_rows,
-    entry=lambda listed: "0",
-    address=lambda listed, place: whole(place, 0, MEMORY - 1),
-    idle=idle,
-    trace=trace,
-    begin=begin,
-    waits=waits,
-    forget=lambda state: state.program_halted(False),
-    step=step,
-    go_on=go_on,
-    look=look,
-    break_at=no_break,
-    break_off=no_break,
-    break_now=break_now,
-    names=check_names,
-    values=watched,
-)
+class TmclDebugging(Debugging):
+    """Observes the program of a TMCL module."""
+
+    state: TmclState
+
+    def listing(self) -> Procedure[tuple[Stored, ...]]:
+        return stored_rows(self.state)
+
+    def entry(self, rows: Sequence[Stored]) -> str:
+        return "0"
+
+    def address(self, rows: Sequence[Stored], place: str) -> int | None:
+        return whole(place, 0, MEMORY - 1)
+
+    def idle(self, place: str, neighbours: Neighbours | None) -> Procedure[None]:
+        return idle(self.state, place, neighbours)
+
+    def trace(self, place: str) -> Procedure[None]:
+        return trace(self.state, place)
+
+    def begin(self, place: str) -> Procedure[None]:
+        return begin(self.state, place)
+
+    def waits(self, place: str, last: Stored | None) -> Procedure[None]:
+        return waits(self.state, place, last)
+
+    def forget(self) -> None:
+        self.state.program_halted(False)
+
+    def step(self, rows: Sequence[Stored]) -> Procedure[Stepped]:
+        return step(self.state, rows)
+
+    def go_on(self, place: str) -> Procedure[None]:
+        return go_on(self.state, place)
+
+    def look(self, place: str) -> Procedure[Look]:
+        return look(self.state, place)
+
+    def break_at(self, place: str, passes: int) -> Procedure[None]:
+        return no_break(self.state, place, passes)
+
+    def break_off(self) -> Procedure[None]:
+        return no_break(self.state)
+
+    def break_now(self, place: str) -> Procedure[None]:
+        return break_now(self.state, place)
+
+    def names(self, names: Sequence[str]) -> None:
+        check_names(self.state, names)
+
+    def values(self, names: Sequence[str]) -> Procedure[Mapping[str, str]]:
+        return watched(self.state, names)

@@ -133,14 +133,26 @@ def stop(asked: Sequence[str]) -> Sequence[StopPiece]:
     return [*pieces, *(StopPiece(each, GAP if at else RESYNC) for at, each in enumerate(frames))]
 
 
-SCAN = Scan(
-    "TMCL",
-    (9600, 19200, 38400, 57600, 115200),
-    lambda reach: len(_addresses(reach)),
-    search,
-    asked=lambda reach: "addresses 1 to 255" if len(_addresses(reach)) > 1 else "address 1 only (--all: each address)",
-    hazard=HAZARD,
-    waits=2 * RESYNC,
-    slow=0.11,
-    stop=stop,
-)
+class TmclScan(Scan):
+    """The search for TMCL modules."""
+
+    title = "TMCL"
+    bauds = (9600, 19200, 38400, 57600, 115200)
+    hazard = HAZARD
+    waits = 2 * RESYNC
+    slow = 0.11
+
+    def places(self, reach: Reach) -> int:
+        return len(_addresses(reach))
+
+    def search(self, reach: Reach, found: Found, step: Step) -> Procedure[Outcome]:
+        return search(reach, found, step)
+
+    def asked(self, reach: Reach) -> str:
+        return "addresses 1 to 255" if len(_addresses(reach)) > 1 else "address 1 only (--all: each address)"
+
+    def stop(self, asked: Sequence[str]) -> Sequence[StopPiece]:
+        return stop(asked)
+
+
+SCAN = TmclScan()

@@ -68,7 +68,7 @@ def disturbs(state: TmclState, text: str) -> Collection[str]:
     if call is None:
         return ()
     if call.command == Command.FACTORY:
-        return UNITS.axes(state)
+        return TmclUnits(state).axes()
     sets = call.command in (Command.SAP, Command.RSAP) and call.type in (Axis.ACTUAL_POSITION, *RESTS)
     return (_axis(state, call.motor),) if sets else ()
 
@@ -110,14 +110,33 @@ def setting(state: TmclState, name: str) -> tuple[str, Takes] | None:
     return (_axis(state, int(found[2] or 0)), takes) if found is not None and takes is not None else None
 
 
-UNITS = Units(
-    lambda state: [str(motor) for motor in range(state.motors)] if state.motors > 1 else [""],
-    fields,
-    "MVP ABS, MVP REL, ROR, and SAP of 0, 1, 2, 4, 5, 194, 195",
-    basis,
-    disturbs,
-    recounts,
-    reads,
-    setting,
-    lambda axis, name: commands.setting_name(f"{name}_{axis}" if axis else name),
-)
+class TmclUnits(Units):
+    """The quantities in lines of TMCL."""
+
+    state: TmclState
+
+    words = "MVP ABS, MVP REL, ROR, and SAP of 0, 1, 2, 4, 5, 194, 195"
+
+    def axes(self) -> Sequence[str]:
+        return [str(motor) for motor in range(self.state.motors)] if self.state.motors > 1 else [""]
+
+    def fields(self, text: str) -> Sequence[Field]:
+        return fields(self.state, text)
+
+    def basis(self, axis: str, full_steps: int | None) -> Procedure[Basis]:
+        return basis(self.state, axis, full_steps)
+
+    def disturbs(self, text: str) -> Collection[str]:
+        return disturbs(self.state, text)
+
+    def recounts(self, request: Request) -> bool:
+        return recounts(request)
+
+    def reads(self, text: str) -> tuple[str, Takes] | None:
+        return reads(self.state, text)
+
+    def setting(self, name: str) -> tuple[str, Takes] | None:
+        return setting(self.state, name)
+
+    def setting_name(self, axis: str, name: str) -> str:
+        return commands.setting_name(f"{name}_{axis}" if axis else name)

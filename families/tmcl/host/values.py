@@ -172,16 +172,31 @@ def save(state: TmclState) -> Procedure[None]:
                     raise
 
 
-PARAMETERS = Parameters(
-    read=read_settings,
-    plan=plan,
-    ready=ready,
-    write=lambda state, change: perform(state, change.text),  # a module keeps global parameters by itself
-    save=save,
-    language="TMCL",
-    saving="STAP",
-    conflict=conflict,
-)
+class TmclParameters(Parameters):
+    """The settings of a TMCL module."""
+
+    state: TmclState
+
+    language = "TMCL"
+    saving = "STAP"
+
+    def read(self, progress: Progress) -> Procedure[Readings]:
+        return read_settings(self.state, progress)
+
+    def plan(self, present: Readings, wanted: Mapping[str, Value], permission: Permission) -> Plan:
+        return plan(self.state, present, wanted, permission)
+
+    def ready(self) -> Procedure[str]:
+        return ready(self.state)
+
+    def write(self, change: Change) -> Procedure[object]:
+        return perform(self.state, change.text)
+
+    def save(self) -> Procedure[object]:
+        return save(self.state)
+
+    def conflict(self, plan: Plan, others: Collection[str]) -> str:
+        return conflict(plan, others)
 
 
 STATE = (Axis.TARGET_POSITION, Axis.POSITION_REACHED)
@@ -330,22 +345,59 @@ def _word(word: str, axis: str) -> str:
     return f"G{found.type}" if found.command == Command.GGP else f"AP{found.type}_{found.motor if named else axis or 0}"
 
 
-ACTIONS = Actions(
-    homings=lambda axis: {"search": {"": f"RFS START, {axis or '0'}"}},
-    run=lambda axis, velocity: (f"ROR {axis or '0'}, {velocity}",),
-    output=lambda number, on: f"SIO {number}, 2, {on:d}",
-    no_error="a module has no error to read: each refusal says its own; read('AP208') shows the driver's flags",
-    word=_word,
-    ports=lambda state: {port: f"GIO {port}, 0" for port in module_of(state.product).inputs},
-)
-VALUES = Values(
-    parameters=PARAMETERS,
-    snapshot=take,
-    parts=parts,
-    fold=fold,
-    check=check,
-    first=lambda state, word: again(state, word, Priority.OPERATOR),
-    again=again,
-    controls=controls,
-    actions=ACTIONS,
-)
+class TmclActions(Actions):
+    """What a program asks of a TMCL module."""
+
+    state: TmclState
+
+    no_error = "a module has no error to read: each refusal says its own; read('AP208') shows the driver's flags"
+
+    def homings(self, axis: str) -> Mapping[str, Mapping[str, str]]:
+        return {"search": {"": f"RFS START, {axis or '0'}"}}
+
+    def run(self, axis: str, velocity: int | str) -> tuple[str, ...]:
+        return (f"ROR {axis or '0'}, {velocity}",)
+
+    def output(self, number: int, on: bool) -> str:
+        return f"SIO {number}, 2, {on:d}"
+
+    def word(self, word: str, axis: str) -> str:
+        return _word(word, axis)
+
+    def ports(self) -> Mapping[int, str]:
+        return {port: f"GIO {port}, 0" for port in module_of(self.state.product).inputs}
+
+
+class TmclValues(Values):
+    """What is read of a TMCL module."""
+
+    state: TmclState
+
+    @property
+    def parameters(self) -> Parameters:
+        return TmclParameters(self.state)
+
+    def snapshot(self, progress: Progress) -> Procedure[Snapshot]:
+        return take(self.state, progress)
+
+    def parts(self, facts: Facts) -> Sequence[Part]:
+        return parts(self.state, facts)
+
+    def fold(self, facts: Facts) -> tuple[Conditions, ...]:
+        return fold(self.state, facts)
+
+    def check(self, word: str) -> str:
+        return check(self.state, word)
+
+    def first(self, word: str) -> Procedure[float]:
+        return again(self.state, word, Priority.OPERATOR)
+
+    def again(self, word: str, priority: Priority) -> Procedure[float]:
+        return again(self.state, word, priority)
+
+    def controls(self, axis: str) -> Controls:
+        return controls(self.state, axis)
+
+    @property
+    def actions(self) -> Actions:
+        return TmclActions(self.state)

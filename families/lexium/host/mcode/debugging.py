@@ -368,24 +368,64 @@ def values(state: MCodeState, names: Sequence[str]) -> Procedure[Mapping[str, st
     return found
 
 
-DEBUGGING = Debugging(
-    listing=rows,
-    entry=entry,
-    address=address_of,
-    idle=idle,
-    trace=trace,
-    begin=begin,
-    waits=waits,
-    forget=lambda state: state.steps(False),
-    step=step,
-    go_on=go_on,
-    look=look,
-    break_at=break_at,
-    break_off=break_off,
-    break_now=break_now,
-    broken=broken,
-    hold=hold,
-    names=check_names,
-    values=values,
-    traced=traced,
-)
+class MCodeDebugging(Debugging):
+    """Observes the program of an MCode drive."""
+
+    state: MCodeState
+
+    def listing(self) -> Procedure[tuple[Stored, ...]]:
+        return rows(self.state)
+
+    def entry(self, rows: Sequence[Stored]) -> str:
+        return entry(rows)
+
+    def address(self, rows: Sequence[Stored], place: str) -> int | None:
+        return address_of(rows, place)
+
+    def idle(self, place: str, neighbours: Neighbours | None) -> Procedure[None]:
+        return idle(self.state, place, neighbours)
+
+    def trace(self, place: str) -> Procedure[None]:
+        return trace(self.state, place)
+
+    def begin(self, place: str) -> Procedure[None]:
+        return begin(self.state, place)
+
+    def waits(self, place: str, last: Stored | None) -> Procedure[None]:
+        return waits(self.state, place, last)
+
+    def forget(self) -> None:
+        self.state.steps(False)
+
+    def step(self, rows: Sequence[Stored]) -> Procedure[Stepped]:
+        return step(self.state, rows)
+
+    def go_on(self, place: str) -> Procedure[None]:
+        return go_on(self.state, place)
+
+    def look(self, place: str) -> Procedure[Look]:
+        return look(self.state, place)
+
+    def break_at(self, place: str, passes: int) -> Procedure[None]:
+        return break_at(self.state, place, passes)
+
+    def break_off(self) -> Procedure[None]:
+        return break_off(self.state)
+
+    def break_now(self, place: str) -> Procedure[None]:
+        return break_now(self.state, place)
+
+    def broken(self, rows: Sequence[Stored], last: Stored, place: str) -> Procedure[int | None]:
+        return broken(self.state, rows, last, place)
+
+    def hold(self, text: str) -> float | None:
+        return hold(text)
+
+    def names(self, names: Sequence[str]) -> None:
+        check_names(self.state, names)
+
+    def values(self, names: Sequence[str]) -> Procedure[Mapping[str, str]]:
+        return values(self.state, names)
+
+    def traced(self, line: str) -> Stored | None:
+        return traced(line)

@@ -2,15 +2,23 @@
 
 from __future__ import annotations
 
-from functools import partial
+from collections.abc import Sequence
 
-from multidrop.dialects.codec import Procedure
-from multidrop.dialects.family import Family, Guard, Guards
+from multidrop.dialects.certifying import Certifying
+from multidrop.dialects.codec import Codec, Priority, Procedure
+from multidrop.dialects.debugging import Debugging
+from multidrop.dialects.family import Family, Guard, Hints, Motion, Printed, Programs, Referencing
+from multidrop.dialects.motions import Motions
+from multidrop.dialects.scanning import Scan
+from multidrop.dialects.state import DriveState, Remembered
+from multidrop.dialects.units import Units
+from multidrop.dialects.values import Values
 from multidrop.families.lexium.host.mcode import classify, operations
 from multidrop.families.lexium.host.mcode.codec import STOP_BYTES, MCode
 from multidrop.families.lexium.host.mcode.identify import identify, remember
 from multidrop.families.lexium.host.mcode.state import MCodeState
 from multidrop.families.lexium.manual import guards, help, points
+from multidrop.families.lexium.manual.guards import CYBER_SECURITY, NAMES
 
 
 def guarded(state: MCodeState, text: str) -> Guard | None:
@@ -22,37 +30,133 @@ def homed(state: MCodeState) -> Procedure[bool]:
     return not (yield from operations.flag(state, "EF"))
 
 
-MCODE = Family(
-    name=MCode.family,
-    codec=MCode(),
-    new_state=MCodeState,
-    identify=identify,
-    perform=operations.perform,
-    check=operations.check,
-    motion=operations.motion,
-    moving=partial(operations.flag, name="MV"),
-    busy=partial(operations.flag, name="BY"),
-    status=operations.status,
-    referencing=classify.referencing,
-    homed=homed,
-    language=help,
-    rests_in_place=False,
-    question="PR {}".format,
-    move=points.move,
-    move_to=points.move_to,
-    assign=points.assign,
-    programs_at="multidrop.families.lexium.host.mcode.programs:PROGRAMS",
-    guards=Guards(guards.NAMES, guarded, guards.word_of, guards.only_ends, guards.only_reads),
-    vouched=classify.vouched,
-    addressed=guards.addressed,
-    protection=guards.CYBER_SECURITY,
-    debugging_at="multidrop.families.lexium.host.mcode.debugging:DEBUGGING",
-    repairs=True,
-    remember=remember,
-    scan_at="multidrop.families.lexium.host.mcode.scan:SCAN",
-    certifying_at="multidrop.families.lexium.host.mcode.programs:CERTIFYING",
-    values_at="multidrop.families.lexium.host.mcode.values:VALUES",
-    units_at="multidrop.families.lexium.host.mcode.units:UNITS",
-    motions_at="multidrop.families.lexium.host.mcode.motions:MOTIONS",
-    stop_bytes=STOP_BYTES,
-)
+class MCodeFamily(Family):
+    """A Lexium MDrive or MDrivePlus on a serial line, or over MCode/TCP."""
+
+    state: MCodeState
+
+    guards = NAMES
+
+    name = MCode.family
+    codec = MCode()
+    language = help
+    rests_in_place = False
+    protection = CYBER_SECURITY
+    repairs = True
+    stop_bytes = STOP_BYTES
+
+    @classmethod
+    def new_state(cls, codec: Codec, address: str) -> DriveState:
+        return MCodeState(codec, address)
+
+    @classmethod
+    def identify(cls, hints: Hints) -> Procedure[Sequence[DriveState]]:
+        return identify(hints)
+
+    def guard(self, text: str) -> Guard | None:
+        return guarded(self.state, text)
+
+    @classmethod
+    def word_of(cls, text: str) -> str:
+        return guards.word_of(text)
+
+    @classmethod
+    def only_ends(cls, text: str) -> bool:
+        return guards.only_ends(text)
+
+    @classmethod
+    def only_reads(cls, text: str) -> bool:
+        return guards.only_reads(text)
+
+    def perform(self, text: str) -> Printed:
+        return operations.perform(self.state, text)
+
+    def check(self, text: str) -> None:
+        operations.check(self.state, text)
+
+    def motion(self, priority: Priority) -> Procedure[tuple[Motion, ...]]:
+        return operations.motion(self.state, priority)
+
+    def moving(self) -> Procedure[bool]:
+        return operations.flag(self.state, name="MV")
+
+    def busy(self) -> Procedure[bool]:
+        return operations.flag(self.state, name="BY")
+
+    def status(self) -> Printed:
+        return operations.status(self.state)
+
+    def referencing(self, text: str) -> Referencing | None:
+        return classify.referencing(self.state, text)
+
+    def homed(self) -> Procedure[bool]:
+        return homed(self.state)
+
+    @classmethod
+    def question(cls, word: str) -> str | None:
+        return f"PR {word}"
+
+    @classmethod
+    def move(cls, axis: str, distance: int | str) -> tuple[str, ...]:
+        return points.move(axis, distance)
+
+    @classmethod
+    def move_to(cls, axis: str, position: int | str) -> tuple[str, ...]:
+        return points.move_to(axis, position)
+
+    @classmethod
+    def assign(cls, word: str, value: str) -> str | None:
+        return points.assign(word, value)
+
+    @property
+    def programs(self) -> Programs:
+        from multidrop.families.lexium.host.mcode.programs import MCodePrograms
+
+        return MCodePrograms(self.state)
+
+    @classmethod
+    def vouched(cls, text: str, product: str) -> bool:
+        return classify.vouched(text, product)
+
+    @classmethod
+    def addressed(cls, text: str, product: str) -> tuple[str, str] | None:
+        return guards.addressed(text, product)
+
+    @property
+    def debugging(self) -> Debugging:
+        from multidrop.families.lexium.host.mcode.debugging import MCodeDebugging
+
+        return MCodeDebugging(self.state)
+
+    def remember(self) -> Remembered | None:
+        return remember(self.state)
+
+    @classmethod
+    def scan(cls) -> Scan:
+        from multidrop.families.lexium.host.mcode.scan import SCAN
+
+        return SCAN
+
+    @property
+    def certifying(self) -> Certifying:
+        from multidrop.families.lexium.host.mcode.programs import MCodeCertifying
+
+        return MCodeCertifying(self.state)
+
+    @property
+    def values(self) -> Values:
+        from multidrop.families.lexium.host.mcode.values import MCodeValues
+
+        return MCodeValues(self.state)
+
+    @property
+    def units(self) -> Units:
+        from multidrop.families.lexium.host.mcode.units import MCodeUnits
+
+        return MCodeUnits(self.state)
+
+    @property
+    def motions(self) -> Motions:
+        from multidrop.families.lexium.host.mcode.motions import MCodeMotions
+
+        return MCodeMotions(self.state)

@@ -10,9 +10,8 @@ has are asked: an error could start a resident OE subroutine. (MCode reference 5
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
-from typing import Generic, TypeVar
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 from multidrop.base.errors import DriveError
 from multidrop.dialects.codec import Procedure
@@ -31,7 +30,6 @@ from multidrop.families.lexium.manual.mnemonic import EVERY
 from multidrop.families.lexium.manual.points import CAUSE
 from multidrop.families.lexium.manual.table import lookup
 
-S = TypeVar("S", bound=DriveState)
 AXIS = ""
 ONLY = frozenset({AXIS})
 SIGNS = ("EF", "MV", "BY", "ST", "P", "AF", "TE")
@@ -134,130 +132,123 @@ def _whole(statement: Statement) -> int | None:
 # Before a motion, and at its end
 
 
-@dataclass(frozen=True)
-class Access(Generic[S]):
-    """How a family reads the words of MCode."""
+class LexiumMotions(Motions):
+    """How the motions of a Lexium drive begin and end. A protocol reads the words of MCode in its own way."""
 
-    values: Callable[[S, Sequence[str]], Procedure[Mapping[str, int]]]
-    """Read those of these words that the product has; nothing is cleared."""
-    error: Callable[[S], Procedure[int | None]]
-    """Read ER, which clears it; None: it could not be read."""
-    handles_errors: Callable[[S], Procedure[bool]]
-    """Whether the program in the drive has an OE routine."""
-    program_input: Callable[[S], Procedure[bool]]
-    """Whether an input is set up to start a program (type 4, 5.1.64)."""
-    check: Callable[[S, str], object] = lambda state, text: None
-    """Raise Inexpressible for a line that no frame can carry, before anything is asked for it."""
+    def read(self, words: Sequence[str]) -> Procedure[Mapping[str, int]]:
+        """Read those of these words that the product has; nothing is cleared."""
+        raise NotImplementedError
 
+    def error(self) -> Procedure[int | None]:
+        """Read ER, which clears it; None: it could not be read."""
+        raise NotImplementedError
 
-def motions(access: Access[S]) -> Motions[S]:
-    """The record of a family that reads the words of MCode in its own way."""
+    def handles_errors(self) -> Procedure[bool]:
+        """Whether the program in the drive has an OE routine."""
+        return False
+        yield  # a conversation
 
-    def signs(state: S) -> Procedure[Signs]:
-        found = yield from access.values(state, SIGNS)
-        if "EF" in found:
-            state.error_flag_read(bool(found["EF"]))
+    def program_input(self) -> Procedure[bool]:
+        """Whether an input is set up to start a program (type 4, 5.1.64)."""
+        raise NotImplementedError
+
+    def carried(self, text: str) -> None:
+        """Raise Inexpressible for a line that no frame can carry, before anything is asked for it."""
+
+    def effect(self, text: str) -> Effect:
+        found = effect(self.state, text)
+        if found.begins:
+            self.carried(text)
         return found
 
-    def old(state: S, found: Signs, own: bool) -> Procedure[Signs]:
-        if not found.get("EF"):
-            return found
+    def signs(self) -> Procedure[Signs]:
+        found = yield from self.read(SIGNS)
+        if "EF" in found:
+            self.state.error_flag_read(bool(found["EF"]))
+        return found
+
+    def old(self, signs: Signs, own: bool) -> Procedure[Signs]:
+        state = self.state
+        if not signs.get("EF"):
+            return signs
         if not own:
             state.note(f"{who(state)}: its error flag was set before (EF=1); PR ER shows and clears the error")
-            return found
-        code = yield from access.error(state)
+            return signs
+        code = yield from self.error()
         if code:
             state.note(f"{who(state)}: {earlier_error(code, state)}")
-        return found if code is None else {**found, "EF": 0}
+        return signs if code is None else {**signs, "EF": 0}
 
-    def judge(state: S, axis: str, evidence: Evidence) -> Procedure[Ending | None]:
-        return (yield from _judge(access, state, evidence))
+    def place(self, signs: Signs, axis: str) -> int | None:
+        return None if signs.get("MV") or signs.get("BY") else signs.get("P")
 
-    def effect_of(state: S, text: str) -> Effect:
-        found = effect(state, text)
-        if found.begins:
-            access.check(state, text)
-        return found
+    def runs(self, signs: Signs) -> bool:
+        return any(signs.get(each) for each in RUNS)
 
-    return Motions(
-        effect=effect_of,
-        signs=signs,
-        old=old,
-        place=_place,
-        runs=_runs,
-        judge=judge,
-        fails=errors.BY_ITSELF.__contains__,
-    )
+    def fails(self, code: int) -> bool:
+        return code in errors.BY_ITSELF
 
-
-def _place(found: Signs, axis: str) -> int | None:
-    return None if found.get("MV") or found.get("BY") else found.get("P")
-
-
-def _runs(found: Signs) -> bool:
-    return any(found.get(each) for each in RUNS)
-
-
-def _judge(access: Access[S], state: S, evidence: Evidence) -> Procedure[Ending | None]:
-    found = yield from access.values(state, END)
-    before, move, position = evidence.before, evidence.move, found.get("P")
-    ending = Ending(Outcome.REACHED, AXIS, position)
-    if move is None:
-        seen = _seen(found, before, ending)
-        return None if seen is ending and (yield from _makes_up(access, state, found)) else seen
-    homing, program = move.kind is MoveKind.HOMING, move.kind is MoveKind.PROGRAM
-    codes = [code for code in evidence.errors if code in errors.BY_ITSELF]
-    if found.get("EF") and not before.get("EF"):
-        state.error_flag_read(True)
-        count = state.errors.count
-        if program and (yield from access.handles_errors(state)):
+    def judge(self, axis: str, evidence: Evidence) -> Procedure[Ending | None]:
+        state = self.state
+        found = yield from self.read(END)
+        before, move, position = evidence.before, evidence.move, found.get("P")
+        ending = Ending(Outcome.REACHED, AXIS, position)
+        if move is None:
+            seen = _seen(found, before, ending)
+            return None if seen is ending and (yield from self._makes_up(found)) else seen
+        homing, program = move.kind is MoveKind.HOMING, move.kind is MoveKind.PROGRAM
+        codes = [code for code in evidence.errors if code in errors.BY_ITSELF]
+        if found.get("EF") and not before.get("EF"):
+            state.error_flag_read(True)
+            count = state.errors.count
+            if program and (yield from self.handles_errors()):
+                return ending
+            reported = state.errors.since(count)  # the list has reported it, and cleared it
+            code = reported[-1] if reported else (yield from self.error())
+            if code is None:
+                return replace(
+                    ending, outcome=Outcome.UNKNOWN, reason="an error is set, and its number could not be read"
+                )
+            codes += [code] if code and (code in errors.BY_ITSELF or not evidence.stopped) else []
+        if homing and codes and set(codes) <= LIMITS:
+            turns = yield from self.read(("LM",))
+            if turns.get("LM") in TURNS_ROUND:
+                state.note(f"{who(state)}: the homing met a limit and turned round: {described(codes[-1], state)}")
+                codes = []
+        if codes:
+            return _failed(ending, codes[-1], state)
+        if (fault := _new_fault(found, before)) is not None:
+            return replace(ending, outcome=fault[0], reason=fault[1])
+        if (yield from self._makes_up(found)):
+            return None
+        if evidence.program or found.get("BY") or found.get("AS") == TORQUE:
             return ending
-        reported = state.errors.since(count)  # the list has reported it, and cleared it
-        code = reported[-1] if reported else (yield from access.error(state))
-        if code is None:
-            return replace(ending, outcome=Outcome.UNKNOWN, reason="an error is set, and its number could not be read")
-        codes += [code] if code and (code in errors.BY_ITSELF or not evidence.stopped) else []
-    if homing and codes and set(codes) <= LIMITS:
-        turns = yield from access.values(state, ("LM",))
-        if turns.get("LM") in TURNS_ROUND:
-            state.note(f"{who(state)}: the homing met a limit and turned round: {described(codes[-1], state)}")
-            codes = []
-    if codes:
-        return _failed(ending, codes[-1], state)
-    if (fault := _new_fault(found, before)) is not None:
-        return replace(ending, outcome=fault[0], reason=fault[1])
-    if (yield from _makes_up(access, state, found)):
-        return None
-    if evidence.program or found.get("BY") or found.get("AS") == TORQUE:
-        return ending
-    if move.endless:
-        return (yield from _unexplained(access, state, ending, evidence))
-    target = move.target
-    if target is None or position is None or abs(position - target) <= _tolerance(found):
-        return ending
-    if found.get("EE") and found.get("MP"):
-        return None  # position maintenance may still correct it
-    return (yield from _unexplained(access, state, ending, evidence))
+        if move.endless:
+            return (yield from self._unexplained(ending, evidence))
+        target = move.target
+        if target is None or position is None or abs(position - target) <= _tolerance(found):
+            return ending
+        if found.get("EE") and found.get("MP"):
+            return None  # position maintenance may still correct it
+        return (yield from self._unexplained(ending, evidence))
 
+    def _unexplained(self, ending: Ending, evidence: Evidence) -> Procedure[Ending]:
+        """Judge a motion that ended short of its target, or that only a command ends: did the drive end it by itself?"""
+        free = yield from self.read((*FREE, "DE"))
+        if not free.get("DE", 1):
+            return replace(ending, outcome=Outcome.POWER, reason="its output bridges are off (DE=0)")
+        if any(free.get(each) for each in FREE):
+            return ending
+        if not evidence.stopped and (yield from self.program_input()):
+            return ending
+        return replace(ending, outcome=Outcome.STOPPED)
 
-def _unexplained(access: Access[S], state: S, ending: Ending, evidence: Evidence) -> Procedure[Ending]:
-    """Judge a motion that ended short of its target, or that only a command ends: did the drive end it by itself?"""
-    free = yield from access.values(state, (*FREE, "DE"))
-    if not free.get("DE", 1):
-        return replace(ending, outcome=Outcome.POWER, reason="its output bridges are off (DE=0)")
-    if any(free.get(each) for each in FREE):
-        return ending
-    if not evidence.stopped and (yield from access.program_input(state)):
-        return ending
-    return replace(ending, outcome=Outcome.STOPPED)
-
-
-def _makes_up(access: Access[S], state: S, found: Mapping[str, int]) -> Procedure[bool]:
-    """Whether the rotor is not where the steps are yet: with hMT P counts steps, and makes up what is missing."""
-    if found.get("AS") not in CLOSED_LOOP:
-        return False
-    lag = yield from access.values(state, ("LL", "MS"))
-    return abs(lag.get("LL", 0)) > BOUNDS * lag.get("MS", 1)
+    def _makes_up(self, found: Mapping[str, int]) -> Procedure[bool]:
+        """Whether the rotor is not where the steps are yet: with hMT P counts steps, and makes up what is missing."""
+        if found.get("AS") not in CLOSED_LOOP:
+            return False
+        lag = yield from self.read(("LL", "MS"))
+        return abs(lag.get("LL", 0)) > BOUNDS * lag.get("MS", 1)
 
 
 def _seen(found: Mapping[str, int], before: Signs, ending: Ending) -> Ending:
@@ -367,8 +358,22 @@ def starts_program(lines: Sequence[str]) -> bool:
     return any(re.fullmatch(rf" *IS *= *\d+ *, *{GO} *,.*", line) for line in lines)
 
 
-def _check(state: MCodeState, text: str) -> None:
-    state.codec.encode(state.codec.request(state.address, text))
+class MCodeMotions(LexiumMotions):
+    """How the motions of an MCode drive begin and end."""
 
+    state: MCodeState
 
-MOTIONS = motions(Access(_values, exchange.read_error, _handles_errors, _program_input, _check))
+    def read(self, words: Sequence[str]) -> Procedure[Mapping[str, int]]:
+        return _values(self.state, words)
+
+    def error(self) -> Procedure[int | None]:
+        return exchange.read_error(self.state)
+
+    def handles_errors(self) -> Procedure[bool]:
+        return _handles_errors(self.state)
+
+    def program_input(self) -> Procedure[bool]:
+        return _program_input(self.state)
+
+    def carried(self, text: str) -> None:
+        self.state.codec.encode(self.state.codec.request(self.state.address, text))

@@ -12,7 +12,7 @@ from multidrop.base.files import SourceLine
 from multidrop.base.text import counted, real
 from multidrop.dialects.certifying import Certifying, Occupied
 from multidrop.dialects.codec import Procedure
-from multidrop.dialects.family import Programs
+from multidrop.dialects.family import Printed, Programs, Progress
 from multidrop.dialects.program_files import Difference, Held, Stored, first_difference
 from multidrop.families.lexium.host.mcode import classify, operations, program_readout
 from multidrop.families.lexium.host.mcode.before_request import value_of
@@ -167,29 +167,65 @@ def _read_setting(state: MCodeState, name: str, values: Sequence[float | None]) 
     return next((row for row in rows if row[:1] == list(values[:1])), [])
 
 
-PROGRAMS: Programs[MCodeState] = Programs(
-    listing=operations.listing,
-    readable=program_readout.readable,
-    who=who,
-    read=program_readout.read,
-    file=program_readout.file_of,
-    executed=program_readout.immediate_lines,
-    size=program_readout.size_of_file,
-    end=program_readout.end_program,
-    download=download,
-    differences=differences,
-    to_send=to_send,
-    start=program_readout.start_line,
-    refreshed=program_readout.refreshed,
-    annotated=program_readout.annotated,
-    acts=guards.acts,
-    save="S",
-    remark="'",
-    clearing="CP",
-    begins=("PG", "FD"),
-    names=program_readout.read_names,
-    offered=program_readout.offered,
-)
+class MCodePrograms(Programs):
+    """The program in an MCode drive."""
+
+    state: MCodeState
+
+    save = "S"
+    remark = "'"
+    clearing = "CP"
+    begins = ("PG", "FD")
+
+    def listing(self, place: str) -> Printed:
+        return operations.listing(self.state, place)
+
+    def readable(self, held: Held) -> Sequence[str]:
+        return program_readout.readable(held)
+
+    def read(self, lines: Sequence[SourceLine], progress: Progress) -> Procedure[Held]:
+        return program_readout.read(self.state, lines, progress)
+
+    def file(self, held: Held, raw: bool) -> Sequence[str]:
+        return program_readout.file_of(self.state, held, raw)
+
+    def executed(self, lines: Sequence[SourceLine]) -> Sequence[SourceLine]:
+        return program_readout.immediate_lines(lines)
+
+    def size(self, lines: Sequence[SourceLine]) -> int:
+        return program_readout.size_of_file(lines)
+
+    def end(self) -> Procedure[bool]:
+        return program_readout.end_program(self.state)
+
+    def download(
+        self, lines: Sequence[SourceLine], held: Held | None, progress: Progress
+    ) -> Procedure[Sequence[SourceLine]]:
+        return download(self.state, lines, held, progress)
+
+    def differences(self, lines: Sequence[SourceLine], held: Held, before: Held | None) -> Sequence[Difference]:
+        return differences(self.state, lines, held, before)
+
+    def to_send(self, lines: Sequence[SourceLine], held: Held) -> Procedure[str]:
+        return to_send(self.state, lines, held)
+
+    def start(self, lines: Sequence[SourceLine], label: str) -> str:
+        return program_readout.start_line(lines, label)
+
+    def refreshed(self, text: str, held: Held) -> Sequence[str]:
+        return program_readout.refreshed(text, held)
+
+    def annotated(self, text: str, held: Held) -> Sequence[str]:
+        return program_readout.annotated(text, held)
+
+    def acts(self, line: str) -> bool:
+        return guards.acts(line)
+
+    def names(self) -> Procedure[Held]:
+        return program_readout.read_names(self.state)
+
+    def offered(self, held: Held, line: str) -> Sequence[tuple[str, str]]:
+        return program_readout.offered(held, line)
 
 
 # The questions of a certificate.
@@ -229,4 +265,22 @@ def _masked(address: str, raw: bytes) -> str:
 
 
 _SUBROUTINE = "an error would run its subroutine for errors (OE)"
-CERTIFYING = Certifying(__file__, "PR {}", "{}={}", _traits, _occupied, masked=_masked)
+
+
+class MCodeCertifying(Certifying):
+    """The questions of a certificate to an MCode drive."""
+
+    state: MCodeState
+
+    module = __file__
+    reads = "PR {}"
+    writes = "{}={}"
+
+    def traits(self) -> set[str]:
+        return _traits(self.state)
+
+    def occupied(self) -> Procedure[Occupied]:
+        return _occupied(self.state)
+
+    def masked(self, raw: bytes) -> str:
+        return _masked(self.state.address, raw)

@@ -310,4 +310,25 @@ def _identified(own: _Search, place: Place) -> Procedure[MCodeState | None]:
     return None
 
 
-SCAN = Scan("MCode", (4800, 9600, 19200, 38400, 115200), _places, search, clear, CLEARS, erase, NAMES)
+class MCodeScan(Scan):
+    """The search for MCode drives."""
+
+    title = "MCode"
+    bauds = (4800, 9600, 19200, 38400, 115200)
+    clears = CLEARS
+    names = NAMES
+
+    def places(self, reach: Reach) -> int:
+        return _places(reach)
+
+    def search(self, reach: Reach, found: Found, step: Step) -> Procedure[Outcome]:
+        return search(reach, found, step)
+
+    def clear(self) -> Procedure[None]:
+        return clear()
+
+    def erase(self) -> Procedure[None]:
+        return erase()
+
+
+SCAN = MCodeScan()

@@ -166,7 +166,7 @@ class MCodeState(DriveState):
 
 
 def who(state: DriveState) -> str:
-    return state.label or state.address or "the drive"
+    return state.who
 
 
 def refuse_in_program(state: MCodeState, then: str = "") -> None:

@@ -99,4 +99,27 @@ def counted(product: str, values: Mapping[str, str], full_steps: int | None) -> 
     return Basis(settings, int(values["MS"]) * steps)
 
 
-UNITS = Units(lambda state: ("",), fields, ", ".join(TAKES), basis, disturbs, recounts, reads)
+class MCodeUnits(Units):
+    """The quantities in lines of MCode."""
+
+    state: MCodeState
+
+    words = ", ".join(TAKES)
+
+    def axes(self) -> Sequence[str]:
+        return ("",)
+
+    def fields(self, text: str) -> Sequence[Field]:
+        return fields(self.state, text)
+
+    def basis(self, axis: str, full_steps: int | None) -> Procedure[Basis]:
+        return basis(self.state, axis, full_steps)
+
+    def disturbs(self, text: str) -> Collection[str]:
+        return disturbs(self.state, text)
+
+    def recounts(self, request: Request) -> bool:
+        return recounts(request)
+
+    def reads(self, text: str) -> tuple[str, Takes] | None:
+        return reads(self.state, text)

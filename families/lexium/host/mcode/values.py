@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 
@@ -12,11 +12,16 @@ from multidrop.dialects.codec import End, Priority, Procedure
 from multidrop.dialects.program_files import LOCKED
 from multidrop.dialects.state import DriveState
 from multidrop.dialects.values import (
+    Actions,
+    Change,
     Conditions,
+    Controls,
     Facts,
     Levels,
     Parameters,
     Part,
+    Permission,
+    Plan,
     Progress,
     Readings,
     Snapshot,
@@ -253,25 +258,66 @@ def _whole(readings: Readings, name: str) -> int:
     return found if isinstance(found, int) else 0
 
 
-PARAMETERS = Parameters(
-    read=read,
-    plan=lambda state, present, wanted, allowed: parameter_plan.plan(state.product, present, wanted, allowed),
-    ready=ready,
-    write=lambda state, change: perform(state, change.text),
-    save=save,
-    language="MCode",
-    conflict=conflict,
-    later=frozenset({"BD"}),
-)
-VALUES = Values(
-    parameters=PARAMETERS,
-    snapshot=take,
-    parts=parts,
-    fold=fold,
-    check=check,
-    first=first,
-    again=again,
-    controls=points.controls,
-    actions=points.ACTIONS,
-    own=lambda state, word: lookup(word.upper(), state.product) is not None,
-)
+class MCodeParameters(Parameters):
+    """The settings of an MCode drive."""
+
+    state: MCodeState
+
+    language = "MCode"
+    later = frozenset({"BD"})
+
+    def read(self, progress: Progress) -> Procedure[Readings]:
+        return read(self.state, progress)
+
+    def plan(self, present: Readings, wanted: Mapping[str, Value], permission: Permission) -> Plan:
+        return parameter_plan.plan(self.state.product, present, wanted, permission)
+
+    def ready(self) -> Procedure[str]:
+        return ready(self.state)
+
+    def write(self, change: Change) -> Procedure[object]:
+        return perform(self.state, change.text)
+
+    def save(self) -> Procedure[object]:
+        return save(self.state)
+
+    def conflict(self, plan: Plan, others: Collection[str]) -> str:
+        return conflict(plan, others)
+
+
+class MCodeValues(Values):
+    """What is read of an MCode drive."""
+
+    state: MCodeState
+
+    @property
+    def parameters(self) -> Parameters:
+        return MCodeParameters(self.state)
+
+    def snapshot(self, progress: Progress) -> Procedure[Snapshot]:
+        return take(self.state, progress)
+
+    def parts(self, facts: Facts) -> Sequence[Part]:
+        return parts(self.state, facts)
+
+    def fold(self, facts: Facts) -> tuple[Conditions, ...]:
+        return fold(self.state, facts)
+
+    def check(self, word: str) -> str:
+        return check(self.state, word)
+
+    def first(self, word: str) -> Procedure[float]:
+        return first(self.state, word)
+
+    def again(self, word: str, priority: Priority) -> Procedure[float]:
+        return again(self.state, word, priority)
+
+    def controls(self, axis: str) -> Controls:
+        return points.controls(self.state, axis)
+
+    @property
+    def actions(self) -> Actions:
+        return points.LexiumActions(self.state)
+
+    def own(self, word: str) -> bool:
+        return lookup(word.upper(), self.state.product) is not None

@@ -2,16 +2,22 @@
 
 from __future__ import annotations
 
-from functools import partial
+from collections.abc import Sequence
 
-from multidrop.dialects.codec import Procedure
-from multidrop.dialects.family import Family, Guard, Guards, Registers
+from multidrop.dialects.certifying import Certifying
+from multidrop.dialects.codec import Codec, Priority, Procedure
+from multidrop.dialects.family import Family, Guard, Hints, Motion, Printed, Referencing, Registers
+from multidrop.dialects.motions import Motions
+from multidrop.dialects.state import DriveState
+from multidrop.dialects.units import Units
+from multidrop.dialects.values import Values
 from multidrop.families.lexium.host.mcode import classify
 from multidrop.families.lexium.host.modbus import operations
 from multidrop.families.lexium.host.modbus.codec import USER, Modbus, ModbusState, pdu_codec
 from multidrop.families.lexium.host.modbus.mapping import lines_of
 from multidrop.families.lexium.host.modbus.operations import identify
 from multidrop.families.lexium.manual import grammar, guards, points
+from multidrop.families.lexium.manual.guards import CYBER_SECURITY, NAMES
 from multidrop.families.lexium.manual.modbus import help
 from multidrop.families.lexium.manual.modbus.registers import ALTERNATIVE, REGISTERS
 
@@ -38,40 +44,146 @@ def vouched(text: str, product: str) -> bool:
     return register.writable and register.allows(values[0])
 
 
-MODBUS = Family(
-    name=Modbus.family,
-    codec=Modbus(),
-    new_state=ModbusState,
-    identify=identify,
-    perform=operations.perform,
-    check=operations.parsed,
-    motion=operations.motion,
-    moving=partial(operations.flag, name="MV"),
-    busy=partial(operations.flag, name="BY"),
-    status=operations.status,
-    referencing=classify.referencing,
-    homed=homed,
-    language=help,
-    rests_in_place=False,
-    question="PR {}".format,
-    move=points.move,
-    move_to=points.move_to,
-    assign=points.assign,
-    no_programs=f"programs are neither listed nor written over Modbus; {ALTERNATIVE} does both with the same drive",
-    registers=Registers(
-        read=operations.read_registers,
-        write=operations.write_registers,
-        lines=lines_of,
-        read_coil=operations.read_coil,
-        write_coil=operations.write_coil,
-        device=operations.device,
-    ),
-    guards=Guards(guards.NAMES, guarded, guards.word_of, guards.only_ends, guards.only_reads),
-    vouched=vouched,
-    protection=guards.CYBER_SECURITY,
-    prepare=pdu_codec,
-    certifying_at="multidrop.families.lexium.host.modbus.operations:CERTIFYING",
-    motions_at="multidrop.families.lexium.host.modbus.motions:MOTIONS",
-    values_at="multidrop.families.lexium.host.modbus.values:VALUES",
-    units_at="multidrop.families.lexium.host.modbus.values:UNITS",
-)
+class ModbusRegisters(Registers):
+    """The registers and outputs of an Ethernet drive."""
+
+    state: ModbusState
+
+    def read(self, address: int, count: int | None) -> Printed:
+        return operations.read_registers(self.state, address, count)
+
+    def write(self, address: int, values: Sequence[int]) -> Printed:
+        return operations.write_registers(self.state, address, values)
+
+    def lines(self, address: int, values: Sequence[int]) -> tuple[str, ...]:
+        return lines_of(address, values)
+
+    def read_coil(self, number: int) -> Printed:
+        return operations.read_coil(self.state, number)
+
+    def write_coil(self, number: int, on: bool) -> Printed:
+        return operations.write_coil(self.state, number, on)
+
+    def device(self) -> Printed:
+        return operations.device(self.state)
+
+
+class ModbusFamily(Family):
+    """A Lexium Ethernet drive over Modbus/TCP, with the words of MCode."""
+
+    state: ModbusState
+
+    guards = NAMES
+
+    name = Modbus.family
+    codec = Modbus()
+    language = help
+    rests_in_place = False
+    no_programs = f"programs are neither listed nor written over Modbus; {ALTERNATIVE} does both with the same drive"
+    protection = CYBER_SECURITY
+
+    @classmethod
+    def new_state(cls, codec: Codec, address: str) -> DriveState:
+        return ModbusState(codec, address)
+
+    @classmethod
+    def identify(cls, hints: Hints) -> Procedure[Sequence[DriveState]]:
+        return identify(hints)
+
+    def guard(self, text: str) -> Guard | None:
+        return guarded(self.state, text)
+
+    @classmethod
+    def word_of(cls, text: str) -> str:
+        return guards.word_of(text)
+
+    @classmethod
+    def only_ends(cls, text: str) -> bool:
+        return guards.only_ends(text)
+
+    @classmethod
+    def only_reads(cls, text: str) -> bool:
+        return guards.only_reads(text)
+
+    def perform(self, text: str) -> Printed:
+        return operations.perform(self.state, text)
+
+    def check(self, text: str) -> None:
+        operations.parsed(self.state, text)
+
+    def motion(self, priority: Priority) -> Procedure[tuple[Motion, ...]]:
+        return operations.motion(self.state, priority)
+
+    def moving(self) -> Procedure[bool]:
+        return operations.flag(self.state, name="MV")
+
+    def busy(self) -> Procedure[bool]:
+        return operations.flag(self.state, name="BY")
+
+    def status(self) -> Printed:
+        return operations.status(self.state)
+
+    def referencing(self, text: str) -> Referencing | None:
+        return classify.referencing(self.state, text)
+
+    def homed(self) -> Procedure[bool]:
+        return homed(self.state)
+
+    @classmethod
+    def question(cls, word: str) -> str | None:
+        return f"PR {word}"
+
+    @classmethod
+    def move(cls, axis: str, distance: int | str) -> tuple[str, ...]:
+        return points.move(axis, distance)
+
+    @classmethod
+    def move_to(cls, axis: str, position: int | str) -> tuple[str, ...]:
+        return points.move_to(axis, position)
+
+    @classmethod
+    def assign(cls, word: str, value: str) -> str | None:
+        return points.assign(word, value)
+
+    @property
+    def registers(self) -> Registers | None:
+        return Registers(
+            read=operations.read_registers,
+            write=operations.write_registers,
+            lines=lines_of,
+            read_coil=operations.read_coil,
+            write_coil=operations.write_coil,
+            device=operations.device,
+        )
+
+    @classmethod
+    def vouched(cls, text: str, product: str) -> bool:
+        return vouched(text, product)
+
+    @classmethod
+    def prepare(cls) -> None:
+        pdu_codec()
+
+    @property
+    def certifying(self) -> Certifying:
+        from multidrop.families.lexium.host.modbus.operations import ModbusCertifying
+
+        return ModbusCertifying(self.state)
+
+    @property
+    def motions(self) -> Motions:
+        from multidrop.families.lexium.host.modbus.motions import ModbusMotions
+
+        return ModbusMotions(self.state)
+
+    @property
+    def values(self) -> Values:
+        from multidrop.families.lexium.host.modbus.values import ModbusValues
+
+        return ModbusValues(self.state)
+
+    @property
+    def units(self) -> Units:
+        from multidrop.families.lexium.host.modbus.values import ModbusUnits
+
+        return ModbusUnits(self.state)

@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 from multidrop.base.errors import Refused
 from multidrop.base.files import split_lines
 from multidrop.dialects.codec import Procedure
-from multidrop.families.lexium.host.mcode.motions import Access, motions, starts_program
+from multidrop.families.lexium.host.mcode.motions import LexiumMotions, starts_program
 from multidrop.families.lexium.host.modbus.codec import ModbusState
 from multidrop.families.lexium.host.modbus.operations import PRODUCT, error_number, printed, value
 from multidrop.families.lexium.manual.modbus.registers import REGISTERS
@@ -33,15 +33,22 @@ def _values(state: ModbusState, words: Sequence[str]) -> Procedure[Mapping[str, 
     return found
 
 
-def _no_handler(state: ModbusState) -> Procedure[bool]:
-    return False
-    yield
-
-
 def _program_input(state: ModbusState) -> Procedure[bool]:
     """Read the set-ups of the inputs, which function 65 prints as text."""
     text = yield from printed(state, "IS")
     return starts_program(split_lines(text))
 
 
-MOTIONS = motions(Access(_values, error_number, _no_handler, _program_input))
+class ModbusMotions(LexiumMotions):
+    """How the motions of an Ethernet drive begin and end."""
+
+    state: ModbusState
+
+    def read(self, words: Sequence[str]) -> Procedure[Mapping[str, int]]:
+        return _values(self.state, words)
+
+    def error(self) -> Procedure[int | None]:
+        return error_number(self.state)
+
+    def program_input(self) -> Procedure[bool]:
+        return _program_input(self.state)

@@ -436,7 +436,17 @@ def _announced(state: ModbusState) -> Procedure[dict[int, str]]:
     return {}
 
 
-CERTIFYING = Certifying[ModbusState](
-    __file__, "PR {}", "{}={}", lambda state: {"closed"} if state.product.startswith("LMDC") else set()
-)
+class ModbusCertifying(Certifying):
+    """The questions of a certificate to an Ethernet drive."""
+
+    state: ModbusState
+
+    module = __file__
+    reads = "PR {}"
+    writes = "{}={}"
+
+    def traits(self) -> set[str]:
+        return {"closed"} if self.state.product.startswith("LMDC") else set()
+
+
 """All only read: over Modbus no program is listed, so nothing that may raise an error is asked."""

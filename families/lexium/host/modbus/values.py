@@ -7,15 +7,18 @@ it, is left to MCode/TCP. Nothing moves, and nothing is cleared. What a step is 
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 
 from multidrop.base.errors import Diagnostic, Inexpressible, NoAnswer, Refused
 from multidrop.dialects.codec import Priority, Procedure, Request
-from multidrop.dialects.units import Basis, Units
+from multidrop.dialects.units import Basis, Field, Takes, Units
 from multidrop.dialects.values import (
+    Actions,
+    Change,
     Conditions,
+    Controls,
     Facts,
     Parameters,
     Part,
@@ -120,14 +123,27 @@ def ready(state: ModbusState) -> Procedure[str]:
     return f"{who(state)} has armed trips (TE={armed}): TE=0 disarms them" if armed else ""
 
 
-PARAMETERS = Parameters(
-    read=read_settings,
-    plan=plan,
-    ready=ready,
-    write=lambda state, change: perform(state, change.text),
-    save=lambda state: perform(state, "S"),
-    language="MCode",
-)
+class ModbusParameters(Parameters):
+    """The settings of an Ethernet drive."""
+
+    state: ModbusState
+
+    language = "MCode"
+
+    def read(self, progress: Progress) -> Procedure[Readings]:
+        return read_settings(self.state, progress)
+
+    def plan(self, present: Readings, wanted: Mapping[str, Value], permission: Permission) -> Plan:
+        return plan(self.state, present, wanted, permission)
+
+    def ready(self) -> Procedure[str]:
+        return ready(self.state)
+
+    def write(self, change: Change) -> Procedure[object]:
+        return perform(self.state, change.text)
+
+    def save(self) -> Procedure[object]:
+        return perform(self.state, "S")
 
 
 FLAGS = ("EF", "BY", "MV", "DE")
@@ -225,17 +241,39 @@ def take(state: ModbusState, progress: Progress) -> Procedure[Snapshot]:
     return snapshot_of(state, replace(readings, unread=(*readings.unread, NO_PROGRAM)), now)
 
 
-VALUES = Values(
-    parameters=PARAMETERS,
-    snapshot=take,
-    parts=parts,
-    fold=fold,
-    check=check,
-    first=lambda state, word: again(state, word, Priority.OPERATOR),
-    again=again,
-    controls=points.controls,
-    actions=points.ACTIONS,
-)
+class ModbusValues(Values):
+    """What is read of an Ethernet drive."""
+
+    state: ModbusState
+
+    @property
+    def parameters(self) -> Parameters:
+        return ModbusParameters(self.state)
+
+    def snapshot(self, progress: Progress) -> Procedure[Snapshot]:
+        return take(self.state, progress)
+
+    def parts(self, facts: Facts) -> Sequence[Part]:
+        return parts(self.state, facts)
+
+    def fold(self, facts: Facts) -> tuple[Conditions, ...]:
+        return fold(self.state, facts)
+
+    def check(self, word: str) -> str:
+        return check(self.state, word)
+
+    def first(self, word: str) -> Procedure[float]:
+        return again(self.state, word, Priority.OPERATOR)
+
+    def again(self, word: str, priority: Priority) -> Procedure[float]:
+        return again(self.state, word, priority)
+
+    def controls(self, axis: str) -> Controls:
+        return points.controls(self.state, axis)
+
+    @property
+    def actions(self) -> Actions:
+        return points.LexiumActions(self.state)
 
 
 def basis(state: ModbusState, axis: str, full_steps: int | None) -> Procedure[Basis]:
@@ -257,4 +295,27 @@ def recounts(request: Request) -> bool:
     return any(row.name in (*units.RESTS, *WHOLE) for row in written if row is not None)
 
 
-UNITS = Units(units.UNITS.axes, units.fields, units.UNITS.words, basis, units.disturbs, recounts, units.reads)
+class ModbusUnits(Units):
+    """The quantities in its lines."""
+
+    state: ModbusState
+
+    words = units.UNITS.words
+
+    def axes(self) -> Sequence[str]:
+        return units.UNITS.axes(self.state)
+
+    def fields(self, text: str) -> Sequence[Field]:
+        return units.fields(self.state, text)
+
+    def basis(self, axis: str, full_steps: int | None) -> Procedure[Basis]:
+        return basis(self.state, axis, full_steps)
+
+    def disturbs(self, text: str) -> Collection[str]:
+        return units.disturbs(self.state, text)
+
+    def recounts(self, request: Request) -> bool:
+        return recounts(request)
+
+    def reads(self, text: str) -> tuple[str, Takes] | None:
+        return units.reads(self.state, text)
