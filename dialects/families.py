@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from multidrop.base import registry
 from multidrop.base.files import split_lines
@@ -16,8 +16,8 @@ from multidrop.base.text import visible
 from multidrop.dialects.program_files import FileLanguage, ProgramFiles, errors
 
 if TYPE_CHECKING:
-    from multidrop.dialects.codec import Codec
     from multidrop.dialects.family import Family, Language
+    from multidrop.dialects.state import DriveState
 
 
 class Dialect(NamedTuple):
@@ -42,14 +42,14 @@ def dialects() -> dict[str, Dialect]:
     return {each.name: each for each in registry.records(registry.families(), Dialect)}
 
 
-FAMILIES: Mapping[str, Family[Any]] = OnDemand(lambda: {each.name: each.record for each in dialects().values()})
+FAMILIES: Mapping[str, type[Family]] = OnDemand(lambda: {each.name: each.record for each in dialects().values()})
 """By name. Nothing tries one family after another: a URL names the family, or the drives are `DEFAULT`."""
 DEFAULT = registry.DEFAULT
 
 
-def family_of(codec: Codec) -> Family[Any]:
-    """The family whose drives this codec speaks to."""
-    return FAMILIES[codec.family]
+def family_of(state: DriveState) -> Family:
+    """What the family of a drive says of it."""
+    return FAMILIES[state.codec.family](state)
 
 
 def languages() -> list[Language]:

@@ -314,7 +314,7 @@ class Family(OfDrive, ABC):
 
     @classmethod
     @abstractmethod
-    def identify(cls, hints: Hints) -> Procedure[Sequence[DriveState]]:
+    def identify(cls, hints: Hints) -> Procedure[list[DriveState]]:
         """Find the drives on a line and their settings. Raises NoAnswer where none replies."""
 
     @classmethod

@@ -8,7 +8,7 @@ hold, until a reading shows the settings that were accepted.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from multidrop.dialects.codec import Kind, Priority, Procedure, Request, at_priority
 from multidrop.dialects.state import DriveState
@@ -54,13 +54,13 @@ class Counting:
         """Whether the settings of every axis were read since the last thing that may have changed one."""
         return all(self._read[axis][0] == recounts for axis in self._accepted)
 
-    def sent(self, request: Request, units: Units[Any], state: DriveState) -> None:
+    def sent(self, request: Request, units: Units, state: DriveState) -> None:
         """Note a request that may be executed, if it may change what the axes with a scale count."""
         stored = request.kind is Kind.PROGRAM or state.programming
         if self._accepted and not stored and units.recounts(request):
             state.counts_may_have_changed()
 
-    def contradicted(self, values: Mapping[str, Value], units: Units[Any]) -> bool:
+    def contradicted(self, values: Mapping[str, Value], units: Units) -> bool:
         """Whether settings of a drive, by name, are other ones than were accepted for one of its axes."""
         return any(
             number(values[name]) != float(accepted)
@@ -76,7 +76,7 @@ class Counting:
         accepted, (_, read) = dict(self._accepted[axis]), self._read[axis]
         return [f"{key} was {accepted.get(key)} and is {now} now" for key, now in read if accepted.get(key) != now]
 
-    def reading(self, units: Units[Any], state: DriveState, priority: Priority) -> Procedure[dict[str, list[str]]]:
+    def reading(self, units: Units, state: DriveState, priority: Priority) -> Procedure[dict[str, list[str]]]:
         """Read what the scales rest on; return what differs, by axis, where that was not known before."""
         news = {}
         for axis in self.axes:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, Protocol, TypeVar
+from typing import Protocol, TypeVar
 
 from multidrop.base.errors import (
     Differs,
@@ -19,8 +19,8 @@ from multidrop.base.errors import (
 )
 from multidrop.base.files import SourceLine
 from multidrop.dialects.codec import Codec, Priority, Procedure
-from multidrop.dialects.families import FAMILIES, program_languages
-from multidrop.dialects.family import Family, Motion, Programs
+from multidrop.dialects.families import family_of, program_languages
+from multidrop.dialects.family import Motion, Programs
 from multidrop.dialects.program_files import Held, ProgramFiles
 from multidrop.dialects.state import DriveState
 from multidrop.dialects.values import Value
@@ -110,7 +110,7 @@ class Drive:
         self.strict = False
         """A restart is such a reason."""
         self.link: Link = conversations.link
-        self.family: Family[Any] = FAMILIES[state.codec.family]
+        self.family = family_of(state)
         self._conversations = conversations
         self._neighbours = neighbours
         self._judged = Judged()
@@ -126,7 +126,7 @@ class Drive:
         return self.state.codec
 
     @property
-    def programs(self) -> Programs[Any]:
+    def programs(self) -> Programs:
         """Its family's programs. Raises Inexpressible where the host loads none."""
         if self.family.programs is None:
             raise Inexpressible(f"{self.shown}: {self.family.no_programs}")
@@ -294,10 +294,9 @@ class Drive:
     def check_start(self, text: str = "") -> None:
         """Raise Unreferenced where a line must not start it, or a drive that the line is for, as `hold` says."""
         for each in [drive for drive in self._meant if drive.hold and drive.state.unreferenced]:
-            guards, state = each.family.guards, each.state
             moved = {field.axis for field in each.family.units.fields(text)}
-            ends = each.family.referencing(text) is not None or (guards is not None and guards.only_ends(text))
-            if not ends and (not moved or moved & state.unreferenced):
+            ends = each.family.referencing(text) is not None or each.family.only_ends(text)
+            if not ends and (not moved or moved & each.state.unreferenced):
                 raise Unreferenced(
                     f"{each.shown}: {each.hold}: its position is not referenced, and '{text or 'this'}' was not sent; "
                     f"home it, set its position, or accept() if it is right"

@@ -5,7 +5,7 @@ A protected unit is silent, or refuses every value. The host cannot tell that fr
 
 from __future__ import annotations
 
-from typing import Any, TypeVar
+from typing import TypeVar
 
 from multidrop.base.errors import Refused
 from multidrop.dialects.family import Family, Protection
@@ -16,12 +16,12 @@ ENOUGH = 2
 """Different words whose values were refused, while none was taken, from which on a refusal names the protection."""
 
 
-def protection(link: Link, family: Family[Any]) -> Protection | None:
+def protection(link: Link, family: type[Family] | Family) -> Protection | None:
     """What may protect the drives of a link; None: nothing that is known."""
     return family.protection if link.transport.network else None
 
 
-def silent(error: E, link: Link, family: Family[Any], product: str = "") -> E:
+def silent(error: E, link: Link, family: type[Family] | Family, product: str = "") -> E:
     """Return the failure, with the protection that may cause it where nothing was ever received on the link."""
     known = protection(link, family) if link.unheard else None
     text = known.text(product) if known is not None else ""

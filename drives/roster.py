@@ -20,7 +20,7 @@ from typing import Any
 from multidrop.base.errors import DriveError, NoAnswer, TransportLost
 from multidrop.base.isolation import isolated
 from multidrop.dialects import DriveState, Family, Hints, Motion, StopPiece
-from multidrop.dialects.families import FAMILIES, family_of
+from multidrop.dialects.families import FAMILIES
 from multidrop.dialects.values import Value
 from multidrop.drives.conversations import Conversations
 from multidrop.drives.drive import Drive, still
@@ -226,7 +226,7 @@ def _text(value: Value) -> str:
 class Roster:
     """Every drive that a stop of the link must reach; their search, after which the keeper remembers them."""
 
-    def __init__(self, conversations: Conversations, family: Family[Any], keeper: Keeper) -> None:
+    def __init__(self, conversations: Conversations, family: type[Family], keeper: Keeper) -> None:
         self.conversations = conversations
         self.link = conversations.link
         self.family = family
@@ -298,7 +298,7 @@ class Roster:
         if listed is not None:
             return listed
         like = next((drive.codec for drive in self.drives.values()), self.family.codec)
-        state = family_of(like).new_state(like, address)
+        state = FAMILIES[like.family].new_state(like, address)
         if not self.strange:
             state.identified("", "")  # another name of what is known here
         if address not in GLOBAL:
@@ -410,8 +410,8 @@ class Roster:
 
     def remember(self) -> None:
         """Have the keeper remember the drives, where their family can be found faster by it."""
-        states = {drive.address: (drive.family.remember, drive.state) for drive in self.drives.values()}
-        known = {address: remember(state) for address, (remember, state) in states.items() if remember is not None}
+        offering = [drive for drive in self.drives.values() if drive.family.offers("remember")]
+        known = {drive.address: drive.family.remember() for drive in offering}
         if known:
             self._keeper.remember(known)
 

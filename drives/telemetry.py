@@ -21,7 +21,7 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import partial
 from math import inf
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from multidrop.base.errors import DriveError, NoAnswer, Refused, TransportLost
 from multidrop.dialects import Motion, Priority
@@ -241,14 +241,14 @@ class _ConditionPoller(Poller[str]):
         with suppress(DriveError, TransportLost):  # the polls of motion report a silence
             await recount(known.drive, Priority.POLL)
 
-    def _part_due(self, known: _Facts, part: Part[Any], period: float) -> bool:
+    def _part_due(self, known: _Facts, part: Part, period: float) -> bool:
         if part.name in known.refused:
             return False
         at, commands = known.read.get(part.name, (-inf, -1))
         age = self._link.now() - at
         return not part.slow or age > AGED * period or (age > LEAST and commands != known.drive.commands)
 
-    async def _read_part(self, known: _Facts, due: Due, part: Part[Any]) -> bool:
+    async def _read_part(self, known: _Facts, due: Due, part: Part) -> bool:
         """Read one part; return whether the next may follow."""
         while left := super()._held_up(self._link.now()):
             await asyncio.sleep(left)

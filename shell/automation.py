@@ -320,8 +320,7 @@ def _rested(drive: Drive, sent: Sent) -> bool:
 
 def only_ends(drive: Drive, text: str) -> bool:
     """True if a line that counts as a start can only end motion, as a velocity of 0."""
-    guards = drive.family.guards
-    return guards is not None and guards.only_ends(text)
+    return drive.family.only_ends(text)
 
 
 def sequence(workspace: Workspace) -> object:

@@ -49,7 +49,7 @@ from multidrop.shell.roles import TIMES
 from multidrop.shell.sections import Section, sections, text_list, valid
 
 if TYPE_CHECKING:
-    from multidrop.dialects import DriveState, Family
+    from multidrop.dialects import Family
     from multidrop.dialects.units import Scale
 
 MEGABYTE = 1_000_000
@@ -78,15 +78,12 @@ class Guarding:
     off: frozenset[str] = frozenset()
     also: frozenset[str] = frozenset()
 
-    def what(self, family: Family[Any], state: DriveState, text: str) -> str:
+    def what(self, family: Family, text: str) -> str:
         """The effect of a line that a drive executes, if a person must agree to it; empty: it needs no yes."""
-        guards = family.guards
-        if guards is None:
-            return ""
-        found = guards.find(state, text)
+        found = family.guard(text)
         if found is not None and found.name not in self.off:
             return found.what
-        word = guards.word_of(text) if self.also else ""
+        word = family.word_of(text) if self.also else ""
         return f"'{text.strip()}' is sent: [guards] also has {word}" if word in self.also else ""
 
 
@@ -305,7 +302,7 @@ def _guards(found: Any, where: str) -> Guarding:
             continue  # only a configuration with guards imports all families
         from multidrop.dialects.families import FAMILIES
 
-        named = {name for family in FAMILIES.values() if family.guards for name in family.guards.names}
+        named = {name for family in FAMILIES.values() for name in family.guards}
         known = sorted(named | {TRAVEL})
         for word in sorted(words[key]):
             if key == "off" and word not in known:

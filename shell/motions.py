@@ -15,8 +15,7 @@ from typing import TypeVar
 
 from multidrop.base.errors import Inexpressible, MotionFailed, NoAnswer, Refused, Stopped
 from multidrop.dialects import Procedure
-from multidrop.dialects.motions import NO_MOTIONS, NO_SIGNS, Ending, Evidence, Motions, MoveKind, Outcome, Signs, joined
-from multidrop.dialects.state import DriveState
+from multidrop.dialects.motions import NO_SIGNS, Ending, Evidence, Motions, MoveKind, Outcome, Signs, joined
 from multidrop.drives.drive import NOT_SENT, Check, Drive, still
 from multidrop.drives.motion_record import Course, Courses, restart
 from multidrop.drives.port_journal import GLOBAL
@@ -47,9 +46,9 @@ def failure(name: str, ending: Ending) -> MotionFailed:
     return MotionFailed(ending.described(name), reason, ending.position, ending.target, ending.outcome.value)
 
 
-def _motions(drive: Drive) -> Motions[DriveState]:
+def _motions(drive: Drive) -> Motions:
     """What the family says of a drive's motions; nothing is asked of a device that did not identify itself."""
-    return NO_MOTIONS if drive.state.stranger else drive.family.motions
+    return Motions(drive.state) if drive.state.stranger else drive.family.motions
 
 
 # Lines
@@ -87,7 +86,7 @@ class _Line:
     """A line, the drives that it reaches, and what it does to their motions."""
 
     def __init__(self, workspace: Workspace, drive: Drive, lines: Sequence[str], check: Check | None) -> None:
-        motions, state = _motions(drive), drive.state
+        motions = _motions(drive)
         self.by = sequence(workspace)
         self.effect = joined(() if drive.stores else [motions.effect(each) for each in lines])
         bus = workspace.buses.get(drive.link.name)
@@ -154,7 +153,7 @@ class _Line:
         self._record(drive, (yield from self._signs(drive)))
 
     def _signs(self, drive: Drive) -> Procedure[Signs]:
-        motions, state = _motions(drive), drive.state
+        motions = _motions(drive)
         unsent = f"'{self._text}' was not sent"
         try:
             signs = yield from motions.signs()
@@ -293,7 +292,7 @@ class Watch:
         signs = self._signs.get(drive, NO_SIGNS)
         evidence = Evidence(None, signs, state.errors.since(self._errors.get(drive, state.errors.count)))
         endings: list[Ending] = []
-        if motions is NO_MOTIONS:
+        if type(motions) is Motions:
             return endings
         for axis in drive.family.units.axes():
             found = await drive.run(motions.judge(axis, evidence))

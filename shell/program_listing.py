@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 from multidrop.base import new_file
 from multidrop.base.errors import Diagnostic
@@ -29,7 +28,7 @@ _LISTED = re.compile(r"\s*(\d+)\s+(\S.*)")
 class Listing:
     """The lines of the program in a drive. `state`: the folder with the copies of downloaded files."""
 
-    def __init__(self, state: Path, programs: Programs[Any], rows: Sequence[Stored] = ()) -> None:
+    def __init__(self, state: Path, programs: Programs, rows: Sequence[Stored] = ()) -> None:
         self.rows = tuple(rows)
         held = Held(self.rows)
         source = Sources(state).find(held) if rows else None

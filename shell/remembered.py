@@ -47,7 +47,7 @@ class KnownNames:
         `done` is called once they are read. A drive that stores lines, or takes a file, is not asked.
         """
         programs = drive.family.programs
-        if programs is None or programs.names is None or drive.programming or drive.transferring:
+        if programs is None or not programs.offers("names") or drive.programming or drive.transferring:
             return None
         known = self._held.get(drive)
         if known is not None and known[1] == drive.commands:
@@ -60,7 +60,7 @@ class KnownNames:
 
     async def _read(self, drive: Drive) -> None:
         programs = drive.family.programs
-        assert programs is not None and programs.names is not None
+        assert programs is not None
         with contextlib.suppress(DriveError, TransportLost):  # completion goes without
             self.learn(drive, await drive.run(at_priority(programs.names(), Priority.POLL)))
 

@@ -371,7 +371,7 @@ class LinePath:
             return
         if drive.state.stranger and not _only_asks(drive, text):
             await self.agreed_to_write(drive, text.strip(), by)
-        what = self._session.settings.guards.what(drive.family, drive.state, text)
+        what = self._session.settings.guards.what(drive.family, text)
         if what:
             await self._session.questions.confirm(what, self._session.display_name(drive), by=by)
 
@@ -431,13 +431,11 @@ class LinePath:
 
 
 def _only_asks(drive: Drive, text: str) -> bool:
-    guards = drive.family.guards
-    return guards is not None and guards.only_reads(text)
+    return drive.family.only_reads(text)
 
 
 def _only_reads(drive: Drive, text: str) -> bool:
-    guards = drive.family.guards
-    return guards is not None and not drive.stores and (guards.only_reads(text) or guards.only_ends(text))
+    return not drive.stores and (drive.family.only_reads(text) or drive.family.only_ends(text))
 
 
 def _changes_program(drive: Drive, text: str) -> bool:

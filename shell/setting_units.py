@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 def taken(drive: Drive, name: str) -> tuple[str, Takes] | None:
     """What a setting or a word of a drive takes: its axis, and how that counts; None: no quantity."""
     units = drive.family.units
-    if units.setting is not None:
+    if units.offers("setting"):
         return units.setting(name)
     line = drive.family.assign(name, "1")
     fields = units.fields(line) if line is not None else ()

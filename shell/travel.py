@@ -29,7 +29,7 @@ async def ask(units: Units, drive: Drive, text: str, by: By) -> None:
         if not limited or not each.starts(text):
             continue
         fields = [field for field in each.family.units.fields(text) if field.moves]
-        ends = each.family.guards is not None and each.family.guards.only_ends(text)
+        ends = each.family.only_ends(text)
         if not fields and not ends and each.family.referencing(text) is None:
             for name, axis in limited.items():
                 _unchecked(units, each, name, axis, f"the end of '{text}' is not known")
@@ -43,7 +43,7 @@ def unchecked(units: Units, drive: Drive, text: str) -> None:
     family = drive.family
     if text and any(field.moves for field in family.units.fields(text)):
         return
-    ends = bool(text) and family.guards is not None and family.guards.only_ends(text)
+    ends = bool(text) and family.only_ends(text)
     for name, axis in units.axes(drive).items():
         if axis.scale.travel is not None and not ends:
             what = f"the end of '{text}'" if text else "what a program does"

@@ -112,9 +112,7 @@ class Units:
         for drive in bus.drives.values() if any(each.anchored for each in bus.drives.values()) else ():
             for line in event.event.lines:
                 text = line.strip().removeprefix("@").removeprefix(drive.address)
-                homing = (
-                    drive.family.referencing(text) if text != line.strip() or not drive.address else None
-                )
+                homing = drive.family.referencing(text) if text != line.strip() or not drive.address else None
                 lost = drive.anchored & {homing.axis} if homing is not None else None
                 if lost:
                     drive.state.reference_lost(lost)
@@ -280,7 +278,7 @@ class Units:
         if drive.stores:
             raise Refused(f"{name} is in program mode, which takes no quantity; nothing was sent")
         drives = self.meant(drive)
-        fields = {field.start: field for field in drive.family.units.fields(drives[0].state, text)}
+        fields = {field.start: field for field in drives[0].family.units.fields(text)}
         for match in found:
             if match.start() not in fields:
                 valid = f"valid: {drive.family.units.words}, each with one"
@@ -318,7 +316,7 @@ class Units:
         """Read what a target means to each of these drives. Raises Diagnostic where they differ."""
         if not any(field.takes is Takes.TARGET for field in fields):
             return None
-        found = {await each.run(each.family.units.target()) for each in drives if each.family.units.target}
+        found = {await each.run(each.family.units.target()) for each in drives if each.family.units.offers("target")}
         if len(found) != 1:
             raise Diagnostic("targets are positions for some drives and distances for others; nothing was sent")
         return found.pop()
@@ -356,7 +354,7 @@ class Units:
                 if name in placed and not self.referenced(each, name):
                     raise Differs(f"{self.name(each, name)}: its reference was lost meanwhile; '{text}' was not sent")
             units = each.family.units
-            if target is not None and units.target is not None and (yield from units.target()) is not target:
+            if target is not None and units.offers("target") and (yield from units.target()) is not target:
                 raise Differs(f"{each.shown}: ABS or INC was set meanwhile; '{text}' was not sent")
 
         if drive.address not in EVERYONE or not drive.codec.broadcasts:

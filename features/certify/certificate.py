@@ -13,7 +13,6 @@ import contextlib
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import partial
 from typing import Any
 
 from multidrop.base import new_file
@@ -230,8 +229,7 @@ class Asking:
             return Occupied("it moved")
         if await drive.busy():
             return Occupied("its program ran")
-        ask = self._table.occupied
-        return Occupied() if ask is None else await drive.run(ask(drive.state))
+        return await drive.run(self._table.occupied())
 
     async def _consent(self, moving: Sequence[Question]) -> str:
         """Ask a person, unless --yes has agreed; the reason why the motor must not be moved."""
@@ -251,9 +249,7 @@ class Asking:
             return
         table, state, family = self._table, self._drive.state, self._drive.family
         sent = [line for line in question.lines if not line.startswith("/")]
-        if guarded := "; ".join(
-            filter(None, (self._session.settings.guards.what(family, state, each) for each in sent))
-        ):
+        if guarded := "; ".join(filter(None, (self._session.settings.guards.what(family, each) for each in sent))):
             self.report.unasked[question.name] = f"the configuration guards a line of it: {guarded}"
             return
         words = dict.fromkeys(found[1] for line in (*question.lines, question.ruled) for found in _VALUE.finditer(line))
@@ -282,7 +278,7 @@ class Asking:
         """Restore what a question has changed; say what a drive without a reply is still owed."""
         drive = self._drive
         try:
-            await drive.run(restored(drive.state, partial(drive.family.perform, drive.state)))
+            await drive.run(restored(drive.state, drive.family.perform))
         except (DriveError, TransportLost):
             text = f"{', '.join(kept)}: not restored; the next session on this port does that"
             self._session.notify(f"{self._who}: {text}", warning=True)
@@ -323,7 +319,7 @@ class Asking:
         finally:
             leave()
         if question.shows == BYTES:
-            text = table.masked(taken[0].request.address, taken[0].reply.raw) if taken else NO_REPLY
+            text = table.masked(taken[0].reply.raw) if taken else NO_REPLY
         return text.replace(drive.state.serial, "SERIAL") if drive.state.serial else text
 
     async def _sent(self, line: str) -> tuple[str, ...]:

@@ -349,7 +349,7 @@ def _motion(address: str, polled: Sequence[Exchange]) -> list[Measured]:
             state = family.new_state(codec, address)
             for name, value in zip(more, values[len(names) :], strict=True):
                 setattr(state, name, value)
-            decoding = Decoding(Assumed(family, state))
+            decoding = Decoding(Assumed(state))
             if found := {each.axis: each for exchange in polled for each in decoding.take(exchange)}:
                 return [*found.values()]
     return []

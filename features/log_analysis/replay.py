@@ -143,7 +143,7 @@ class Replay:
             for step in self.steps:
                 if (drive := self._targets.get((step.bus, step.drive))) is None:
                     continue
-                guarded = session.settings.guards.what(drive.family, drive.state, step.text)
+                guarded = session.settings.guards.what(drive.family, step.text)
                 if guarded or drive.codec.starts_motion(step.text):
                     session.notify(
                         f"{step.where}: {_name(drive)} {step.text}" + f" ({guarded})" * bool(guarded), outcome=True

@@ -137,7 +137,7 @@ class Twins:
                     f"{name}: it moves or a program runs, and a twin begins at rest; /twin on once it is at rest"
                 )
             begun = bus.now()
-            twin, gaps = make(snapshot, begun, drive.family.registers is not None, len(bus.drives) == 1)
+            twin, gaps = make(snapshot, begun, drive.family.offers("registers"), len(bus.drives) == 1)
             twins.begin(Beside(drive, twin, begun))
             self._workspace.predicted.add(bus)
         finally:

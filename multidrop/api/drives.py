@@ -8,7 +8,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
-from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
+from typing import TYPE_CHECKING, NamedTuple, TypeVar
 
 from multidrop.api.calls import Calls, Stopping
 from multidrop.api.events import Fault, fault_of
@@ -71,9 +71,7 @@ async def conditions(drive: Drive, slow: bool = True) -> tuple[Conditions, ...]:
     reply in a way in which nothing is asked.
     """
     values, facts, asked = drive.family.values, dict[str, Fact](), set[str]()
-    while left := [
-        each for each in values.parts(facts) if each.name not in asked and (slow or not each.slow)
-    ]:
+    while left := [each for each in values.parts(facts) if each.name not in asked and (slow or not each.slow)]:
         part = left[0]
         asked.add(part.name)
         found, at = drive.settings.get(part.name, ({}, -1)) if part.slow else ({}, -1)
@@ -98,7 +96,7 @@ class DriveFacts(Fixed):
 
     def __init__(self, calls: Calls, drive: Drive, axis: str) -> None:
         self._drive = drive
-        self._family: Family[Any] = drive.family
+        self._family: Family = drive.family
         self.axis = axis
         """The axis that it moves and reads; empty: the first."""
         self._calls = calls
@@ -365,8 +363,8 @@ class AsyncDrive(DriveFacts):
             with contextlib.suppress(Diagnostic):
                 text = self._family.language.describe_error(int(code), self.product)[0]
             found = Fault(int(code), text)
-        if found is not None and (clear := actions.clear) is not None:
-            await self._calls.run(lambda: self._send(clear(_first(self))))
+        if found is not None and (clear := actions.clear(_first(self))):
+            await self._calls.run(lambda: self._send(clear))
         return found
 
     async def _conditions(self, slow: bool = True) -> Conditions:

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from multidrop.base.errors import Diagnostic, TransportLost
 from multidrop.dialects import Family, Hints
@@ -66,7 +66,7 @@ async def open_buses(
     family = _family(connection)
     if connection.scheme.simulated:
         return await _simulated(connection, naming)
-    if family.prepare is not None:
+    if family.offers("prepare"):
         await asyncio.to_thread(family.prepare)  # a stop of another bus must not wait for it
     transport, reopen = (
         await _connected(connection) if failure is None else (NotOpen(connection.short, failure), first(connection))
@@ -131,7 +131,7 @@ async def open_port(connection: Connection) -> OpenedPort:
     return OpenedPort(connection.short, transport, family, baud, reopen)
 
 
-def _family(connection: Connection) -> Family[Any]:
+def _family(connection: Connection) -> type[Family]:
     """The family that a connection names, or the default one. Raises Diagnostic."""
     name = connection.hints.family or DEFAULT
     if name not in FAMILIES:

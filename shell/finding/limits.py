@@ -15,7 +15,7 @@ LEAST, TIMES = 12.0, 4.0
 
 
 async def searched(
-    bus: Bus, scan: Scan[DriveState], reach: Reach, found: Callable[[DriveState], None], step: Callable[[], None]
+    bus: Bus, scan: Scan, reach: Reach, found: Callable[[DriveState], None], step: Callable[[], None]
 ) -> Outcome:
     """Search a bus. A search that the noise on its line makes too long ends, and its remark says what came."""
     limit = LEAST + TIMES * scan.seconds(reach, round(bus.line.baud) or None)

@@ -41,7 +41,7 @@ class Rescue:
         Raises NothingFound, Diagnostic where a person does not agree, and the failures of a port.
         """
         stages = self._scanning.stages(bauds)
-        if stages[0].scan.clear is None:
+        if not stages[0].scan.clears:
             why = f"a {stages[0].scan.title} drive that does not reply is freed by a pause; rescue has no step for it"
             raise Diagnostic(why, self._scanning.port, f"multidrop scan --dialect {stages[0].family} searches for it")
         async with self._scanning.stopping_all():
@@ -65,7 +65,7 @@ class Rescue:
 
         def procedure() -> Procedure[None]:
             for line in lines:
-                yield from family_of(codec).perform(line)
+                yield from family_of(drive.state).perform(line)
 
         async with self._scanning.stopping_all():
             await self._scanning.converse(drive.connection, procedure)
@@ -98,7 +98,7 @@ class Rescue:
                 await self._cleared(each)
 
     async def _cleared(self, stage: Stage) -> None:
-        assert stage.scan.clear is not None
+        assert stage.scan.clears
         await self._scanning.converse(self._scanning.connection(stage), stage.scan.clear)
         self._say(f"cleared with {stage.words}; programs that ran are stopped until they are started again")
         await self._scanning.search([stage], False)
@@ -113,7 +113,7 @@ class Rescue:
             self._say("this step needs a person at a terminal, without --yes; it is left out")
             return
         for stage in stages:
-            if FAMILIES[stage.family].scan is not stage.scan or stage.scan.erase is None:
+            if not stage.scan.erases:
                 continue  # only drives with a sign-on can be heard
             try:
                 what = (
@@ -153,7 +153,7 @@ class Rescue:
 
     async def _erase(self, stages: Sequence[Stage], agreed: bool) -> None:
         """Set every drive to factory defaults, after a question of its own."""
-        erasing = [each for each in stages if each.scan.erase is not None]
+        erasing = [each for each in stages if each.scan.erases]
         asks = self._workspace.front.ask is not None and not self._workspace.questions.agreed
         if not erasing or not (agreed or asks):
             self._say("nothing short of erasing is left; multidrop rescue --erase goes as far as FD")
@@ -162,7 +162,7 @@ class Rescue:
         await self._workspace.questions.confirm(ERASES, self._scanning.port, SO_FAR)
         defaults = [each for each in erasing if each.baud in (None, FAMILIES[each.family].baud)]
         for each in erasing:
-            assert each.scan.erase is not None
+            assert each.scan.erases
             await self._scanning.converse(self._scanning.connection(each), each.scan.erase)
             await self._scanning.search(list(dict.fromkeys([each, *defaults])), False)
             if self._scanning.found:

@@ -133,8 +133,8 @@ class Stage(NamedTuple):
     """None: the port has no baud rate."""
 
     @property
-    def scan(self) -> Scan[Any]:
-        found = FAMILIES[self.family].scan
+    def scan(self) -> Scan:
+        found = FAMILIES[self.family].scan()
         assert found is not None
         return found
 
@@ -151,8 +151,8 @@ class Scanning:
         self, workspace: Workspace, opener: Opener, connection: Connection, report: Callable[[FoundDrive], None]
     ) -> None:
         """Search nothing yet. Raises Diagnostic for a port that needs no search."""
-        if connection.hints.family and FAMILIES[connection.hints.family].scan is None:
-            titles = [scan.title for family in FAMILIES.values() if (scan := family.scan) is not None]
+        if connection.hints.family and FAMILIES[connection.hints.family].scan() is None:
+            titles = [scan.title for family in FAMILIES.values() if (scan := family.scan()) is not None]
             searched = f"{', '.join(titles[:-1])} and {titles[-1]}"
             raise Diagnostic(f"scan searches for {searched} drives", connection.text, "open it instead")
         self.found: list[FoundDrive] = []
@@ -212,7 +212,7 @@ class Scanning:
                     return  # a no ends the search where a drive was found
                 await self.search(others, everything)
         if not self.found:
-            advice = "; multidrop rescue PORT frees a drive that is stuck" if first.scan.clear is not None else ""
+            advice = "; multidrop rescue PORT frees a drive that is stuck" if first.scan.clears else ""
             raise self.nothing([first, *others], advice)
 
     def about(self, stages: Iterable[Stage]) -> str:
@@ -222,7 +222,9 @@ class Scanning:
     def stages(self, bauds: Sequence[int]) -> list[Stage]:
         """The stages in their order: the given language and baud rate first."""
         given = self._connection
-        searched = [name for name, family in FAMILIES.items() if (scan := family.scan) is not None and not scan.hazard]
+        searched = [
+            name for name, family in FAMILIES.items() if (scan := family.scan()) is not None and not scan.hazard
+        ]
         stages = [Stage(family, None) for family in ([given.hints.family] if given.hints.family else searched)]
         if not given.scheme.bauded:
             if bauds:
@@ -448,7 +450,7 @@ def _stage_of(connection: Connection) -> Stage:
 
 async def extend(workspace: Workspace, bus: Bus) -> list[str]:
     """Search an open bus for drives that are not listed, and list them; return their addresses. Raises Diagnostic."""
-    scan = bus.roster.family.scan
+    scan = bus.roster.family.scan()
     if scan is None or scan.hazard:
         raise Diagnostic(f"{bus.name}: its drives cannot be searched for", hint="/open URL names them in drives=")
     if "" in bus.drives:

@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterator
 from copy import copy
 from datetime import datetime
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from multidrop.base.errors import DriveError
 from multidrop.base.text import whole
 from multidrop.dialects import Priority, Procedure, Request
 from multidrop.dialects.codec import copy_with
-from multidrop.dialects.family import Family, Motion
+from multidrop.dialects.families import family_of
+from multidrop.dialects.family import Motion
 from multidrop.dialects.state import DriveState
 from multidrop.shell.log.steps import Exchange, Step
 
@@ -36,7 +37,6 @@ class Measured(NamedTuple):
 class Assumed(NamedTuple):
     """A drive of which only a log is known."""
 
-    family: Family[Any]
     state: DriveState
 
 
@@ -61,7 +61,7 @@ class Decoding:
         """Go on with the conversation that the request belongs to, or begin one; return its result at its end."""
         try:
             if self._request is None or not self._fits(self._request, poll):
-                self._procedure = self._drive.family.motion(copy(self._drive.state), Priority.POLL)
+                self._procedure = family_of(copy(self._drive.state)).motion(Priority.POLL)
                 self._request = next(self._procedure)
             request, self._request = self._request, None
             if self._fits(request, poll) and self._procedure is not None:

@@ -231,6 +231,6 @@ def freed_dialect() -> Mapping[str, Any]:
     """Declare the language of a drive that `rescue` can free."""
     from multidrop.dialects.families import FAMILIES
 
-    scans = {name: family.scan for name, family in FAMILIES.items()}
-    languages = [name for name, scan in scans.items() if scan is not None and scan.clear is not None]
+    scans = {name: family.scan() for name, family in FAMILIES.items()}
+    languages = [name for name, scan in scans.items() if scan is not None and scan.clears]
     return {"help": "this language only", "choices": languages}

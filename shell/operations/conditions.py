@@ -10,11 +10,11 @@ if TYPE_CHECKING:
 
 
 def has_registers(workspace: Workspace) -> bool:
-    return workspace.selected is not None and workspace.selected.family.registers is not None
+    return workspace.selected is not None and workspace.selected.family.offers("registers")
 
 
 def reports_status(workspace: Workspace) -> bool:
-    return workspace.selected is not None and workspace.selected.family.status is not None
+    return workspace.selected is not None and workspace.selected.family.offers("status")
 
 
 def simulated_cell(workspace: Workspace) -> RunningFloor | None:

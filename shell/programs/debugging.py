@@ -35,14 +35,14 @@ WAYS = "/step executes one line, /continue all the rest"
 LEFT = "the break point at {} stays in the drive until /break off or power-off"
 
 
-Start = Callable[[Any, str], Procedure[None]]
+Start = Callable[[str], Procedure[None]]
 """Starts a program of a drive at a place."""
 
 
 class Debugger:
     """Observation of one drive's program. Its methods raise what the conversations of `Debugging` raise."""
 
-    def __init__(self, session: Session, drive: Drive, debugging: Debugging[Any]) -> None:
+    def __init__(self, session: Session, drive: Drive, debugging: Debugging) -> None:
         self._session, self._drive, self._debugging = session, drive, debugging
         self._listing = Listing(session.settings.state, drive.programs)
         self._commands = -1
@@ -97,7 +97,7 @@ class Debugger:
         self._place, self._last = place, None
         self._last_at = self._free_at = self._session.now()
         async with self._session.path.starting(self._drive, parts=True):
-            await self._run(start(self._drive.state, place))
+            await self._run(start(place))
 
     async def step(self) -> None:
         """Execute one line; show it, and the watched values that it changed."""

@@ -191,7 +191,7 @@ class _Download:
         guards, drive = self._session.settings.guards, self._drive
         found = []
         for line in self._outside(lines):
-            what = guards.what(drive.family, drive.state, line.text)
+            what = guards.what(drive.family, line.text)
             if what or self._programs.acts(line.text):
                 found.append(f"line {line.number}: " + (what or f"'{line.text}' starts motion or a program"))
         if not found:

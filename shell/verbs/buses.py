@@ -110,9 +110,9 @@ async def referenced(call: Call) -> None:
 
 async def status(call: Call) -> None:
     drive = call.drive(call.word())
-    if (read := drive.family.status) is None:
+    if not drive.family.offers("status"):
         raise Inexpressible(f"{call.session.display_name(drive)}: drives of this family do not report their state")
-    for line in await drive.run(read(drive.state)):
+    for line in await drive.run(drive.family.status()):
         call.session.output(line)
     units = call.session.units if call.session.scaled else None
     if units is None or not units.shown or not units.axes(drive) or drive.programming:

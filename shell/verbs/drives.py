@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 import shlex
 from collections.abc import Sequence
-from typing import Any
 
 from multidrop.base.errors import Diagnostic, Inexpressible
 from multidrop.base.on_demand import imported
@@ -139,11 +138,11 @@ def _plotted(call: Call, words: list[str]) -> tuple[dict[str, str], list[str]]:
     return options, addresses
 
 
-def _registered(call: Call) -> tuple[Drive, Registers[Any]]:
+def _registered(call: Call) -> tuple[Drive, Registers]:
     """The selected drive and its registers. Raises Inexpressible if its family has none."""
     drive = call.drive()
     if (registers := drive.family.registers) is None:
-        having = {name: dialects()[name].scheme for name, family in FAMILIES.items() if family.registers is not None}
+        having = {name: dialects()[name].scheme for name, family in FAMILIES.items() if family.offers("registers")}
         opened = " or ".join(f"{scheme}://HOST" if scheme else f"dialect={name}" for name, scheme in having.items())
         where = call.session.display_name(drive)
         raise Inexpressible(f"{where}: no registers; {call.verb.name} is valid on a bus opened with {opened}")

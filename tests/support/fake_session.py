@@ -58,7 +58,7 @@ class FakeDrive:
         """Take any line."""
 
     @property
-    def family(self) -> Family[Any]:
+    def family(self) -> Family:
         return FAMILIES["mcode"]
 
     @property

@@ -50,7 +50,7 @@ def facts_of(view: View, bus: Bus, glance: Glance) -> Iterator[tuple[str, str]]:
         )
         yield f"units {axis.axis}".rstrip(), text
     program, family = readout.program, drive.family
-    if not family.programs_at:
+    if not family.offers("programs"):
         yield "program", family.no_programs
     elif program.read_at is None:
         yield "program", f"not read: {_to('/list', glance)}"
@@ -66,8 +66,8 @@ def facts_of(view: View, bus: Bus, glance: Glance) -> Iterator[tuple[str, str]]:
         ("last sent", readout.sent, "nothing yet"),
     ):
         yield word, f"{session.wall(last[1]):%H:%M:%S} {visible(last[0])}" if last else nothing
-    can = {"programs": family.programs_at, "tracing": family.debugging_at, "registers": family.registers}
-    yield "has", ", ".join(["settings", *(word for word, it in can.items() if it)])
+    can = {"programs": "programs", "tracing": "debugging", "registers": "registers"}
+    yield "has", ", ".join(["settings", *(word for word, name in can.items() if family.offers(name))])
 
 
 def _failed(readout: Readout) -> Conditions | None:
@@ -161,7 +161,7 @@ def _asked_for(view: View) -> Iterator[tuple[str, str]]:
         yield "an error is set", conditions.error_text
     if chosen.unreferenced:
         yield _to("/referenced", chosen), "once you know that its position is right"
-    if program.read_at is None and drive.family.programs_at and not chosen.lost:
+    if program.read_at is None and drive.family.offers("programs") and not chosen.lost:
         yield _to("/list", chosen), "shows its program here"
 
 

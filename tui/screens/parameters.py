@@ -119,7 +119,7 @@ class Edit:
     warning: str = ""
 
 
-def edit(parameters: Parameters[Any], state: Any, present: Readings, name: str, value: Value) -> Edit:
+def edit(parameters: Parameters, state: Any, present: Readings, name: str, value: Value) -> Edit:
     """Plan the lines that set one value. Raises Diagnostic for a value that the drive refuses."""
     made = parameters.plan(present, {name: value}, ORDINARY)
     warning = "; ".join(reason for _, reason in made.withheld)

@@ -7,7 +7,8 @@ stays set.
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
+from typing import ClassVar
 
 from multidrop.dialects.certifying import Certifying
 from multidrop.dialects.codec import Codec, Priority, Procedure
@@ -18,6 +19,7 @@ from multidrop.dialects.family import (
     Family,
     Guard,
     Hints,
+    Language,
     Motion,
     Printed,
     Programs,
@@ -98,17 +100,17 @@ class PmxFamily(Family):
 
     name = Pmx.family
     codec = Pmx()
-    language = help
-    rests_in_place = False
+    language: ClassVar[Language] = help
     stop_bytes = STOP_BYTES
 
     @classmethod
     def new_state(cls, codec: Codec, address: str) -> DriveState:
+        assert isinstance(codec, Pmx)
         return PmxState(codec, address)
 
     @classmethod
-    def identify(cls, hints: Hints) -> Procedure[Sequence[DriveState]]:
-        return identify(hints)
+    def identify(cls, hints: Hints) -> Procedure[list[DriveState]]:
+        return [*(yield from identify(hints))]
 
     def guard(self, text: str) -> Guard | None:
         return guarded(text, self.state.address)

@@ -319,7 +319,7 @@ BUSY = 2.5
 """The longest wait, in windows, where something else arrives."""
 
 
-def search(reach: Reach, found: Found[PmxState], step: Step) -> Procedure[Outcome]:
+def search(reach: Reach, found: Found, step: Step) -> Procedure[Outcome]:
     """Search for every controller at one baud rate; report each as soon as it is identified."""
     remarks: list[str] = []
     seen = set(reach.known)
@@ -340,7 +340,7 @@ def _numbers(reach: Reach) -> tuple[str, ...]:
     return ("",) if reach.alone else (*NUMBERS, FACTORY, "")
 
 
-def _identified(states: Sequence[PmxState], seen: set[str], found: Found[PmxState]) -> Procedure[bool]:
+def _identified(states: Sequence[PmxState], seen: set[str], found: Found) -> Procedure[bool]:
     """Identify the controllers whose replies came: the last of these, or those before it. A reply bears no number."""
     before = len(seen)
     for state in reversed(states):

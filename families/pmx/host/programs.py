@@ -10,11 +10,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from multidrop.base.errors import Diagnostic, DriveError, NoAnswer, Refused, Stopped
+from multidrop.base.errors import Diagnostic, DriveError, Inexpressible, NoAnswer, Refused, Stopped
 from multidrop.base.files import SourceLine, lines_of_text
 from multidrop.base.text import whole
 from multidrop.dialects.codec import End, Procedure
-from multidrop.dialects.debugging import Debugging, Look, Neighbours, Stepped, lacking
+from multidrop.dialects.debugging import Debugging, Look, Neighbours
 from multidrop.dialects.family import Printed, Programs, Progress
 from multidrop.dialects.program_files import Difference, Held, Stored, first_difference
 from multidrop.families.pmx.host.codec import PmxState
@@ -261,8 +261,7 @@ RUNNING, PAUSED = 1, 2
 START, PAUSE, CONTINUE = 1, 2, 3
 """Values of SR."""
 NO_STEP = "a PMX has no single step: /break now pauses a program, /continue goes on"
-no_step = lacking(who, NO_STEP)
-no_break = lacking(who, "a PMX has no break points: /break now pauses a program; program test --break has them")
+NO_BREAK = "a PMX has no break points: /break now pauses a program; program test --break has them"
 
 
 def stored_rows(state: PmxState) -> Procedure[tuple[Stored, ...]]:
@@ -285,7 +284,7 @@ def _rows(held: tuple[Stored, ...]) -> tuple[Stored, ...]:
 
 def idle(state: PmxState, program: str, neighbours: Neighbours | None) -> Procedure[None]:
     if neighbours is None:
-        yield from no_step(state)
+        raise Inexpressible(f"{who(state)}: {NO_STEP}; nothing was sent")
     if (yield from _status(state, program)) in (RUNNING, PAUSED):
         raise Refused(f"{who(state)}: program {program} runs already; not started; SR{program}=0 ends it")
 
@@ -347,6 +346,7 @@ class PmxDebugging(Debugging):
 
     state: PmxState
 
+    no_break = NO_BREAK
     no_step = NO_STEP
 
     def listing(self) -> Procedure[tuple[Stored, ...]]:
@@ -367,26 +367,14 @@ class PmxDebugging(Debugging):
     def trace(self, place: str) -> Procedure[None]:
         return trace(self.state, place)
 
-    def begin(self, place: str) -> Procedure[None]:
-        return no_step(self.state, place)
-
     def waits(self, place: str, last: Stored | None) -> Procedure[None]:
         return waits(self.state, place, last)
-
-    def step(self, rows: Sequence[Stored]) -> Procedure[Stepped]:
-        return no_step(self.state, rows)
 
     def go_on(self, place: str) -> Procedure[None]:
         return go_on(self.state, place)
 
     def look(self, place: str) -> Procedure[Look]:
         return look(self.state, place)
-
-    def break_at(self, place: str, passes: int) -> Procedure[None]:
-        return no_break(self.state, place, passes)
-
-    def break_off(self) -> Procedure[None]:
-        return no_break(self.state)
 
     def break_now(self, place: str) -> Procedure[None]:
         return break_now(self.state, place)

@@ -255,15 +255,18 @@ POLARITY = 1 << 10
 """The bit of POLX that inverts the inputs."""
 
 
-def parts(state: PmxState, facts: Facts) -> Sequence[Part[PmxState]]:
+def parts(state: PmxState, facts: Facts) -> Sequence[Part]:
     found = []
     for axis in table.AXES:
         loop = (f"SLS{axis}", f"DX{axis}") if facts.get(f"SL{axis}") else ()
-        found.append(Part(axis, partial(_facts, names=(f"MST{axis}", *loop))))
-    found += [Part("points", partial(_facts, names=("DI", "DO", "EO"))), Part("programs", _programs)]
-    found += [Part(f"settings {axis}", partial(_facts, names=(f"SL{axis}",)), slow=True) for axis in table.AXES]
+        found.append(Part(axis, partial(_facts, state, names=(f"MST{axis}", *loop))))
+    found += [
+        Part("points", partial(_facts, state, names=("DI", "DO", "EO"))),
+        Part("programs", partial(_programs, state)),
+    ]
+    found += [Part(f"settings {axis}", partial(_facts, state, names=(f"SL{axis}",)), slow=True) for axis in table.AXES]
     named = [each + axis for axis in ("", *table.AXES) for each in SPEEDS]
-    return [*found, *(Part(name, partial(_facts, names=(name,)), slow=True) for name in (*named, "EDEC"))]
+    return [*found, *(Part(name, partial(_facts, state, names=(name,)), slow=True) for name in (*named, "EDEC"))]
 
 
 def _facts(state: PmxState, names: Sequence[str]) -> Procedure[dict[str, Value]]:

@@ -8,6 +8,7 @@ the module is reached. A stop is never guarded. Values have numbers; a word is t
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from typing import ClassVar
 
 from multidrop.base.files import rows
 from multidrop.dialects.certifying import Certifying
@@ -19,6 +20,7 @@ from multidrop.dialects.family import (
     Family,
     Guard,
     Hints,
+    Language,
     Motion,
     Printed,
     Programs,
@@ -102,18 +104,19 @@ class TmclFamily(Family):
 
     name = Tmcl.family
     codec = Tmcl()
-    language = help
+    language: ClassVar[Language] = help
     rests_in_place = True
     repairs = True
     stop_bytes = STOP_BYTES
 
     @classmethod
     def new_state(cls, codec: Codec, address: str) -> DriveState:
+        assert isinstance(codec, Tmcl)
         return TmclState(codec, address)
 
     @classmethod
-    def identify(cls, hints: Hints) -> Procedure[Sequence[DriveState]]:
-        return identify(hints)
+    def identify(cls, hints: Hints) -> Procedure[list[DriveState]]:
+        return [*(yield from identify(hints))]
 
     def guard(self, text: str) -> Guard | None:
         return guarded(text, self.state.address)

@@ -17,7 +17,7 @@ from multidrop.base.errors import Diagnostic, DriveError, Inexpressible, Refused
 from multidrop.base.files import SourceLine, lines_of_text
 from multidrop.base.text import counted, whole
 from multidrop.dialects.codec import Procedure
-from multidrop.dialects.debugging import Debugging, Look, Neighbours, Stepped, lacking
+from multidrop.dialects.debugging import Debugging, Look, Neighbours, Stepped
 from multidrop.dialects.family import Printed, Programs, Progress
 from multidrop.dialects.program_files import Difference, Held, Stored, first_difference, numbered
 from multidrop.families.tmcl.host.codec import TmclState, call_of, line_in, parse_reply
@@ -273,7 +273,7 @@ class TmclPrograms(Programs):
 
 
 NO_PLACE = "does not report the address of its next line (global parameter 130)"
-no_break = lacking(who, "TMCL has no break points: /break now halts a program; program test --break has them")
+NO_BREAK = "TMCL has no break points: /break now halts a program; program test --break has them"
 
 
 def stored_rows(state: TmclState) -> Procedure[tuple[Stored, ...]]:
@@ -387,6 +387,8 @@ class TmclDebugging(Debugging):
 
     state: TmclState
 
+    no_break = NO_BREAK
+
     def listing(self) -> Procedure[tuple[Stored, ...]]:
         return stored_rows(self.state)
 
@@ -419,12 +421,6 @@ class TmclDebugging(Debugging):
 
     def look(self, place: str) -> Procedure[Look]:
         return look(self.state, place)
-
-    def break_at(self, place: str, passes: int) -> Procedure[None]:
-        return no_break(self.state, place, passes)
-
-    def break_off(self) -> Procedure[None]:
-        return no_break(self.state)
 
     def break_now(self, place: str) -> Procedure[None]:
         return break_now(self.state, place)

@@ -40,7 +40,7 @@ class _Search:
     """One search of a line."""
 
     reach: Reach
-    found: Found[TmclState]
+    found: Found
     states: dict[str, TmclState] = field(default_factory=dict)
     remarks: list[str] = field(default_factory=list)
     asked: dict[str, None] = field(default_factory=dict)
@@ -91,7 +91,7 @@ class _Search:
         return bool(known and replies_in((yield from _heard(known, SLOWEST))))
 
 
-def search(reach: Reach, found: Found[TmclState], step: Step) -> Procedure[Outcome]:
+def search(reach: Reach, found: Found, step: Step) -> Procedure[Outcome]:
     """Search for modules; report each as soon as it is identified, with the number of its motors."""
     own, addresses = _Search(reach, found), _addresses(reach)
     for begin in range(0, len(addresses), BLOCK):

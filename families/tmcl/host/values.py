@@ -212,15 +212,15 @@ ABSENT = "absent"
 FULL_CURRENT = 255
 
 
-def parts(state: TmclState, facts: Facts) -> Sequence[Part[TmclState]]:
+def parts(state: TmclState, facts: Facts) -> Sequence[Part]:
     """The parts of a module, for each motor that was counted; at first they are counted."""
     if not state.motors:
-        return (Part("motors", _count),)
-    found: list[Part[TmclState]] = [Part("program", _program)]
+        return (Part("motors", partial(_count, state)),)
+    found: list[Part] = [Part("program", partial(_program, state))]
     for motor in range(state.motors):
         some = (FLAGS, *(axis for axis, _ in SWITCHES))
         asked = [*STATE, *(axis for axis in some if facts.get(_key(axis, motor)) != ABSENT)]
-        found.append(Part(f"motor {motor}", partial(_parameters, motor=motor, wanted=asked)))
+        found.append(Part(f"motor {motor}", partial(_parameters, state, motor=motor, wanted=asked)))
         for axis in SETTINGS:
             found.append(Part(_key(axis, motor), partial(_parameters, motor=motor, wanted=(axis,)), slow=True))
     return found

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from typing import ClassVar
 
 from multidrop.dialects.certifying import Certifying
 from multidrop.dialects.codec import Codec, Priority, Procedure
 from multidrop.dialects.debugging import Debugging
-from multidrop.dialects.family import Family, Guard, Hints, Motion, Printed, Programs, Referencing
+from multidrop.dialects.family import Family, Guard, Hints, Language, Motion, Printed, Programs, Referencing
 from multidrop.dialects.motions import Motions
 from multidrop.dialects.scanning import Scan
 from multidrop.dialects.state import DriveState, Remembered
@@ -39,19 +39,19 @@ class MCodeFamily(Family):
 
     name = MCode.family
     codec = MCode()
-    language = help
-    rests_in_place = False
+    language: ClassVar[Language] = help
     protection = CYBER_SECURITY
     repairs = True
     stop_bytes = STOP_BYTES
 
     @classmethod
     def new_state(cls, codec: Codec, address: str) -> DriveState:
+        assert isinstance(codec, MCode)
         return MCodeState(codec, address)
 
     @classmethod
-    def identify(cls, hints: Hints) -> Procedure[Sequence[DriveState]]:
-        return identify(hints)
+    def identify(cls, hints: Hints) -> Procedure[list[DriveState]]:
+        return [*(yield from identify(hints))]
 
     def guard(self, text: str) -> Guard | None:
         return guarded(self.state, text)

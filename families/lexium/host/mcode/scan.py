@@ -121,7 +121,7 @@ class _Search:
     """One search: its manner, what it has found, and what it could not read."""
 
     reach: Reach
-    found: Found[MCodeState]
+    found: Found
     step: Step
     names: list[str] = field(default_factory=list)
     remarks: dict[str, str] = field(default_factory=dict)
@@ -142,7 +142,7 @@ class _Search:
         return reply.raw
 
 
-def search(reach: Reach, found: Found[MCodeState], step: Step) -> Procedure[Outcome]:
+def search(reach: Reach, found: Found, step: Step) -> Procedure[Outcome]:
     """Search for every drive at one baud rate; report each as soon as it is identified."""
     own = _Search(reach, found, step, list(reach.known))
     if reach.cut:

@@ -78,19 +78,21 @@ UNSURE = frozenset({"EE", "AS", "AF", "I5", "ST"})
 REFUSAL = "refuses to print its conditions"
 
 
-def parts(state: MCodeState, facts: Facts) -> Sequence[Part[MCodeState]]:
+def parts(state: MCodeState, facts: Facts) -> Sequence[Part]:
     """The parts of a drive: its state, its settings, and its set-ups, which have another form on an MDrivePlus."""
     if state.codec.em == 3 or state.address in EVERY_DRIVE or state.programming:
         return ()
     found = [
-        Part("state", partial(_state, before=facts)),
-        Part("settings", partial(_values, names=SETTINGS), slow=True),
+        Part("state", partial(_state, state, before=facts)),
+        Part("settings", partial(_values, state, names=SETTINGS), slow=True),
     ]
     if facts.get("BY") and SETTLED in facts:
         return found  # a list has no signature, and a program prints lines, too
     if not (lists := manual.lists(state.product, state.version)):
-        return [*found, Part("points", partial(_values, names=POINTS), slow=True)]
-    return found + [Part(word, partial(_list, word=word, numbers=rows), slow=True) for word, rows in lists.items()]
+        return [*found, Part("points", partial(_values, state, names=POINTS), slow=True)]
+    return found + [
+        Part(word, partial(_list, state, word=word, numbers=rows), slow=True) for word, rows in lists.items()
+    ]
 
 
 def _state(state: MCodeState, before: Facts) -> Procedure[Facts]:

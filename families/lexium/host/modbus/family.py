@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import ClassVar
 
 from multidrop.dialects.certifying import Certifying
 from multidrop.dialects.codec import Codec, Priority, Procedure
-from multidrop.dialects.family import Family, Guard, Hints, Motion, Printed, Referencing, Registers
+from multidrop.dialects.family import Family, Guard, Hints, Language, Motion, Printed, Referencing, Registers
 from multidrop.dialects.motions import Motions
 from multidrop.dialects.state import DriveState
 from multidrop.dialects.units import Units
@@ -77,18 +78,18 @@ class ModbusFamily(Family):
 
     name = Modbus.family
     codec = Modbus()
-    language = help
-    rests_in_place = False
+    language: ClassVar[Language] = help
     no_programs = f"programs are neither listed nor written over Modbus; {ALTERNATIVE} does both with the same drive"
     protection = CYBER_SECURITY
 
     @classmethod
     def new_state(cls, codec: Codec, address: str) -> DriveState:
+        assert isinstance(codec, Modbus)
         return ModbusState(codec, address)
 
     @classmethod
-    def identify(cls, hints: Hints) -> Procedure[Sequence[DriveState]]:
-        return identify(hints)
+    def identify(cls, hints: Hints) -> Procedure[list[DriveState]]:
+        return [*(yield from identify(hints))]
 
     def guard(self, text: str) -> Guard | None:
         return guarded(self.state, text)
@@ -147,14 +148,7 @@ class ModbusFamily(Family):
 
     @property
     def registers(self) -> Registers | None:
-        return Registers(
-            read=operations.read_registers,
-            write=operations.write_registers,
-            lines=lines_of,
-            read_coil=operations.read_coil,
-            write_coil=operations.write_coil,
-            device=operations.device,
-        )
+        return ModbusRegisters(self.state)
 
     @classmethod
     def vouched(cls, text: str, product: str) -> bool:

@@ -153,14 +153,14 @@ SETTINGS = ("EE", "AS", "RC", "HC", "VI", "VM", "A", "D")
 INPUTS = 4
 
 
-def parts(state: ModbusState, facts: Facts) -> Sequence[Part[ModbusState]]:
+def parts(state: ModbusState, facts: Facts) -> Sequence[Part]:
     table = words(state.product)
     signs = [n for n in SIGNS if state.product in EVERY and state.product in table[n].products]
-    found = [Part("state", partial(_state, names=(*FLAGS, *signs), before=facts))]
+    found = [Part("state", partial(_state, state, names=(*FLAGS, *signs), before=facts))]
     has = [n for n in SETTINGS if state.product not in EVERY or state.product in table[n].products]
-    found += [Part(name, partial(_registers, names=(name,)), slow=True) for name in has]
+    found += [Part(name, partial(_registers, state, names=(name,)), slow=True) for name in has]
     lists = manual.lists(state.product, state.version)
-    found += [Part(word, partial(_setups, word=word), slow=True) for word in ("IS", "OS") if word in lists]
+    found += [Part(word, partial(_setups, state, word=word), slow=True) for word in ("IS", "OS") if word in lists]
     return found
 
 
@@ -300,10 +300,10 @@ class ModbusUnits(Units):
 
     state: ModbusState
 
-    words = units.UNITS.words
+    words = units.MCodeUnits.words
 
     def axes(self) -> Sequence[str]:
-        return units.UNITS.axes(self.state)
+        return ("",)
 
     def fields(self, text: str) -> Sequence[Field]:
         return units.fields(self.state, text)
