@@ -32,7 +32,6 @@ from multidrop.drives.bus import Bus
 from multidrop.drives.drive import Drive
 from multidrop.drives.events import BusEvent, Ended
 from multidrop.families.lexium.host.mcode.codec import MCode
-from multidrop.families.lexium.host.mcode.family import MCODE
 from multidrop.families.lexium.manual import program_file
 from multidrop.transports.serial_port import open_serial
 
@@ -88,16 +87,16 @@ async def transfer(where: str, baud: int, codec: MCode) -> list[float]:
         file = program_file.read("\n".join(PROGRAM), "bench.mxt")
         watched = Lines(drive)
         times = [time.perf_counter()]
-        held = await drive.run(MCODE.programs.read(file, nothing))
+        held = await drive.run(drive.programs.read(file, nothing))
         times.append(time.perf_counter())
         sent = await drive.download(file, held)
         times.append(time.perf_counter())
         await drive.send("S")
         times.append(time.perf_counter())
-        found = await drive.run(MCODE.programs.read(file, nothing))
-        assert not MCODE.programs.differences(sent, found)
+        found = await drive.run(drive.programs.read(file, nothing))
+        assert not drive.programs.differences(sent, found, None)
         times.append(time.perf_counter())
-        made = await drive.run(MCODE.programs.upload(True))
+        made = await drive.run(drive.programs.upload(True))
         times.append(time.perf_counter())
         assert [each for each in made if each in BODY] == BODY, made
         return [watched.last - watched.first, *(b - a for a, b in pairwise(times))]

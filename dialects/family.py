@@ -181,7 +181,7 @@ class Programs(OfDrive, ABC):
 
     @abstractmethod
     def end(self) -> Procedure[bool]:
-        """Begin to end running programs and their motion; whether one ran. Raises Refused where it moves without one."""
+        """Begin to end running programs and their motion; whether one ran. Raises Refused if it moves without one."""
 
     @abstractmethod
     def download(
@@ -195,7 +195,7 @@ class Programs(OfDrive, ABC):
 
     @abstractmethod
     def differences(self, lines: Sequence[SourceLine], held: Held, before: Held | None) -> Sequence[Difference]:
-        """Compare the lines of a file with what a drive holds. `before`: what it held before the file was sent to it."""
+        """Compare the lines of a file with what a drive holds. `before`: what it held before the file was sent."""
 
     @abstractmethod
     def to_send(self, lines: Sequence[SourceLine], held: Held) -> Procedure[str]:
@@ -338,7 +338,7 @@ class Family(OfDrive, ABC):
 
     @classmethod
     def move(cls, axis: str, distance: int | str) -> tuple[str, ...]:
-        """The lines that move an axis by a distance, a quantity too. An axis is as in `Motion.axis`; empty: the first."""
+        """The lines that move an axis by a distance, a quantity too. Axes are as in `Motion.axis`; empty: the first."""
         raise Inexpressible(f"{cls.name}: no line moves by a distance; nothing was sent")
 
     @classmethod
@@ -412,7 +412,7 @@ class Family(OfDrive, ABC):
         return any(each.velocity for each in axes)
 
     def busy(self) -> Procedure[bool]:
-        """Whether a program runs, which can move the drive. A stop is confirmed by it; Refused or NoAnswer: not known."""
+        """Whether a program runs, which can move the drive. A stop is confirmed by it; if it raises: not known."""
         return False
         yield  # a conversation
 

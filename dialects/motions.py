@@ -146,7 +146,7 @@ class Ending:
 
 
 class Motions(OfDrive):
-    """What a family says of the motions of a drive. Each conversation raises Refused, NoAnswer, Stopped or Inexpressible.
+    """What a family says of the motions of a drive. Conversations raise Refused, NoAnswer, Stopped or Inexpressible.
 
     The defaults know of no motion: waits for such a drive end when it is at rest.
     """

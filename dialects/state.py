@@ -241,7 +241,7 @@ class DriveState:
 
 
 class OfDrive:
-    """What a family says of one drive, in a class for each subject. A family's own class knows its own kind of state."""
+    """What a family says of one drive, in a class for each subject. A class of a family knows its own kind of state."""
 
     state: DriveState
 

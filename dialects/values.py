@@ -152,11 +152,11 @@ class Parameters(OfDrive):
         yield  # a conversation
 
     def plan(self, present: Readings, wanted: Mapping[str, Value], permission: Permission) -> Plan:
-        """Order the steps from the present to the wanted values. Raises Diagnostic for a value that the drive refuses."""
+        """Order the steps from the present to the wanted values. Raises Diagnostic for a value that it refuses."""
         return Plan()
 
     def ready(self) -> Procedure[str]:
-        """Return the reason for which settings must not be changed now: it moves, a program runs; empty: there is none."""
+        """Return the reason for which settings must not be changed now: it moves, a program runs; empty: none."""
         return ""
         yield
 
@@ -453,7 +453,7 @@ class Values(OfDrive):
         return ()
 
     def check(self, word: str) -> str:
-        """Return a word as the drive spells it; nothing is sent. Raises Diagnostic for a word that must not be polled."""
+        """Return a word as the drive spells it; nothing is sent. Raises Diagnostic for one that must not be polled."""
         raise Diagnostic(f"{self.state.who}: no value {word}", "", "valid: position, velocity")
 
     def first(self, word: str) -> Procedure[float]:

@@ -20,7 +20,7 @@ from multidrop.base.errors import (
 from multidrop.base.files import SourceLine
 from multidrop.dialects.codec import Codec, Priority, Procedure
 from multidrop.dialects.families import family_of, program_languages
-from multidrop.dialects.family import Motion, Programs
+from multidrop.dialects.family import Family, Motion, Programs
 from multidrop.dialects.program_files import Held, ProgramFiles
 from multidrop.dialects.state import DriveState
 from multidrop.dialects.values import Value
@@ -110,7 +110,6 @@ class Drive:
         self.strict = False
         """A restart is such a reason."""
         self.link: Link = conversations.link
-        self.family = family_of(state)
         self._conversations = conversations
         self._neighbours = neighbours
         self._judged = Judged()
@@ -120,6 +119,11 @@ class Drive:
     def address(self) -> str:
         """Its address on the wire; empty where it needs none."""
         return self.state.address
+
+    @property
+    def family(self) -> Family:
+        """What its family says of it, as it is now: it is another object once the drive was found again after a loss."""
+        return family_of(self.state)
 
     @property
     def codec(self) -> Codec:

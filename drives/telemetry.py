@@ -208,11 +208,10 @@ class _ConditionPoller(Poller[str]):
         restarts = self._roster.restarts.count(drive)
         if known is None or known.drive is not drive or known.restarts != restarts:  # it holds other settings
             known = self._known[address] = _Facts(drive, restarts=restarts)
-        values = drive.family.values
         ready, begun, period = False, self._link.now(), self.periods[address]
-        parts = values.parts(known.facts)
+        parts = drive.family.values.parts(known.facts)
         for name in [part.name for part in parts]:
-            part = next((each for each in values.parts(known.facts) if each.name == name), None)
+            part = next((each for each in drive.family.values.parts(known.facts) if each.name == name), None)
             if part is None or not self._part_due(known, part, period):
                 continue
             if self._barred(drive) or not await self._read_part(known, due, part):
@@ -221,7 +220,7 @@ class _ConditionPoller(Poller[str]):
         if parts and drive.counting.axes and not self._barred(drive) and self._scale_due(known, period):
             await self._read_scales(known)
         if ready and known.facts:
-            conditions = values.fold(known.facts)
+            conditions = drive.family.values.fold(known.facts)
             if (runs := next((each.runs for each in conditions if each.runs is not None), None)) is not None:
                 drive.running = Running(begun, runs)
             self._link.publish(Conditioned(self._link.now(), drive.address, conditions))

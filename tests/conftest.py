@@ -143,7 +143,7 @@ class Bench:
 
     def type(self, state: DriveState, text: str) -> tuple[str, ...]:
         """Type a line to a drive; return what it printed."""
-        return tuple(self.run(family_of(state.codec).perform(state, text), state))
+        return tuple(self.run(family_of(state).perform(text), state))
 
 
 @pytest.fixture(scope="session")

@@ -16,7 +16,7 @@ FAMILY = Feature(
     adds=(
         Dialect(
             "mcode",
-            f"{HERE}.host.mcode.family:MCODE",
+            f"{HERE}.host.mcode.family:MCodeFamily",
             files=ProgramFiles(
                 "MCode",
                 (".mxt", ".txt"),
@@ -27,7 +27,7 @@ FAMILY = Feature(
                 f"{HERE}.manual.supported:unsupported",
             ),
         ),
-        Dialect("modbus", f"{HERE}.host.modbus.family:MODBUS", scheme="modbus"),
+        Dialect("modbus", f"{HERE}.host.modbus.family:ModbusFamily", scheme="modbus"),
         Simulated(
             "mcode",
             f"{HERE}.simulator.family:MCODE",

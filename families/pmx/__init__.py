@@ -16,7 +16,7 @@ FAMILY = Feature(
     adds=(
         Dialect(
             "pmx",
-            f"{HERE}.host.family:PMX",
+            f"{HERE}.host.family:PmxFamily",
             files=ProgramFiles(
                 "A-SCRIPT",
                 (".prg", ".asc"),

@@ -15,7 +15,7 @@ FAMILY = Feature(
     adds=(
         Dialect(
             "tmcl",
-            f"{HERE}.host.family:TMCL",
+            f"{HERE}.host.family:TmclFamily",
             files=ProgramFiles(
                 "TMCL",
                 (".tmc", ".tmcl"),

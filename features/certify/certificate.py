@@ -20,7 +20,7 @@ from multidrop.base.errors import Diagnostic, DriveError, NoAnswer, Refused, Sto
 from multidrop.base.files import escaped_toml, text_of, toml_of
 from multidrop.base.on_demand import imported
 from multidrop.base.text import counted
-from multidrop.dialects.certifying import BYTES, FITS, MOVES, Occupied, Question
+from multidrop.dialects.certifying import BYTES, FITS, MOVES, Certifying, Occupied, Question
 from multidrop.dialects.owed_settings import owed, restored
 from multidrop.drives.conversations import refuse_stranger
 from multidrop.drives.drive import Drive
@@ -188,13 +188,19 @@ class Asking:
         found = drive.family.certifying
         if found is None:
             raise Diagnostic(f"no questions are known for drives of {drive.family.name}", self._who)
-        self._table, state = found, drive.state
+        state = drive.state
         if not state.product:  # what is owed to a drive is kept by what the drive is
             refuse_stranger(self._drive.state, self._who)
             raise NoAnswer(f"{self._who} was not found on this line; check its name, or give drives=NAMES in the URL")
         known = {"family": drive.family.name, "product": state.product, "version": state.version, "part": state.part}
         known["traits"] = " ".join(sorted(found.traits()))
         self.report = Report({key: text for key, text in known.items() if text})
+
+    @property
+    def _table(self) -> Certifying:
+        found = self._drive.family.certifying
+        assert found is not None
+        return found
 
     @property
     def questions(self) -> list[Question]:

@@ -18,9 +18,9 @@ from multidrop.api.programs import AsyncParameters, AsyncPrograms
 from multidrop.api.values import seconds, short_text_of, text_of
 from multidrop.base.errors import Diagnostic, DriveError, Inexpressible, Refused
 from multidrop.base.text import visible
-from multidrop.dialects import Family, Motion
+from multidrop.dialects import Motion
 from multidrop.dialects.units import QUANTITY
-from multidrop.dialects.values import DISABLE, ENABLE, Conditions
+from multidrop.dialects.values import DISABLE, ENABLE, Actions, Conditions
 from multidrop.dialects.values import Value as Fact
 from multidrop.drives.drive import still
 from multidrop.shell import stop_report, waits
@@ -70,8 +70,10 @@ async def conditions(drive: Drive, slow: bool = True) -> tuple[Conditions, ...]:
     What such a part has read since the last command is not read again. Raises Inexpressible where the drive is set to
     reply in a way in which nothing is asked.
     """
-    values, facts, asked = drive.family.values, dict[str, Fact](), set[str]()
-    while left := [each for each in values.parts(facts) if each.name not in asked and (slow or not each.slow)]:
+    facts, asked = dict[str, Fact](), set[str]()
+    while left := [
+        each for each in drive.family.values.parts(facts) if each.name not in asked and (slow or not each.slow)
+    ]:
         part = left[0]
         asked.add(part.name)
         found, at = drive.settings.get(part.name, ({}, -1)) if part.slow else ({}, -1)
@@ -84,8 +86,7 @@ async def conditions(drive: Drive, slow: bool = True) -> tuple[Conditions, ...]:
         facts.update(found)
     if not asked:
         raise Inexpressible(f"{drive.shown}: its state is not asked for as it is set to reply (EM=3)")
-    found_now: tuple[Conditions, ...] = values.fold(facts)
-    return found_now
+    return drive.family.values.fold(facts)
 
 
 class DriveFacts(Fixed):
@@ -96,7 +97,6 @@ class DriveFacts(Fixed):
 
     def __init__(self, calls: Calls, drive: Drive, axis: str) -> None:
         self._drive = drive
-        self._family: Family = drive.family
         self.axis = axis
         """The axis that it moves and reads; empty: the first."""
         self._calls = calls
@@ -144,7 +144,7 @@ class DriveFacts(Fixed):
 
 def _first(drive: DriveFacts) -> str:
     """Its axis as in `Motion.axis`."""
-    return drive.axis.lower() or drive._family.units.axes()[0]
+    return drive.axis.lower() or drive._drive.family.units.axes()[0]
 
 
 def _of_axis(drive: DriveFacts, axes: Sequence[A]) -> A:
@@ -162,9 +162,12 @@ class AsyncDrive(DriveFacts):
     def __init__(self, calls: Calls, drive: Drive, axis: str = "") -> None:
         super().__init__(calls, drive, axis)
         self._axis_known = not axis
-        self._actions = drive.family.values.actions
         self.programs = AsyncPrograms(calls, drive)
         self.parameters = AsyncParameters(calls, drive)
+
+    @property
+    def _actions(self) -> Actions:
+        return self._drive.family.values.actions
 
     # Lines
 
@@ -214,11 +217,11 @@ class AsyncDrive(DriveFacts):
         `beyond`: it may leave the travel of its axis. Raises Refused; Diagnostic for a unit that its scale has not;
         TypeError for a fraction of a step.
         """
-        await self._move(self._family.move(self.axis, _amount(steps, unit)), beyond)
+        await self._move(self._drive.family.move(self.axis, _amount(steps, unit)), beyond)
 
     async def move_to(self, position: float, unit: str = "", *, beyond: bool = False) -> None:
         """Begin to move to a position: whole steps, or a number of a unit. As `move` in all else."""
-        await self._move(self._family.move_to(self.axis, _amount(position, unit)), beyond)
+        await self._move(self._drive.family.move_to(self.axis, _amount(position, unit)), beyond)
 
     async def run_at(self, velocity: float, unit: str = "") -> None:
         """Begin to run at a velocity, negative for minus: whole steps a second, or a number of a unit. 0 ends it.
@@ -309,7 +312,7 @@ class AsyncDrive(DriveFacts):
     async def enable(self, on: bool = True) -> None:
         """Switch the current of the motor on. Raises Inexpressible where its family has no command for it."""
         name = ENABLE if on else DISABLE
-        control = self._family.values.controls(_first(self))[name]
+        control = self._drive.family.values.controls(_first(self))[name]
         if control.absent:
             raise Inexpressible(f"{self.name}: no {name}(): {control.absent}")
         self._check_executes()
@@ -361,7 +364,7 @@ class AsyncDrive(DriveFacts):
         elif code := await self.read(actions.error):
             text = f"error {code}"
             with contextlib.suppress(Diagnostic):
-                text = self._family.language.describe_error(int(code), self.product)[0]
+                text = self._drive.family.language.describe_error(int(code), self.product)[0]
             found = Fault(int(code), text)
         if found is not None and (clear := actions.clear(_first(self))):
             await self._calls.run(lambda: self._send(clear))

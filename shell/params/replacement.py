@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 from multidrop.base.errors import Diagnostic, DriveError, Inexpressible, Refused
 from multidrop.base.text import counted
 from multidrop.dialects.program_files import LOCKED
-from multidrop.dialects.values import Change, Permission, Plan, Readings, differing
+from multidrop.dialects.values import Change, Parameters, Permission, Plan, Readings, differing
 from multidrop.shell import snapshots
 from multidrop.shell.channel import transferring
 from multidrop.shell.params.file import read, shown
@@ -65,7 +65,7 @@ class _Replacement:
 
     def __init__(self, session: Session, drive: Drive, file: str, spec: DriveSpec, wanted: Options) -> None:
         self._session, self._drive, self._file = session, drive, file
-        self._spec, self._wanted, self._parameters = spec, wanted, drive.family.values.parameters
+        self._spec, self._wanted = spec, wanted
         self._settings = _tables(spec).wanted(spec)
         self._program = _tables(spec).program(spec)
         programs = drive.family.programs
@@ -78,6 +78,10 @@ class _Replacement:
     @property
     def _name(self) -> str:
         return self._session.display_name(self._drive)
+
+    @property
+    def _parameters(self) -> Parameters:
+        return self._drive.family.values.parameters
 
     async def run(self) -> None:
         """Read, show, ask, write, verify."""

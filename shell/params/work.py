@@ -158,9 +158,9 @@ async def save(workspace: Workspace, target: str) -> None:
     """Have drives keep their present settings, after a question. Raises Diagnostic where it is not agreed to."""
 
     async def keep(drive: Drive) -> None:
-        family, who = drive.family.values.parameters, workspace.display_name(drive)
-        await workspace.questions.confirm(f"'{family.saving}' keeps all present settings over power-off", who)
-        await transferring(drive, family.save())
+        saving, who = drive.family.values.parameters.saving, workspace.display_name(drive)
+        await workspace.questions.confirm(f"'{saving}' keeps all present settings over power-off", who)
+        await transferring(drive, drive.family.values.parameters.save())
         workspace.notify(f"{who}: its settings are saved")
 
     await each(workspace, targets(workspace, target), keep)
@@ -278,7 +278,7 @@ async def restore(session: Session, drive: Drive, file: files.SettingsFile, opti
         what = f"has the settings of an {file.product}, and {who} is an {drive.product}; nothing was sent"
         raise Diagnostic(what, file.path, "--other-product restores what both have")
     present = await files.read(session, drive, "reading")
-    wanted = _values(present, file, options, who)
+    wanted, family = _values(present, file, options, who), drive.family.values.parameters
     try:
         permission = Permission(options.named, options.communication)
         plan = family.plan(present, wanted.values, permission)

@@ -42,8 +42,8 @@ Start = Callable[[str], Procedure[None]]
 class Debugger:
     """Observation of one drive's program. Its methods raise what the conversations of `Debugging` raise."""
 
-    def __init__(self, session: Session, drive: Drive, debugging: Debugging) -> None:
-        self._session, self._drive, self._debugging = session, drive, debugging
+    def __init__(self, session: Session, drive: Drive) -> None:
+        self._session, self._drive = session, drive
         self._listing = Listing(session.settings.state, drive.programs)
         self._commands = -1
         """The commands to the drive when the listing was read, ours included: after another one it is read again."""
@@ -64,6 +64,12 @@ class Debugger:
         self._sight = Sight(session, drive)
         self._checks: set[asyncio.Task[None]] = set()
         self._unsubscribe = session.subscribe(self._notice)
+
+    @property
+    def _debugging(self) -> Debugging:
+        found = self._drive.family.debugging
+        assert found is not None
+        return found
 
     # Starting
 
@@ -329,10 +335,9 @@ def of(session: Session, drive: Drive) -> Debugger:
     found = debuggers.get(drive)
     if isinstance(found, Debugger):
         return found
-    debugging = drive.family.debugging
-    if debugging is None:
+    if drive.family.debugging is None:
         raise Inexpressible(f"{session.display_name(drive)}: programs of its family cannot be observed")
-    made = debuggers[drive] = Debugger(session, drive, debugging)
+    made = debuggers[drive] = Debugger(session, drive)
     return made
 
 

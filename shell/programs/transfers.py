@@ -18,6 +18,7 @@ from multidrop.base.errors import Diagnostic, Differs, DriveError, Refused
 from multidrop.base.files import SourceLine, check_program_text, program_text_of
 from multidrop.base.text import counted
 from multidrop.dialects.families import correct_in, program_languages
+from multidrop.dialects.family import Programs
 from multidrop.dialects.program_files import LOCKED, Difference, Held, errors, in_order, refuse
 from multidrop.drives.drive import Drive, still
 from multidrop.shell import motions
@@ -138,8 +139,11 @@ class _Download:
     def __init__(self, session: Session, drive: Drive, file: str, wanted: Wanted) -> None:
         self._session, self._drive = session, drive
         self._file, self._wanted = file, wanted
-        self._programs = drive.programs
         self._name = session.display_name(drive)
+
+    @property
+    def _programs(self) -> Programs:
+        return self._drive.programs
 
     async def run(self, text: str, lines: Sequence[SourceLine]) -> None:
         """Do all of it. Raises Diagnostic for an unknown label to run."""

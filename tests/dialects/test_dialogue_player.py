@@ -8,13 +8,13 @@ import pytest
 
 from multidrop.base.errors import Refused
 from multidrop.families.pmx.host.codec import Pmx, PmxState
-from multidrop.families.pmx.host.family import PMX
+from multidrop.families.pmx.host.family import PmxFamily
 from tests.support.dialogues import blocks, played, shown, written
 
 TEXT = """\
 == A position is read
 $ it = PmxState(Pmx(), '00')
-$ PMX.perform(it, 'PX')
+$ PmxFamily(it).perform('PX')
 > 'PX' PRINT expect='(?![OK]*$).*' b'@00PX\\r'
 < b'10\\r'
   DONE lines=('10') acknowledged=True
@@ -22,14 +22,14 @@ $ PMX.perform(it, 'PX')
 
 == Silence
 $ it = PmxState(Pmx(), '00')
-$ PMX.perform(it, 'X5')
+$ PmxFamily(it).perform('X5')
 > 'X5' COMMAND expect='OK' b'@00X5\\r'
 < nothing
   TIMEOUT
 ! NoAnswer: 00 does not reply: it is not known whether 'X5' was executed; it was sent once
 * reply_pending: False, True
 """
-NAMES = {"PMX": PMX, "PmxState": PmxState, "Pmx": Pmx, "Refused": Refused, "replace": replace}
+NAMES = {"PmxFamily": PmxFamily, "PmxState": PmxState, "Pmx": Pmx, "Refused": Refused, "replace": replace}
 
 
 def play(text):

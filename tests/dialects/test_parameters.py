@@ -6,7 +6,7 @@ from multidrop.base.errors import Diagnostic
 from multidrop.dialects.families import family_of
 from multidrop.dialects.values import COMMUNICATION, Permission, Reading, Readings, same
 from multidrop.families.lexium.host.modbus.codec import Modbus, ModbusState
-from multidrop.families.lexium.host.modbus.family import MODBUS
+from multidrop.families.lexium.host.modbus.family import ModbusFamily
 from multidrop.families.lexium.manual import parameters as mcode
 from multidrop.families.lexium.manual.modbus.registers import REGISTERS
 from multidrop.families.pmx.host import values as pmx
@@ -110,7 +110,7 @@ def modbus_drive(**values):
 
 def test_registers_are_read_without_er_and_what_has_none_is_listed():
     state, far = modbus_drive(VM=512000, EF=1, ER=65)
-    found = talk(far, MODBUS.values.parameters.read(state, lambda done, total: None))
+    found = talk(far, ModbusFamily(state).values.parameters.read(lambda done, total: None))
     assert found.values["VM"] == 512000 and far.get("ER") == 65
     listed = dict(found.unread)
     assert all(name in found.values or name in listed for name in (each.name for each in mcode.settings("LMDCE")))
@@ -121,10 +121,10 @@ def test_a_plan_over_modbus_has_the_order_of_mcode_and_leaves_out_what_no_regist
     state, _ = modbus_drive()
     present = held(VI=1000, VM=768000, A=1000000, D5=0, MS=256)
     wanted = {"VM": 500, "VI": 100, "A": 70, "AJ": 5, "D5": 999}
-    made = MODBUS.values.parameters.plan(state, present, wanted, Permission())
+    made = ModbusFamily(state).values.parameters.plan(present, wanted, Permission())
     assert steps(made) == ["VI=100", "VM=500"]
     assert {name for name, _ in made.impossible} == {"A", "AJ", "D5"}
 
 
 def test_every_family_of_drives_reads_parameters():
-    assert all(family_of(each).values.parameters is not None for each in (Modbus(), MODBUS.codec))
+    assert all(family_of(ModbusState(each)).values.parameters.language for each in (Modbus(), ModbusFamily.codec))

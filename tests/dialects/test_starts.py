@@ -99,7 +99,7 @@ def test_two_lines_have_started_what_either_has(one, two):
     ],
 )
 def test_what_can_only_end_motion(name, text, ends):
-    assert FAMILIES[name].guards.only_ends(text) is ends
+    assert FAMILIES[name].only_ends(text) is ends
 
 
 @given(st.sampled_from([word for word in (*MNEMONICS, *MDRIVE) if word[0].isalpha()]))

@@ -69,7 +69,7 @@ NOT_TAKEN = {
 @pytest.mark.parametrize(("family", "line", "found"), TAKEN)
 def test_what_a_line_takes(family, line, found):
     state = FAMILIES[family].new_state(FAMILIES[family].codec, "1")
-    fields = FAMILIES[family].units.fields(state, line)
+    fields = FAMILIES[family](state).units.fields(line)
     assert [(each.axis, each.takes, each.moves) for each in fields] == found
     assert all(line[each.start : each.stop].strip("{}")[0] in "-0123456789" for each in fields)
 
@@ -77,16 +77,16 @@ def test_what_a_line_takes(family, line, found):
 @pytest.mark.parametrize("family", NOT_TAKEN)
 def test_any_other_place_takes_none(family):
     state = FAMILIES[family].new_state(FAMILIES[family].codec, "1")
-    assert [line for line in NOT_TAKEN[family] if FAMILIES[family].units.fields(state, line)] == []
+    assert [line for line in NOT_TAKEN[family] if FAMILIES[family](state).units.fields(line)] == []
 
 
 def test_motors_of_a_module_are_axes():
     state = TmclState(Tmcl(), "1")
     state.motors_counted(3)
-    units = FAMILIES["tmcl"].units
-    assert list(units.axes(state)) == ["0", "1", "2"]
-    assert [each.axis for each in units.fields(state, "MVP ABS, 2, {1 mm}")] == ["2"]
-    assert units.reads(state, "GAP 1, 2") == ("2", Takes.PLACE) and units.disturbs(state, "SAP 140, 1, 4") == ("1",)
+    units = FAMILIES["tmcl"](state).units
+    assert list(units.axes()) == ["0", "1", "2"]
+    assert [each.axis for each in units.fields("MVP ABS, 2, {1 mm}")] == ["2"]
+    assert units.reads("GAP 1, 2") == ("2", Takes.PLACE) and units.disturbs("SAP 140, 1, 4") == ("1",)
 
 
 def test_lines_after_which_positions_count_from_elsewhere():
@@ -116,12 +116,13 @@ def first_request(family, line):
     address = {"mcode": "a", "modbus": "", "pmx": "00", "tmcl": "1"}[family]
     state = record.new_state(record.codec, address)
     state.identified("LMDCE" if family == "modbus" else "TMCM-1140" if family == "tmcl" else "LMDCM", "")
-    return next(record.perform(state, line))
+    return next(record(state).perform(line))
 
 
 @pytest.mark.parametrize("family", SETS)
 def test_requests_after_which_a_count_may_have_another_length(family):
-    recounts = FAMILIES[family].units.recounts
+    record = FAMILIES[family]
+    recounts = record(record.new_state(record.codec, "")).units.recounts
     assert [line for line in SETS[family] if not recounts(first_request(family, line))] == []
     assert [line for line in LEAVES[family] if recounts(first_request(family, line))] == []
 
@@ -131,4 +132,4 @@ def test_a_register_that_is_written_by_its_number_counts_as_its_word():
     for address, values, counts in ((0x48, [128], True), (0x47, [0, 128], True), (0x87, [128], False)):
         state = record.new_state(record.codec, "")
         state.identified("LMDCE", "")
-        assert record.units.recounts(next(record.registers.write(state, address, values))) is counts
+        assert record(state).units.recounts(next(record(state).registers.write(address, values))) is counts

@@ -7,14 +7,14 @@ from dataclasses import replace
 import pytest
 
 from multidrop.dialects import DriveState, Kind
-from multidrop.dialects.families import FAMILIES
 from multidrop.drives.counting import Counting
 from multidrop.families.lexium.host.mcode.codec import MCode
 from multidrop.families.lexium.host.mcode.state import MCodeState
+from multidrop.families.lexium.host.mcode.units import MCodeUnits
 from multidrop.families.lexium.host.modbus.codec import Modbus, ModbusState
 
 ACCEPTED = (("MS", "256"), ("EE", "0"))
-UNITS = FAMILIES["mcode"].units
+UNITS = MCodeUnits(MCodeState(MCode()))
 
 
 def scaled() -> tuple[Counting, MCodeState]:

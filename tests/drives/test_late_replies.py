@@ -14,7 +14,7 @@ from multidrop.dialects import End, Kind, Reply, Request
 from multidrop.drives.events import Unsolicited
 from multidrop.drives.line import Finished, Line, Write
 from multidrop.families.lexium.host.mcode.codec import MCode
-from multidrop.families.lexium.host.mcode.family import MCODE
+from multidrop.families.lexium.host.mcode.family import MCodeFamily
 from multidrop.families.lexium.host.mcode.framing import sealed
 from multidrop.families.lexium.host.mcode.state import MCodeState
 from multidrop.families.pmx.host.codec import Pmx
@@ -67,7 +67,7 @@ class Two:
     def _frame(self, text: str) -> bytes:
         """What the host sent to b, which was the same that it will send to a; b does not reply."""
         other = MCodeState(self.mode, "b", "b")
-        procedure = ProcedureRunner(MCODE.perform(other, text))
+        procedure = ProcedureRunner(MCodeFamily(other).perform(text))
         assert procedure.request is not None
         self.line.ask(procedure.request)
         [write] = [event for event in self.line.events(0.0) if isinstance(event, Write)]
@@ -78,7 +78,7 @@ class Two:
         return write.data.removeprefix(b"~\n")
 
     def ask(self, text: str) -> None:
-        self.procedure = ProcedureRunner(MCODE.perform(self.state, text))
+        self.procedure = ProcedureRunner(MCodeFamily(self.state).perform(text))
         self._next()
         self.coming["b"] = self.late
 
@@ -229,7 +229,7 @@ def test_a_programs_line_that_has_lost_its_end_does_not_run_into_the_answer(em, 
 def test_a_list_that_another_drives_answer_may_stand_in_is_not_taken():
     two = Two(1, 0, "PR R1", True)
     two.coming["b"] = b""
-    talk = MCODE.perform(two.state, "PR AL")
+    talk = MCodeFamily(two.state).perform("PR AL")
     request = next(talk)
     two.ticket = two.line.ask(request)
     ended = two.line.events(two.now)

@@ -7,7 +7,7 @@ or as a program's, and nothing is executed twice. Without a checksum a digit may
 import pytest
 
 from multidrop.base.errors import DriveError, NoAnswer
-from multidrop.families.lexium.host.mcode.family import MCODE
+from multidrop.families.lexium.host.mcode.family import MCodeFamily
 from multidrop.simulator.cell.spec import Faults
 from tests.support.faults import disturb
 from tests.support.mcode_drives import Desk
@@ -109,7 +109,7 @@ def test_an_ack_after_a_false_nak_is_not_taken_for_that_of_another_drive(bench, 
     receive = desk.bench.wire.receive
     desk.bench.wire.receive = lambda data, now: None if b"MR 200" in data else receive(data, now)
     a, b = desk.knowns
-    first, second = ProcedureRunner(MCODE.perform(a, "MR 100")), ProcedureRunner(MCODE.perform(b, other))
+    first, second = ProcedureRunner(MCodeFamily(a).perform("MR 100")), ProcedureRunner(MCodeFamily(b).perform(other))
     failures = run_all(desk, [first, second])
     assert "an ACK came later: it is not known whether 'MR 100' was executed" in failures[first]
     assert len(desk.witnesses[0].executed("MR 100")) == 1 and not desk.witnesses[1].executed(other)
@@ -120,7 +120,7 @@ def test_a_drive_that_refuses_is_asked_why_before_another_one_acts(bench):
     """The other one's ACK might be its own, late: both lines would be reported as not known."""
     desk = Desk(bench, (1, 1), (1, 1), party=True)
     a, b = desk.knowns
-    first, second = ProcedureRunner(MCODE.perform(a, "VM=-1")), ProcedureRunner(MCODE.perform(b, "MR 200"))
+    first, second = ProcedureRunner(MCodeFamily(a).perform("VM=-1")), ProcedureRunner(MCodeFamily(b).perform("MR 200"))
     failures = run_all(desk, [first, second])
     assert "refused 'VM=-1': error 21" in failures[first] and second not in failures
     assert not b.notes and desk.witnesses[1].executed("MR 200")

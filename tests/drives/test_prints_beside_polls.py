@@ -133,7 +133,7 @@ def test_a_late_reply_to_a_signed_request_is_no_line_of_a_program(bench, priorit
     wired.wait(0.1)
     disturb(wired.wire, Faults(delay=(0.5, 0.5)))
     state = MCodeState(MCode(em=1, party=True, escape=1), "a", "a", "LMDCM")
-    asked = ProcedureRunner(family_of(state.codec).motion(state, priority)).request
+    asked = ProcedureRunner(family_of(state).motion(priority)).request
     assert asked is not None
     wired.line.ask(asked)
     wired.events()

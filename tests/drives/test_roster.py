@@ -10,7 +10,6 @@ import pytest
 
 from multidrop.base.errors import DriveError, NoAnswer
 from multidrop.dialects import Hints, Motion, Owed
-from multidrop.dialects.families import FAMILIES
 from multidrop.drives.events import Restarted
 from multidrop.drives.motion_record import MotionRecord
 from multidrop.drives.roster import PAUSE, Restarts, Roster, _compare, _shown, _text
@@ -597,9 +596,7 @@ async def test_what_is_to_be_remembered_goes_to_the_keeper():
     kept: list[Any] = []
     roster._keeper = SimpleNamespace(remember=kept.append)  # type: ignore[assignment]
     roster.remember()
-    remember = FAMILIES["mcode"].remember
-    assert remember is not None
-    assert kept == [{"a": remember(roster.drives["a"].state)}]
+    assert kept == [{"a": roster.drives["a"].family.remember()}]
     roster.drives = {}
     roster.remember()
     assert len(kept) == 1

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from multidrop.families.lexium.host.mcode.family import MCODE
+from multidrop.families.lexium.host.mcode.family import MCodeFamily
 from multidrop.families.lexium.manual.program_file import read
 from tests.conftest import Bench
 from tests.support.front_door import Home
@@ -45,7 +45,9 @@ def test_a_tab_is_sent_stored_listed_and_printed_as_it_is(bench: Callable[..., B
     desk = Desk(bench, (em, 0))
     assert desk.type('PR "a\tb",\tR1') == ("a\tb0",)
     assert b'PR "a\tb", R1,"~"\r' in desk.bench.written
-    desk.bench.run(MCODE.programs.download(desk.state, read(TABLE, "x"), None, lambda done, total: None), desk.state)
+    desk.bench.run(
+        MCodeFamily(desk.state).programs.download(read(TABLE, "x"), None, lambda done, total: None), desk.state
+    )
     assert ['PR "pos\t", P, "\terr\t", ER' in line for line in desk.type("L")].count(True) == 1
     desk.type("EX Ga")
     desk.bench.wait(2.0)
@@ -71,7 +73,9 @@ def test_a_file_of_settings_is_a_warning(check: Check) -> None:
 
 def test_a_file_of_settings_is_downloaded(bench: Callable[..., Bench]) -> None:
     desk = Desk(bench, (0, 0))
-    desk.bench.run(MCODE.programs.download(desk.state, read(SETTINGS, "x"), None, lambda done, total: None), desk.state)
+    desk.bench.run(
+        MCodeFamily(desk.state).programs.download(read(SETTINGS, "x"), None, lambda done, total: None), desk.state
+    )
     assert desk.type("PR VM, Q1") == ("4000007",) and desk.state.codec.em == 1
 
 

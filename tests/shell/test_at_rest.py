@@ -12,7 +12,7 @@ import pytest
 from multidrop.base.errors import NoAnswer
 from multidrop.dialects import Motion, Priority
 from multidrop.dialects.families import FAMILIES
-from multidrop.dialects.motions import Outcome
+from multidrop.dialects.motions import Motions, Outcome
 from multidrop.drives.drive import Drive, still
 from multidrop.drives.events import Sample
 from multidrop.drives.stopping import Fate
@@ -39,14 +39,23 @@ class Moving:
     def __init__(self, monkeypatch: pytest.MonkeyPatch, family: str, *false: int, lost: Container[int] = ()) -> None:
         self.false, self.lost = set(false), lost
         self.read = 0
-        own = replace(
-            FAMILIES[family],
-            motion=self._motion,
-            moving=self._moving,
-            busy=self._busy,
-            motions_at="multidrop.dialects.motions:NO_MOTIONS",
-        )
-        monkeypatch.setattr(Drive, "family", property(lambda drive: own, lambda drive, found: None), raising=False)
+        mover = self
+
+        class Own(FAMILIES[family]):  # type: ignore[misc]
+            def motion(self, priority: Priority) -> Iterator[Any]:
+                return mover._motion(self.state, priority)
+
+            def moving(self) -> Iterator[Any]:
+                return mover._moving(self.state)
+
+            def busy(self) -> Iterator[Any]:
+                return mover._busy(self.state)
+
+            @property
+            def motions(self) -> Motions:
+                return Motions(self.state)
+
+        monkeypatch.setattr(Drive, "family", property(lambda drive: Own(drive.state)))
 
     def _velocity(self) -> int:
         self.read += 1

@@ -290,7 +290,7 @@ def test_faults_of_the_driver_of_a_module_are_an_error_with_its_cause():
     state = family.new_state(family.codec, "1")
     state.motors_counted(2)
     for flags, why in ((0, ""), (1 << 1, "the driver is shut down: overtemperature"), (1, ""), ("absent", "")):
-        fine, found = family.values.fold(state, {"DRIVER_FLAGS 0": 0, "DRIVER_FLAGS 1": flags})
+        fine, found = family(state).values.fold({"DRIVER_FLAGS 0": 0, "DRIVER_FLAGS 1": flags})
         assert (fine.error, found.error, found.error_text) == (0, UNREAD if why else 0, why)
 
 

@@ -209,7 +209,7 @@ async def test_a_stop_by_another_host_is_a_failure(tmp_path: Path) -> None:
         async def other() -> None:
             await asyncio.sleep(0.3)
             drive = session.drive()
-            await drive.run(drive.family.perform(drive.state, "SL 0"))  # past everything that the session records
+            await drive.run(drive.family.perform("SL 0"))  # past everything that the session records
 
         task = asyncio.get_running_loop().create_task(other())
         failure = await failed(session, "MA 900000", "/wait stopped", "R1=777")
@@ -237,7 +237,7 @@ async def test_an_old_error_of_a_drive_at_rest_is_no_failure(tmp_path: Path) -> 
         drive = session.drive()
         device_error = "MA 90000"  # into the active limit: refused, and the flag is left set by another host
         with pytest.raises(DriveError):
-            await drive.run(drive.family.perform(drive.state, device_error))
+            await drive.run(drive.family.perform(device_error))
         await sent(session, "/wait stopped", "R1=777", "MA 100", "/wait stopped")
         assert await value(session, "P") == 100
 
@@ -383,7 +383,7 @@ async def test_a_relative_move_on_the_way_has_no_known_target(tmp_path: Path) ->
 async def test_a_wait_for_another_ones_motion_never_reads_the_error(tmp_path: Path) -> None:
     async with at_limit(tmp_path) as session:
         drive = session.drive()
-        await drive.run(drive.family.perform(drive.state, "MA 90000"))  # as another host's line
+        await drive.run(drive.family.perform("MA 90000"))  # as another host's line
         with pytest.raises(MotionFailed, match="error flag"):
             await sent(session, "/wait stopped")
         assert await value(session, "EF") == 1
@@ -393,7 +393,7 @@ async def test_a_wait_for_another_ones_motion_never_reads_the_error(tmp_path: Pa
 async def test_an_error_flag_from_before_is_told_and_is_no_failure(tmp_path: Path) -> None:
     async with at_limit(tmp_path) as session:
         drive = session.drive()
-        await drive.run(drive.family.perform(drive.state, "MA 90000"))
+        await drive.run(drive.family.perform("MA 90000"))
         await asyncio.sleep(5)
         await sent(session, "/wait stopped")
         assert any("its error flag was set before" in each for each in noted(session))

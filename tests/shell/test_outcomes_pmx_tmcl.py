@@ -103,7 +103,7 @@ async def test_a_stop_by_another_host_is_a_failure(tmp_path: Path, line: str) ->
         async def other() -> None:
             await asyncio.sleep(0.5)
             each = session.drive()
-            await each.run(each.family.perform(each.state, "STOPX"))  # past everything that the session records
+            await each.run(each.family.perform("STOPX"))  # past everything that the session records
 
         task = asyncio.get_running_loop().create_task(other())
         failure = await failed(session, "ABS", line, "/wait stopped", "V1=777")
@@ -192,7 +192,7 @@ async def test_a_stop_by_another_master_is_a_failure(tmp_path: Path, line: str) 
         async def other() -> None:
             await asyncio.sleep(0.5)
             each = session.drive()
-            await each.run(each.family.perform(each.state, "MST 0"))
+            await each.run(each.family.perform("MST 0"))
 
         task = asyncio.get_running_loop().create_task(other())
         failure = await failed(session, "SAP 194, 0, 500", "SAP 4, 0, 20000", line, "/wait stopped", "SGP 0, 2, 777")

@@ -303,7 +303,7 @@ async def other(session: Session, line: str) -> None:
     """Send a line past everything that the session records, as another host does."""
     await asyncio.sleep(0.3)
     each = session.drive()
-    await each.run(each.family.perform(each.state, line))
+    await each.run(each.family.perform(line))
 
 
 @pytest.mark.parametrize(("line", "stop"), [("SL 5000", "SL 0"), ("SL -5000", "MA 0")])

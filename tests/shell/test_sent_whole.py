@@ -151,8 +151,8 @@ def test_any_typed_text_is_sent_whole_or_refused(name: str, text: str) -> None:
         line = parse(text)
         if not isinstance(line, DriveLine) or line.address is not None:
             return
-        family.check_line(state, line.text)
-        request = _first(family.perform(state, line.text))
+        family(state).check_line(line.text)
+        request = _first(family(state).perform(line.text))
     except (DriveError, Diagnostic) as error:
         assert "\n" not in str(error).replace(text.strip(), "")
         return
@@ -189,7 +189,7 @@ def test_many_texts_of_words_are_sent_whole_or_refused() -> None:
                 line = parse(text)
                 if not isinstance(line, DriveLine) or line.address is not None:
                     continue
-                family.check_line(state, line.text)
+                family(state).check_line(line.text)
                 request = family.codec.request(state.address, line.text)  # type: ignore[attr-defined]
             except (DriveError, Diagnostic):
                 continue

@@ -145,7 +145,7 @@ async def test_a_setting_that_the_scale_rests_on_ends_the_units_in_every_output(
 ) -> None:
     async with CellSession(tmp_path, floor) as shop:
         drive, units = next(iter(shop.session.buses["press"].drives.values())), shop.session.units
-        axis = drive.family.units.axes(drive.state)[0]
+        axis = drive.family.units.axes()[0]
         assert "in units" in "\n".join(await output(shop, f"/status {drive.address}"))
         await shop.session.run(to + change)
         assert any("its scale rests on that, so its own numbers are shown" in each for each in shop.told(Notified))

@@ -4,7 +4,7 @@ import asyncio
 from dataclasses import dataclass, field
 
 from multidrop.dialects import Motion
-from multidrop.dialects.families import DEFAULT, FAMILIES
+from multidrop.dialects.families import family_of
 from multidrop.drives.motion_record import MotionRecord
 from multidrop.drives.stopping import Halt
 from multidrop.families.lexium.host.mcode.codec import MCode
@@ -20,8 +20,7 @@ class FakeDrive:
     version: str = "6.002"
     programming: bool = False
     stores: bool = False
-    family: object = FAMILIES[DEFAULT]
-    state: object = field(default_factory=lambda: MCodeState(MCode()))
+    state: MCodeState = field(default_factory=lambda: MCodeState(MCode()))
 
     seen = running = noted = None
     commands = requests = starting = stops = 0
@@ -34,6 +33,10 @@ class FakeDrive:
     @property
     def link(self):
         return self.bus
+
+    @property
+    def family(self):
+        return family_of(self.state)
 
     @property
     def codec(self):

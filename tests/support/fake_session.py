@@ -19,7 +19,7 @@ from textual.pilot import Pilot
 
 from multidrop.base.errors import Diagnostic, DriveError, Stopped, TransportLost
 from multidrop.dialects import DriveState
-from multidrop.dialects.families import FAMILIES
+from multidrop.dialects.families import FAMILIES, family_of
 from multidrop.dialects.family import Family
 from multidrop.dialects.units import Basis
 from multidrop.dialects.units import scale as scale_of
@@ -59,11 +59,12 @@ class FakeDrive:
 
     @property
     def family(self) -> Family:
-        return FAMILIES["mcode"]
+        return family_of(self.state)
 
     @property
     def state(self) -> DriveState:
-        state: DriveState = self.family.new_state(self.family.codec, self.address)
+        family = FAMILIES["mcode"]
+        state = family.new_state(family.codec, self.address)
         state.reference_lost(self.unreferenced)
         return state
 

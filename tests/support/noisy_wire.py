@@ -99,7 +99,7 @@ class Crowd:
         return result
 
     def print_judged(self, state: DriveState, text: str, name: str, held: int):
-        result = yield from self.talk(family_of(state.codec).perform(state, text), state)
+        result = yield from self.talk(family_of(state).perform(text), state)
         if isinstance(result, DriveError):
             return
         shown = {
@@ -128,7 +128,7 @@ class Crowd:
         return ""
 
     def command_judged(self, state: DriveState, text: str, name: str):
-        result = yield from self.talk(family_of(state.codec).perform(state, text), state)
+        result = yield from self.talk(family_of(state).perform(text), state)
         times = len(self.witnesses[name].executed(text))
         if times > 1:
             self.told.misdeeds.append(f"{self.bench.now:.3f} @{name} {text}: executed {times} times")
@@ -137,7 +137,7 @@ class Crowd:
 
     def poll_judged(self, state: DriveState, name: str):
         """Each drive stands at a place of its own."""
-        result = yield from self.talk(family_of(state.codec).motion(state, Priority.POLL), state)
+        result = yield from self.talk(family_of(state).motion(Priority.POLL), state)
         if isinstance(result, DriveError):
             return
         places = {axis.position for axis in result}

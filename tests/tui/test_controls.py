@@ -101,15 +101,14 @@ def test_between_two_moves_there_is_always_a_reading_at_rest(presses: list[tuple
 
 def test_every_family_has_every_control_or_the_reason_for_its_absence() -> None:
     for family in FAMILIES.values():
-        state = family.new_state(family.codec, "1")
-        controls = family.values.controls(state, "x" if family.name == "pmx" else "")
+        controls = family(family.new_state(family.codec, "a")).values.controls("x" if family.name == "pmx" else "")
         assert set(controls) == set(NAMES)
         assert all(bool(each.lines) != bool(each.absent) for each in controls.values())
 
 
 def test_a_controllers_moves_say_first_that_numbers_are_positions() -> None:
     family = FAMILIES["pmx"]
-    controls = family.values.controls(family.new_state(family.codec, "00"), "y")
+    controls = family(family.new_state(family.codec, "00")).values.controls("y")
     assert controls[BY].filled(by=-10, to=90) == controls[TO].filled(to=90) == ("ABS", "Y90")
 
 

@@ -75,12 +75,12 @@ def test_an_edit_is_planned_by_the_family() -> None:
     family = FAMILIES["mcode"]
     state = family.new_state(family.codec, "a")
     state.identified("LMDCM", "LMDCM 6.002")
-    assert edit(family.values.parameters, state, FOUND, "VM", 500_000).lines == ("VM=500000",)
+    assert edit(family(state).values.parameters, FOUND, "VM", 500_000).lines == ("VM=500000",)
     with pytest.raises(Diagnostic, match="VM"):
-        edit(family.values.parameters, state, FOUND, "VM", 900)
+        edit(family(state).values.parameters, FOUND, "VM", 900)
     with pytest.raises(Diagnostic, match="already"):
-        edit(family.values.parameters, state, FOUND, "VM", 600_000)
-    assert "communication" in edit(family.values.parameters, state, FOUND, "DN", "b").warning
+        edit(family(state).values.parameters, FOUND, "VM", 600_000)
+    assert "communication" in edit(family(state).values.parameters, FOUND, "DN", "b").warning
 
 
 # The page

@@ -10,7 +10,7 @@ import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from multidrop.base.errors import Diagnostic
 from multidrop.dialects.values import (
@@ -119,7 +119,7 @@ class Edit:
     warning: str = ""
 
 
-def edit(parameters: Parameters, state: Any, present: Readings, name: str, value: Value) -> Edit:
+def edit(parameters: Parameters, present: Readings, name: str, value: Value) -> Edit:
     """Plan the lines that set one value. Raises Diagnostic for a value that the drive refuses."""
     made = parameters.plan(present, {name: value}, ORDINARY)
     warning = "; ".join(reason for _, reason in made.withheld)
@@ -434,7 +434,7 @@ class ParametersPage(ListPage, SendingPage):
         drive, present = self.host.session.selected, self._settings()
         if drive is None or present is None:
             raise Diagnostic("the settings of the drive are not read", name, "/params read reads them")
-        planned: Edit = edit(drive.family.values.parameters, drive.state, present, name, parsed(text))
+        planned: Edit = edit(drive.family.values.parameters, present, name, parsed(text))
         self._close("")
         self.offer(EDIT, planned.lines)
         warning = f" - {planned.warning}" if planned.warning else ""

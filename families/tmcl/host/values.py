@@ -222,7 +222,7 @@ def parts(state: TmclState, facts: Facts) -> Sequence[Part]:
         asked = [*STATE, *(axis for axis in some if facts.get(_key(axis, motor)) != ABSENT)]
         found.append(Part(f"motor {motor}", partial(_parameters, state, motor=motor, wanted=asked)))
         for axis in SETTINGS:
-            found.append(Part(_key(axis, motor), partial(_parameters, motor=motor, wanted=(axis,)), slow=True))
+            found.append(Part(_key(axis, motor), partial(_parameters, state, motor=motor, wanted=(axis,)), slow=True))
     return found
 
 

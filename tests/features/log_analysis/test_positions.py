@@ -163,9 +163,9 @@ REPLIES = {
 def test_no_bytes_in_a_log_break_the_decoding(name: str, polls: list[tuple[bool, bytes, int]]) -> None:
     family = FAMILIES[name]
     state = family.new_state(family.codec, {"pmx": "00", "tmcl": "1"}.get(name, ""))
-    first = ProcedureRunner(family.motion(state, Priority.POLL)).request
+    first = ProcedureRunner(family(state).motion(Priority.POLL)).request
     assert first is not None
-    decoding = Decoding(cast(Drive, SimpleNamespace(family=family, state=state)))
+    decoding = Decoding(cast(Drive, SimpleNamespace(state=state)))
     for known, noise, cut in polls:
         sent = first.codec.encode(first) if known else noise
         poll = Exchange("log:1", AT, "bus", "", sent, REPLIES[name][:cut] + noise)

@@ -177,7 +177,7 @@ async def test_a_drive_that_was_only_silent_is_not_restarted(tmp_path: Path, com
 )
 def test_the_lines_that_give_a_reference(family: str, line: str, found: tuple[str, bool] | None) -> None:
     record = FAMILIES[family]
-    given = record.referencing(record.new_state(record.codec, ""), line)
+    given = record(record.new_state(record.codec, "")).referencing(line)
     assert (None if given is None else (given.axis, given.homing)) == found
 
 

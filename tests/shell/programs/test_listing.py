@@ -7,13 +7,15 @@ from typing import Any
 
 import pytest
 
-from multidrop.dialects.families import FAMILIES
 from multidrop.dialects.program_files import Stored
+from multidrop.families.lexium.host.mcode.codec import MCode
+from multidrop.families.lexium.host.mcode.programs import MCodePrograms
+from multidrop.families.lexium.host.mcode.state import MCodeState
 from multidrop.shell.events import Phase, ProgramRead, ProgramSeen
 from multidrop.shell.program_listing import Listing, Sight
 from tests.support.cases import for_each
 
-PROGRAMS: Any = FAMILIES["mcode"].programs
+PROGRAMS: Any = MCodePrograms(MCodeState(MCode()))
 ROWS = tuple(Stored(at, text) for at, text in ((1, "LB G1"), (5, "MR 51200"), (12, "H"), (14, "MR -51200"), (21, "H"),
                                               (23, "BR G1"), (27, "E"), (100, "LB G2")))  # fmt: skip
 

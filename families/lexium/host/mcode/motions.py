@@ -233,7 +233,7 @@ class LexiumMotions(Motions):
         return (yield from self._unexplained(ending, evidence))
 
     def _unexplained(self, ending: Ending, evidence: Evidence) -> Procedure[Ending]:
-        """Judge a motion that ended short of its target, or that only a command ends: did the drive end it by itself?"""
+        """Judge a motion that ended short of its target, or that only a command ends: did the drive end it itself?"""
         free = yield from self.read((*FREE, "DE"))
         if not free.get("DE", 1):
             return replace(ending, outcome=Outcome.POWER, reason="its output bridges are off (DE=0)")

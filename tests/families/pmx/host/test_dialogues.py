@@ -12,17 +12,17 @@ from multidrop.dialects.scanning import Reach
 from multidrop.dialects.values import ORDINARY, Change, Permission, Plan, Readings
 from multidrop.families.pmx.host import codec, family, motions, operations, programs, units, values
 from multidrop.families.pmx.host.codec import Pmx, PmxState
-from multidrop.families.pmx.host.family import PMX
-from multidrop.families.pmx.host.motions import MOTIONS
-from multidrop.families.pmx.host.programs import DEBUGGING, PROGRAM_FILES
-from multidrop.families.pmx.host.units import UNITS
-from multidrop.families.pmx.host.values import ACTIONS, PARAMETERS, VALUES
+from multidrop.families.pmx.host.family import PmxFamily
+from multidrop.families.pmx.host.motions import PmxMotions
+from multidrop.families.pmx.host.programs import PmxDebugging, PmxPrograms
+from multidrop.families.pmx.host.units import PmxUnits
+from multidrop.families.pmx.host.values import PmxActions, PmxParameters, PmxValues
 from multidrop.families.pmx.manual import program_file
 from tests.support.dialogues import dialogue_tests
 
 USED = (
-    replace, Hints, Kind, Priority, Ending, Evidence, Move, MoveKind, Outcome, family, PMX, codec, motions, operations,
-    programs, units, values, MOTIONS, DEBUGGING, UNITS, ACTIONS, PARAMETERS, VALUES, Held, Stored, Reach, ORDINARY,
+    replace, Hints, Kind, Priority, Ending, Evidence, Move, MoveKind, Outcome, family, PmxFamily, codec, motions, operations,
+    programs, units, values, PmxMotions, PmxDebugging, PmxUnits, PmxActions, PmxParameters, PmxValues, Held, Stored, Reach, ORDINARY,
     Change, Permission, Plan, Readings,
 )  # fmt: skip
 """The names that calls in the files use."""
@@ -38,7 +38,7 @@ def alone():
 
 
 def type_(state, text):
-    return PMX.perform(state, text)
+    return PmxFamily(state).perform(text)
 
 
 def decoded(text, heard, **more):
@@ -58,7 +58,7 @@ def progress(shown):
 
 
 def download(state, text, shown=None, held=None):
-    return PROGRAM_FILES.download(state, source(text), held, progress([] if shown is None else shown))
+    return PmxPrograms(state).download(source(text), held, progress([] if shown is None else shown))
 
 
 def searched(found, **reach):

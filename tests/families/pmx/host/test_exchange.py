@@ -10,7 +10,7 @@ from multidrop.base.errors import Diagnostic, Inexpressible, NoAnswer, Refused
 from multidrop.dialects import End, Hints, Priority, Reply
 from multidrop.dialects.codec import copy_with
 from multidrop.families.pmx.host.codec import Pmx, PmxState
-from multidrop.families.pmx.host.family import PMX
+from multidrop.families.pmx.host.family import PmxFamily
 from multidrop.families.pmx.host.operations import identify
 from multidrop.families.pmx.manual import help, table
 from tests.support.paths import FACTS
@@ -46,7 +46,7 @@ def say(talk, far):
 
 def type_(text, far, known=None):
     known = known or PmxState(Pmx(), "00")
-    return say(PMX.perform(known, text), far)
+    return say(PmxFamily(known).perform(text), far)
 
 
 # On the wire
@@ -194,7 +194,7 @@ def test_silence_is_told_and_the_next_line_waits_for_a_mark():
 
 def test_after_a_damaged_reply_too_the_next_line_waits_for_a_mark():
     known, far = PmxState(Pmx(), "00"), Far()
-    procedure = ProcedureRunner(PMX.perform(known, "X1000"))
+    procedure = ProcedureRunner(PmxFamily(known).perform("X1000"))
     with pytest.raises(NoAnswer, match="it may have been executed and was not sent again"):
         procedure.answer(Reply((), end=End.DAMAGED))
     assert type_("PX", far, known) == ("10",)
@@ -222,7 +222,7 @@ def test_an_answer_that_may_be_anothers_is_made_sure_of():
 
 def test_a_poll_reads_both_axes_and_no_speed_of_one_that_rests():
     known, far = PmxState(Pmx(), "00"), Far(MSTX="4", PSX="-500", MSTY="128")
-    x, y = say(PMX.motion(known, Priority.POLL), far)
+    x, y = say(PmxFamily(known).motion(Priority.POLL), far)
     assert (x.axis, x.position, x.velocity, x.trouble) == ("x", 10, -500, "")
     assert (y.axis, y.position, y.velocity, y.trouble) == ("y", -20, 0, "plus limit error")
     assert b"@00PSY\r" not in far.sent and len(far.sent) == 5
@@ -230,32 +230,32 @@ def test_a_poll_reads_both_axes_and_no_speed_of_one_that_rests():
 
 def test_after_a_stop_the_speed_itself_is_read():
     known, far = PmxState(Pmx(), "00"), Far()
-    say(PMX.motion(known, Priority.OPERATOR), far)
+    say(PmxFamily(known).motion(Priority.OPERATOR), far)
     assert {b"@00PSX\r", b"@00PSY\r"} < set(far.sent)
 
 
 def test_a_doubtful_poll_is_made_sure_of_once():
     known, far = PmxState(Pmx(), "00"), Far(doubtful=[1, 2, 3, 4])
-    say(PMX.motion(known, Priority.POLL), far)
+    say(PmxFamily(known).motion(Priority.POLL), far)
     assert far.sent[4:] == [b"@00Q00001\r"]
 
 
 @pytest.mark.parametrize(("answers", "moving"), [({}, False), ({"MSTY": "2"}, True), ({"MSTX": "112"}, False)])
 def test_moving_is_what_makes_pulses(answers, moving):
     known = PmxState(Pmx(), "00")
-    assert say(PMX.moving(known), Far(**answers)) is moving
+    assert say(PmxFamily(known).moving(), Far(**answers)) is moving
 
 
 @pytest.mark.parametrize(("state", "busy"), [("0", False), ("1", True), ("2", False), ("4", False)])
 def test_busy_is_a_program_that_runs(state, busy):
     known = PmxState(Pmx(), "00")
-    assert say(PMX.busy(known), Far(SASTAT1=state)) is busy
+    assert say(PmxFamily(known).busy(), Far(SASTAT1=state)) is busy
 
 
 def test_status_in_words():
     known = PmxState(Pmx(), "00")
     far = Far(MSTX="17", MSTY="256", SLSY="10", SASTAT1="4", DI="129", DO="0", EO="2")
-    assert say(PMX.status(known), far) == (
+    assert say(PmxFamily(known).status(), far) == (
         "X: accelerating, plus limit switch on; StepNLoop off",
         "Y: at rest, minus limit error; StepNLoop error: stalled",
         "program 0: idle",
@@ -325,7 +325,7 @@ def test_raw_lines_are_written_and_read_back():
     known, done = PmxState(Pmx(), "00"), []
     far = Far(**{"SA0=PS0": "OK", "SA0": "PS0", "SA1=XX0": "OK", "SA1": "XX0"})
     lines = [Line(1, "SA0=PS0"), Line(2, "SA1=XX0")]
-    say(PMX.programs.download(known, lines, None, lambda at, total: done.append((at, total))), far)
+    say(PmxFamily(known).programs.download(lines, None, lambda at, total: done.append((at, total))), far)
     assert done == [(1, 2), (2, 2)] and far.sent[2:4] == [b"@00SA0=PS0\r", b"@00SA0\r"]
 
 
@@ -333,12 +333,12 @@ def test_anything_else_is_refused_before_something_is_written():
     known, far = PmxState(Pmx(), "00"), Far()
     with pytest.raises(Diagnostic, match="program:2:1: 'X1000' is not a compiled line"):
         say(
-            PMX.programs.download(known, [Line(1, "SA0=PS0"), Line(2, "X1000")], None, lambda at, total: None),
+            PmxFamily(known).programs.download([Line(1, "SA0=PS0"), Line(2, "X1000")], None, lambda at, total: None),
             far,
         )
     with pytest.raises(Refused, match="program 1 runs"):
         say(
-            PMX.programs.download(known, [Line(1, "SA0=PS0")], None, lambda at, total: None),
+            PmxFamily(known).programs.download([Line(1, "SA0=PS0")], None, lambda at, total: None),
             Far(SASTAT1="1"),
         )
     assert far.sent == []
@@ -347,7 +347,7 @@ def test_anything_else_is_refused_before_something_is_written():
 def test_a_line_that_was_not_kept_is_seen():
     known, far = PmxState(Pmx(), "00"), Far(**{"SA0=PS0": "OK", "SA0": "PS1"})
     with pytest.raises(NoAnswer, match="has 'PS1' at SA0"):
-        say(PMX.programs.download(known, [Line(1, "SA0=PS0")], None, lambda at, total: None), far)
+        say(PmxFamily(known).programs.download([Line(1, "SA0=PS0")], None, lambda at, total: None), far)
 
 
 def test_a_download_that_is_refused_half_way_says_what_is_stored():
@@ -355,13 +355,13 @@ def test_a_download_that_is_refused_half_way_says_what_is_stored():
     far = Far(**{"SA0=PS0": "OK", "SA0": "PS0", "SA1=XX0": "?SA1=XX0"})
     lines = [Line(1, "SA0=PS0"), Line(2, "SA1=XX0")]
     with pytest.raises(Refused, match=r"^line 2: .*; 1 of 2 lines are stored: the program in 00 is incomplete$"):
-        say(PMX.programs.download(known, lines, None, lambda at, total: None), far)
+        say(PmxFamily(known).programs.download(lines, None, lambda at, total: None), far)
 
 
 def test_a_listing_ends_where_nothing_is_stored():
     known = PmxState(Pmx(), "00")
     stored = {f"SA{n}": "" for n in range(40)} | {"SA0": "PS0", "SA2": "XX1"}
-    assert say(PMX.programs.listing(known, ""), Far(**stored)) == ("SA0=PS0", "SA1=", "SA2=XX1")
+    assert say(PmxFamily(known).programs.listing(""), Far(**stored)) == ("SA0=PS0", "SA1=", "SA2=XX1")
 
 
 # Tables

@@ -8,7 +8,7 @@ ONE, EVERY = PmxState(Pmx(), "00"), PmxState(Pmx(), "*")
 
 
 def named(state, text):
-    found = FAMILY.guards.find(state, text)
+    found = FAMILY(state).guard(text)
     return found.name if found else ""
 
 
@@ -22,7 +22,7 @@ def test_what_is_kept_and_what_changes_the_address_is_guarded():
         "DB=2": "DB",
     }.items():
         for form in (text, text.lower()):
-            assert named(ONE, form) == named(EVERY, form) == FAMILY.guards.word_of(form.strip()) == name, form
+            assert named(ONE, form) == named(EVERY, form) == FAMILY.word_of(form.strip()) == name, form
     for text in ("DN", "DB", "X1000", "SR0=1", "HSPD=1000", "STOP", "SA0=5", "nonsense"):
         assert named(ONE, text) == "", text
 

@@ -9,7 +9,7 @@ import pytest
 
 from multidrop.base.errors import Diagnostic
 from multidrop.dialects.families import correct_in
-from multidrop.families.pmx.host.family import PMX
+from multidrop.families.pmx.host.family import PmxFamily
 from multidrop.families.pmx.host.values import NAMES, RANGES, base
 from multidrop.families.pmx.manual import help, script_parser, table
 from multidrop.families.pmx.simulator.settings import REGISTERS, WINDOWS
@@ -106,13 +106,13 @@ def test_the_least_low_speed_of_each_window_is_in_the_help() -> None:
 
 
 def test_a_limit_error_names_the_line_that_clears_it_and_blocks_its_axis_only() -> None:
-    state = PMX.new_state(PMX.codec, "00")
+    state = PmxFamily.new_state(PmxFamily.codec, "00")
     facts = {"MSTX": 0, "MSTY": 0x80, "SLSX": 12, "SLSY": 12, "EO": 3, "SLX": 0, "SLY": 0}
-    one, other = PMX.values.fold(state, facts)
+    one, other = PmxFamily(state).values.fold(facts)
     assert (one.clears, one.blocked, one.error) == ("", "", 0)
     assert (other.clears, other.blocked) == ("CLRY", "plus limit error: CLRY clears it")
     assert other.error_name == "error"  # 128 is a bit and no number that help knows
-    one, _ = PMX.values.fold(state, {**facts, "SLX": 1, "SLSX": 9})
+    one, _ = PmxFamily(state).values.fold({**facts, "SLX": 1, "SLSX": 9})
     assert one.blocked == "StepNLoop error: too many corrections: CLRX clears it"
 
 

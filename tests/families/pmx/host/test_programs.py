@@ -121,7 +121,7 @@ def test_a_script_is_written_and_what_a_longer_one_has_left_is_erased() -> None:
     }
     state = PmxState(Pmx(), "00")
     assert programs.readable(held(programs.read(state, (), nothing), far)) == ("X1", "END")
-    assert held(programs.PROGRAM_FILES.upload(state, True), far) == ("SA0=CV1", "SA1=&X$1", "SA2=XX")
+    assert held(programs.PmxPrograms(state).upload(True), far) == ("SA0=CV1", "SA1=&X$1", "SA2=XX")
 
 
 def test_a_script_is_refused_by_anything_but_the_simulator_before_something_is_written() -> None:
@@ -147,5 +147,5 @@ def test_a_line_that_was_not_kept_names_its_line_of_the_file() -> None:
 
 def test_a_controller_without_a_program_says_so() -> None:
     with pytest.raises(Refused, match="00 holds no program"):
-        held(programs.PROGRAM_FILES.upload(PmxState(Pmx(), "00"), False), Far())
+        held(programs.PmxPrograms(PmxState(Pmx(), "00")).upload(False), Far())
     assert programs.readable(held(programs.read(PmxState(Pmx(), "00"), (), nothing), Far())) == ()

@@ -13,11 +13,11 @@ from multidrop.dialects.scanning import Reach
 from multidrop.dialects.values import ORDINARY, Change, Permission, Plan, Readings
 from multidrop.families.tmcl.host import codec, family, motions, operations, programs, scan, units, values
 from multidrop.families.tmcl.host.codec import Tmcl, TmclState
-from multidrop.families.tmcl.host.family import TMCL
-from multidrop.families.tmcl.host.motions import MOTIONS
-from multidrop.families.tmcl.host.programs import DEBUGGING, PROGRAM_FILES
-from multidrop.families.tmcl.host.units import UNITS
-from multidrop.families.tmcl.host.values import ACTIONS, PARAMETERS, VALUES
+from multidrop.families.tmcl.host.family import TmclFamily
+from multidrop.families.tmcl.host.motions import TmclMotions
+from multidrop.families.tmcl.host.programs import TmclDebugging, TmclPrograms
+from multidrop.families.tmcl.host.units import TmclUnits
+from multidrop.families.tmcl.host.values import TmclActions, TmclParameters, TmclValues
 from multidrop.families.tmcl.manual import commands, program_file
 from multidrop.families.tmcl.manual.commands import Call, Command
 from multidrop.families.tmcl.manual.modules import module_of
@@ -25,8 +25,8 @@ from tests.support.dialogues import dialogue_tests
 
 USED = (
     replace, Hints, Kind, Owed, Priority, Started, Ending, Evidence, Move, MoveKind, Outcome, Held, Stored, family,
-    TMCL, codec, motions, operations, programs, units, values, MOTIONS, DEBUGGING, PROGRAM_FILES, UNITS, ACTIONS,
-    PARAMETERS, VALUES, Call, Command, module_of, ORDINARY, Change, Permission, Plan, Readings,
+    TmclFamily, codec, motions, operations, programs, units, values, TmclMotions, TmclDebugging, TmclPrograms, TmclUnits, TmclActions,
+    TmclParameters, TmclValues, Call, Command, module_of, ORDINARY, Change, Permission, Plan, Readings,
 )  # fmt: skip
 """The names that calls in the files use."""
 
@@ -36,7 +36,7 @@ def module(product="TMCM-1241", motors=1, address="1", **known):
 
 
 def type_(state, text):
-    return TMCL.perform(state, text)
+    return TmclFamily(state).perform(text)
 
 
 def asked(text, address="1", **more):
@@ -70,7 +70,7 @@ def progress(shown):
 
 
 def download(state, text, shown=None, held=None):
-    return PROGRAM_FILES.download(state, source(text), held, progress([] if shown is None else shown))
+    return TmclPrograms(state).download(source(text), held, progress([] if shown is None else shown))
 
 
 def searched(found, **reach):

@@ -13,7 +13,7 @@ from multidrop.dialects.state import Owed
 from multidrop.dialects.values import BY
 from multidrop.drives.line import Line
 from multidrop.families.tmcl.host.codec import Tmcl
-from multidrop.families.tmcl.host.family import TMCL
+from multidrop.families.tmcl.host.family import TmclFamily
 from multidrop.families.tmcl.manual.commands import Call, Command, Status
 from multidrop.families.tmcl.simulator.module import Refused as Lacking
 from multidrop.simulator.cell.spec import Faults
@@ -62,7 +62,7 @@ class Shop(Bench):
         return super().step(min([until, *due]))
 
     def open(self, *names):
-        return self.run(TMCL.identify(Hints(drives=names)))
+        return self.run(TmclFamily.identify(Hints(drives=names)))
 
     def position(self, state):
         return int(self.type(state, "GAP 1, 0")[0])
@@ -103,7 +103,7 @@ def test_nobody_answers():
 @pytest.mark.parametrize("hints", [Hints(em=1), Hints(checksum=0), Hints(addressed=False)])
 def test_hints_of_other_families_are_refused(hints):
     with pytest.raises(Inexpressible, match="for other families"):
-        Shop().run(TMCL.identify(hints))
+        Shop().run(TmclFamily.identify(hints))
 
 
 def test_the_first_request_may_complete_a_message_of_somebody_else(shop):
@@ -143,9 +143,9 @@ def test_what_is_no_command_is_not_sent(text, shop, state):
 def test_motion_is_position_and_velocity(shop, state):
     shop.type(state, "ROR 0, -5000")
     shop.wait(1.0)
-    (axis,) = shop.run(TMCL.motion(state, Priority.POLL))
+    (axis,) = shop.run(TmclFamily(state).motion(Priority.POLL))
     assert axis.velocity == -5000 and axis.position < 0 and axis.axis == ""
-    assert shop.run(TMCL.moving(state)) and not shop.run(TMCL.busy(state))
+    assert shop.run(TmclFamily(state).moving()) and not shop.run(TmclFamily(state).busy())
 
 
 def test_a_search_counts_as_motion_between_its_phases():
@@ -153,7 +153,7 @@ def test_a_search_counts_as_motion_between_its_phases():
     (state,) = shop.open()
     shop.type(state, "RFS START, 0")
     seen = 0
-    while shop.run(TMCL.moving(state)):
+    while shop.run(TmclFamily(state).moving()):
         shop.wait(0.01)
         seen += 1
     assert seen > 5 and shop.position(state) == 0 and shop.type(state, "GAP 11, 0") == ("0",)
@@ -223,11 +223,14 @@ def test_what_changes_something_is_sent_once(text, shop, state):
 
 
 def test_a_parameter_that_reading_clears_is_neither_plotted_nor_watched(state):
-    for refuses in (TMCL.values.check, lambda state, word: TMCL.debugging.names(state, [word])):
+    for refuses in (
+        lambda state, word: TmclFamily(state).values.check(word),
+        lambda state, word: TmclFamily(state).debugging.names([word]),
+    ):
         for word in ("AP207", "AP207/1"):
             with pytest.raises(Diagnostic, match=f"{word} cannot be .*: reading it clears it"):
                 refuses(state, word)
-    assert TMCL.values.check(state, "AP206") == "AP206"
+    assert TmclFamily(state).values.check("AP206") == "AP206"
 
 
 def test_after_a_stop_a_late_reply_is_not_taken_for_a_value(shop, state):
@@ -239,7 +242,7 @@ def test_after_a_stop_a_late_reply_is_not_taken_for_a_value(shop, state):
             shop.line.stop(shop.now)
 
     with pytest.raises(Stopped):
-        shop.run(TMCL.perform(state, "GAP 5, 0"), at=stop)
+        shop.run(TmclFamily(state).perform("GAP 5, 0"), at=stop)
     try:
         assert shop.type(state, "GAP 140, 0") == ("8",)
     except NoAnswer as error:
@@ -249,11 +252,11 @@ def test_after_a_stop_a_late_reply_is_not_taken_for_a_value(shop, state):
 
 
 def test_after_a_stop_in_a_mark_the_next_mark_has_another_command():
-    state = TMCL.new_state(Tmcl(), "1")
+    state = TmclFamily.new_state(Tmcl(), "1")
     state.reply_outstanding()
     commands = []
     for _ in range(3):
-        typed = TMCL.perform(state, "GGP 66, 0")
+        typed = TmclFamily(state).perform("GGP 66, 0")
         commands.append(next(typed).body[1])
         with pytest.raises(Stopped):
             typed.throw(Stopped("stopped"))
@@ -262,7 +265,7 @@ def test_after_a_stop_in_a_mark_the_next_mark_has_another_command():
 
 def test_a_damaged_reply_is_no_value(shop):
     disturb(shop.wire, Faults(flip=0.02), 5)
-    state = TMCL.new_state(Tmcl(), "1")
+    state = TmclFamily.new_state(Tmcl(), "1")
     values, failures = set(), 0
     for _ in range(200):
         try:
@@ -273,11 +276,11 @@ def test_a_damaged_reply_is_no_value(shop):
 
 
 def test_a_new_address_is_told(shop, state):
-    assert shop.run(TMCL.perform(state, "SGP 66, 0, 5")) == ()
+    assert shop.run(TmclFamily(state).perform("SGP 66, 0, 5")) == ()
     assert state.remarks == ["module 1: its address is 5 from now on: type @5"]
     assert state.address == "5" and shop.type(state, "GGP 66, 0") == ("5",)
     state.take_messages()
-    assert shop.run(TMCL.perform(state, "137 0, 0, 1234")) == ()
+    assert shop.run(TmclFamily(state).perform("137 0, 0, 1234")) == ()
     assert "factory settings" in state.remarks[0]
 
 
@@ -338,7 +341,7 @@ def test_a_late_reply_of_another_module_costs_nothing():
         if shop.count(Command.GGP) and late:
             shop.line.receive(late.pop(), shop.now)
 
-    assert shop.run(TMCL.perform(one, "GAP 5, 0"), at=before_the_mark) == ("51200",)
+    assert shop.run(TmclFamily(one).perform("GAP 5, 0"), at=before_the_mark) == ("51200",)
     assert shop.strays == []
 
 
@@ -348,7 +351,7 @@ def test_a_module_that_comes_back_has_its_motors_counted():
     _, seven = shop.open("1", "7")
     assert seven.motors == 0
     shop.devices["7"].power(True, shop.now)
-    assert len(shop.run(TMCL.motion(seven, Priority.POLL))) == 1
+    assert len(shop.run(TmclFamily(seven).motion(Priority.POLL))) == 1
     assert seven.motors == 1
 
 
@@ -374,14 +377,14 @@ def test_the_last_session_s_download_is_ended_before_anything_is_stored(shop):
     shop.type(state, "132 0, 0, 0")
     shop.type(state, "MST 0")
     assert state.restore is not None and state.programming and len(program.memory) == 1
-    (again,) = shop.run(TMCL.identify(Hints(drives=("1",), owed=(state.restore,))))
+    (again,) = shop.run(TmclFamily.identify(Hints(drives=("1",), owed=(state.restore,))))
     assert (program.storing, len(program.memory), again.programming, again.restore) == (False, 1, False, None)
 
 
 def test_a_module_that_is_owed_nothing_is_sent_no_end_of_a_download(shop):
     (state,) = shop.open()
     before = len(shop.written)
-    shop.run(TMCL.identify(Hints(drives=("1",), owed=(Owed(0, "7", state.product, state.version, ""),))))
+    shop.run(TmclFamily.identify(Hints(drives=("1",), owed=(Owed(0, "7", state.product, state.version, ""),))))
     assert not [data for data in shop.written[before:] if data[1] == Command.END_DOWNLOAD]
 
 
@@ -406,7 +409,7 @@ def test_whether_a_program_runs_is_read_by_135_or_global_parameter_128(without, 
         return execute(call, now)
 
     monkeypatch.setattr(device, "_execute", lacking)
-    assert shop.run(TMCL.busy(state)) is runs
+    assert shop.run(TmclFamily(state).busy()) is runs
 
 
 def damaged(data, place, how):
@@ -446,19 +449,19 @@ def test_a_harmed_frame_turns_no_module_otherwise_than_typed_and_gives_no_wrong_
 def test_the_host_says_from_where_a_relative_move_counts(option, counted):
     shop = Shop({"set": {"127": option}})
     (state,) = shop.open()
-    assert TMCL.values.controls(state, "")[BY].about == counted
+    assert TmclFamily(state).values.controls("")[BY].about == counted
     shop.type(state, f"SAP 127, 0, {1 - option}")
-    assert TMCL.values.controls(state, "")[BY].about != counted
+    assert TmclFamily(state).values.controls("")[BY].about != counted
     shop.delays = [None]
     with pytest.raises(NoAnswer):
         shop.type(state, "SAP 127, 0, 0")
-    assert "not known" in TMCL.values.controls(state, "")[BY].about
+    assert "not known" in TmclFamily(state).values.controls("")[BY].about
 
 
 def test_a_module_without_parameter_127_counts_from_a_place_that_is_not_known():
     (state,) = Shop({"personality": "TMCM-1140"}).open()
     assert state.motors == 1
-    assert "not known" in TMCL.values.controls(state, "")[BY].about
+    assert "not known" in TmclFamily(state).values.controls("")[BY].about
 
 
 def interrupted(shop, state, procedure, delay):
@@ -480,8 +483,8 @@ def test_a_resting_module_is_known_after_stops_that_wore_out_every_mark(stops):
     shop = Shop()
     (state,) = shop.open()
     for _ in range(stops):
-        interrupted(shop, state, TMCL.moving(state), 0.05)
-    assert shop.run(TMCL.moving(state)) is False
+        interrupted(shop, state, TmclFamily(state).moving(), 0.05)
+    assert shop.run(TmclFamily(state).moving()) is False
 
 
 @pytest.mark.slow
@@ -492,7 +495,7 @@ def test_after_any_stops_a_value_is_right_or_not_given(delays, start):
     (state,) = shop.open()
     asked = [("GGP 66, 0", "1"), ("GAP 4, 0", "51200"), ("GGP 76, 0", "2"), ("GAP 140, 0", "8")]
     for delay in delays:
-        interrupted(shop, state, TMCL.perform(state, asked[start][0]), delay)
+        interrupted(shop, state, TmclFamily(state).perform(asked[start][0]), delay)
     for number in range(8):
         text, value = asked[(start + number) % 4]
         with contextlib.suppress(NoAnswer):

@@ -33,8 +33,8 @@ ONE, EVERY = TmclState(Tmcl(), "1"), TmclState(Tmcl(), "*")
 )
 def test_a_guarded_line_has_a_reason(text, part):
     for form in (text, text.lower()):
-        assert part in FAMILY.guards.find(ONE, form).what
-        assert FAMILY.guards.word_of(form) == FAMILY.guards.word_of(form.upper())
+        assert part in FAMILY(ONE).guard(form).what
+        assert FAMILY.word_of(form) == FAMILY.word_of(form.upper())
 
 
 @pytest.mark.parametrize(
@@ -43,11 +43,11 @@ def test_a_guarded_line_has_a_reason(text, part):
     + ["SGP 65, 2, 7", "RSGP 66, 2", "SGP 255, 2, 1", "SGP 67, 0, 0", "SGP 255, 0, 0"],
 )
 def test_other_lines_have_none(text):
-    assert FAMILY.guards.find(ONE, text) is None
+    assert FAMILY(ONE).guard(text) is None
 
 
 def test_a_line_to_all_that_can_start_is_guarded_and_a_stop_is_not():
     for text in ("ROR 0, 1000", "MVP ABS, 0, 0", "SAP 2, 0, 5", "RFS START, 0"):
-        assert FAMILY.guards.find(EVERY, text).name == FAMILY.guards.find(EVERY, text.lower()).name == "*", text
+        assert FAMILY(EVERY).guard(text).name == FAMILY(EVERY).guard(text.lower()).name == "*", text
     for text in ("ROR 0, 0", "ROL 0, 0", "MST 0", "RFS STOP, 0", "GAP 1, 0"):
-        assert FAMILY.guards.find(EVERY, text) is None, text
+        assert FAMILY(EVERY).guard(text) is None, text

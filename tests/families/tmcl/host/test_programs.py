@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from multidrop.base.errors import Inexpressible, NoAnswer, Refused, Stopped
 from multidrop.base.files import SourceLine
 from multidrop.families.tmcl.host import programs
-from multidrop.families.tmcl.host.family import TMCL
+from multidrop.families.tmcl.host.family import TmclFamily
 from multidrop.families.tmcl.manual import instructions, program_file
 from multidrop.families.tmcl.manual.commands import Call, Command
 from tests.families.tmcl.host.test_exchange import Shop
@@ -124,7 +124,7 @@ def test_routines_at_other_addresses_are_listed_with_a_gap_and_come_back() -> No
     shop, state = opened()
     device = shop.devices["1"]
     device.program.load({0: Call(28), 50: Call(3), 51: Call(22, value=50)})
-    upload = shop.run(programs.PROGRAM_FILES.upload(state, raw=False))
+    upload = shop.run(programs.TmclPrograms(state).upload(raw=False))
     assert upload[:2] == ("    STOP", "    0 0, 0, 0") and upload[-3:] == ("Line50:", "    MST 0", "    JA Line50")
     memory = list(device.program.memory)
     device.program.load({})
@@ -148,7 +148,7 @@ def test_what_upload_writes_downloads_to_the_same_memory(numbers: list[int], kin
     device.program.load({at: Call(number, kind, 0, value) for at, number in enumerate(numbers)})
     memory = list(device.program.memory)
     for raw in (False, True):
-        text = "\n".join(shop.run(programs.PROGRAM_FILES.upload(state, raw)))
+        text = "\n".join(shop.run(programs.TmclPrograms(state).upload(raw)))
         device.program.load({})
         load(shop, state, text)
         assert list(device.program.memory) == memory
@@ -157,34 +157,34 @@ def test_what_upload_writes_downloads_to_the_same_memory(numbers: list[int], kin
 def test_a_program_is_stepped_from_its_first_line() -> None:
     shop, state = opened()
     load(shop, state, "SAP 4, 0, 7\nSAP 4, 0, 8\nSTOP")
-    observed = TMCL.debugging
+    observed = TmclFamily(state).debugging
     assert observed is not None
-    rows = shop.run(observed.listing(state))
+    rows = shop.run(observed.listing())
     with pytest.raises(Inexpressible, match="single step begins with line 0"):
-        shop.run(observed.idle(state, "1", None))
-    shop.run(observed.begin(state, "0"))
+        shop.run(observed.idle("1", None))
+    shop.run(observed.begin("0"))
     for at, speed in ((0, "7"), (1, "8")):
-        assert shop.run(observed.step(state, rows)).row.at == at
+        assert shop.run(observed.step(rows)).row.at == at
         assert shop.type(state, "GAP 4, 0") == (speed,)
-        assert shop.run(observed.look(state, "0")).paused
-    shop.run(observed.step(state, rows))
-    assert not shop.run(observed.look(state, "0")).runs
+        assert shop.run(observed.look("0")).paused
+    shop.run(observed.step(rows))
+    assert not shop.run(observed.look("0")).runs
     with pytest.raises(Refused, match="not known to be halted"):
-        shop.run(observed.waits(state, "0", None))
+        shop.run(observed.waits("0", None))
 
 
 def test_a_running_program_is_broken_where_it_is_and_goes_on() -> None:
     shop, state = opened()
     load(shop, state, "ROR 0, 500\nWAIT TICKS, 0, 50\nMST 0\nWAIT TICKS, 0, 500\nSTOP")
-    observed = TMCL.debugging
+    observed = TmclFamily(state).debugging
     assert observed is not None
-    shop.run(observed.trace(state, "0"))
+    shop.run(observed.trace("0"))
     shop.wait(0.2)
-    assert shop.run(observed.look(state, "0"))[:2] == (True, False)
-    shop.run(observed.break_now(state, "0"))
-    look = shop.run(observed.look(state, "0"))
+    assert shop.run(observed.look("0"))[:2] == (True, False)
+    shop.run(observed.break_now("0"))
+    look = shop.run(observed.look("0"))
     assert (look.runs, look.paused, look.address) == (True, True, 2)
-    assert shop.run(observed.values(state, ("A", "AP3"))) == {"A": "0", "AP3": "500"}
-    shop.run(observed.go_on(state, "0"))
+    assert shop.run(observed.values(("A", "AP3"))) == {"A": "0", "AP3": "500"}
+    shop.run(observed.go_on("0"))
     shop.wait(1.0)
     assert shop.type(state, "GAP 3, 0") == ("0",)

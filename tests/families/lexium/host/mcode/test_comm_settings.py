@@ -9,7 +9,7 @@ from multidrop.base.errors import DriveError, NoAnswer, Refused
 from multidrop.dialects import End, Reply
 from multidrop.families.lexium.host.mcode import classify
 from multidrop.families.lexium.host.mcode.codec import MCode
-from multidrop.families.lexium.host.mcode.family import MCODE
+from multidrop.families.lexium.host.mcode.family import MCodeFamily
 from multidrop.families.lexium.host.mcode.state import MCodeState
 from multidrop.simulator.cell.spec import Faults
 from tests.support.faults import disturb
@@ -79,7 +79,7 @@ def test_another_drive_by_the_new_name_is_not_taken_for_one_whose_renaming_was_l
         disturb(bench.wire, Faults(drop=1.0 if b"DN" in bench.written[-1] else 0.0))
 
     with pytest.raises(DriveError):
-        desk.bench.run(MCODE.perform(desk.state, 'DN="b"'), desk.state, at=lose_the_first)
+        desk.bench.run(MCodeFamily(desk.state).perform('DN="b"'), desk.state, at=lose_the_first)
     disturb(desk.bench.wire)
     desk.device.execute("R1=11", desk.bench.now)
     assert desk.type("PR R1") == ("11",)
@@ -221,7 +221,7 @@ def test_a_drive_that_was_set_silent_by_somebody_else_is_looked_at_again(bench, 
 
 def test_an_error_that_cannot_be_read_is_not_blamed_on_the_next_line():
     state = MCodeState(MCode(em=1, escape=1), error=True)
-    talk = MCODE.perform(state, "MR 1")
+    talk = MCodeFamily(state).perform("MR 1")
     assert next(talk).text.startswith("PR ER")
     with pytest.raises(NoAnswer, match="'MR 1' was not sent"):
         talk.send(Reply(end=End.DAMAGED))
@@ -229,7 +229,7 @@ def test_an_error_that_cannot_be_read_is_not_blamed_on_the_next_line():
 
 def test_a_nak_that_may_be_another_drives_is_no_reason_to_repeat():
     state = MCodeState(MCode(em=1, checksum=1, party=True, escape=1), "a")
-    talk = MCODE.perform(state, "MR 1")
+    talk = MCodeFamily(state).perform("MR 1")
     next(talk)
     with pytest.raises(NoAnswer, match="not known whether 'MR 1' was executed"):
         talk.send(Reply(end=End.NAK, doubtful=True))

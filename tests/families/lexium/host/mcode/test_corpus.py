@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from multidrop.families.lexium.host.mcode.family import MCODE as FAMILY
+from multidrop.families.lexium.host.mcode.family import MCodeFamily as FAMILY
 from multidrop.families.lexium.manual.program_checker import check
 from multidrop.families.lexium.manual.program_file import formatted, read, remark_at
 from multidrop.families.lexium.manual.statements import canonical
@@ -161,9 +161,9 @@ def test_a_drive_with_a_program_has_its_formatted_file_too(bench: Callable[..., 
     desk, state = one_drive(bench, product=product, personality=product)
     text = file.read_bytes().decode()
     for sent, other in ((text, formatted(text)), (formatted(text), text)):
-        programs, quiet = FAMILY.programs, lambda done, total: None
-        desk.run(programs.download(state, read(sent, "x"), None, quiet), state)
-        held = desk.run(programs.read(state, (), quiet), state)
+        programs, quiet = FAMILY(state).programs, lambda done, total: None
+        desk.run(programs.download(read(sent, "x"), None, quiet), state)
+        held = desk.run(programs.read((), quiet), state)
         assert held.lines or file.stem == "settings_only"
-        assert not programs.differences(state, read(sent, "x"), held)
-        assert not programs.differences(state, read(other, "x"), held)
+        assert not programs.differences(read(sent, "x"), held, None)
+        assert not programs.differences(read(other, "x"), held, None)

@@ -8,7 +8,7 @@ from multidrop.base.errors import TransportLost
 from multidrop.dialects import End, Hints, Owed, Reply
 from multidrop.families.lexium.host.mcode import identify
 from multidrop.families.lexium.host.mcode.codec import MCode
-from multidrop.families.lexium.host.mcode.family import MCODE
+from multidrop.families.lexium.host.mcode.family import MCodeFamily
 from multidrop.families.lexium.host.mcode.operations import put_back_found
 from multidrop.families.lexium.host.mcode.state import MCodeState
 from multidrop.families.lexium.manual import program_file
@@ -198,7 +198,7 @@ def test_a_download_says_what_is_owed_before_the_echo_mode_is_changed(bench):
         seen.append((state.restore, device.memory.echo_mode))
 
     lines = program_file.read("PG 1\nLB G1\nE\nPG\n", "x")
-    desk.run(MCODE.programs.download(state, lines, None, lambda done, total: None), state, at=look)
+    desk.run(MCodeFamily(state).programs.download(lines, None, lambda done, total: None), state, at=look)
     assert (None, 0) not in seen and (OWED, 0) in seen and (state.restore, device.memory.echo_mode) == (None, 1)
 
 
@@ -217,7 +217,9 @@ def test_an_echo_mode_that_was_borrowed_as_the_line_was_lost_stays_owed(bench):
     [state] = found(desk, True)
     lines = program_file.read("PG 1\nLB G1\nE\nPG\n", "x")
     with pytest.raises(TransportLost):
-        desk.run(lost_behind(MCODE.programs.download(state, lines, None, lambda done, total: None), "EM=0"), state)
+        desk.run(
+            lost_behind(MCodeFamily(state).programs.download(lines, None, lambda done, total: None), "EM=0"), state
+        )
     assert (state.restore, device.memory.echo_mode) == (OWED, 0)
     assert desk.type(state, "PR EM") == ("1",)
     assert (state.restore, device.memory.echo_mode) == (None, 1)

@@ -35,18 +35,18 @@ from multidrop.families.lexium.host.mcode import (
     values,
 )
 from multidrop.families.lexium.host.mcode.codec import MCode
-from multidrop.families.lexium.host.mcode.family import MCODE
-from multidrop.families.lexium.host.mcode.motions import MOTIONS
+from multidrop.families.lexium.host.mcode.family import MCodeFamily
+from multidrop.families.lexium.host.mcode.motions import MCodeMotions
 from multidrop.families.lexium.host.mcode.state import MCodeState, Place, Unconfirmed
-from multidrop.families.lexium.host.mcode.units import UNITS
-from multidrop.families.lexium.host.mcode.values import PARAMETERS, VALUES
+from multidrop.families.lexium.host.mcode.units import MCodeUnits
+from multidrop.families.lexium.host.mcode.values import MCodeParameters, MCodeValues
 from multidrop.families.lexium.manual import program_file
 from tests.support.dialogues import dialogue_tests
 
 USED = (
-    replace, Hints, Kind, Owed, Priority, Started, Looking, family, MCODE, before_request, classify, codec, debugging,
+    replace, Hints, Kind, Owed, Priority, Started, Looking, family, MCodeFamily, before_request, classify, codec, debugging,
     download, exchange, framing, identify, identity, motions, operations, program_readout, programs, reply_parser,
-    scan, settings, units, values, MOTIONS, Place, Unconfirmed, UNITS, PARAMETERS, VALUES, Ending, Evidence, Move,
+    scan, settings, units, values, MCodeMotions, Place, Unconfirmed, MCodeUnits, MCodeParameters, MCodeValues, Ending, Evidence, Move,
     MoveKind, Outcome, Held, Stored, Reach, Remembered, ORDINARY, Change, Permission, Plan, Readings,
 )  # fmt: skip
 """The names that calls in the files use."""
@@ -58,7 +58,7 @@ def drive(em=0, ck=0, name="", product="LMDCM", **known):
 
 
 def type_(state, text):
-    return MCODE.perform(state, text)
+    return MCodeFamily(state).perform(text)
 
 
 def asked(text, em=0, ck=0, name="", **more):
@@ -97,7 +97,9 @@ def progress(shown):
 
 def sent(state, text, held=None, shown=None):
     """A download; the lines that were sent, each with its number."""
-    lines = yield from programs.PROGRAMS.download(state, source(text), held, progress([] if shown is None else shown))
+    lines = yield from programs.MCodePrograms(state).download(
+        source(text), held, progress([] if shown is None else shown)
+    )
     return [(line.number, line.text) for line in lines]
 
 

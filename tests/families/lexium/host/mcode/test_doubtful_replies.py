@@ -8,7 +8,7 @@ from multidrop.base.errors import NoAnswer
 from multidrop.dialects import End, Kind, Priority, Reply
 from multidrop.families.lexium.host.mcode.codec import MCode
 from multidrop.families.lexium.host.mcode.exchange import fresh
-from multidrop.families.lexium.host.mcode.family import MCODE
+from multidrop.families.lexium.host.mcode.family import MCodeFamily
 from multidrop.families.lexium.host.mcode.framing import sealed
 from multidrop.families.lexium.host.mcode.state import MCodeState
 from multidrop.simulator.cell.spec import Faults
@@ -46,7 +46,7 @@ NAKED, CLEAR = Reply((), end=End.NAK), Reply(("0~a",))
 @pytest.mark.parametrize("text", ["MR 51200", "EX G1", "R1=5"])
 def test_a_line_is_repeated_after_a_nak_only_if_no_ack_came_before_its_error_was_read_as_none(readings, repeats, text):
     state = MCodeState(MCode(em=1, party=True, checksum=1), "a")
-    procedure = ProcedureRunner(MCODE.perform(state, text))
+    procedure = ProcedureRunner(MCodeFamily(state).perform(text))
     assert procedure.request.text == text
     procedure.answer(NAKED)
     *before, last = readings
@@ -64,13 +64,13 @@ def test_a_line_is_repeated_after_a_nak_only_if_no_ack_came_before_its_error_was
 def test_a_nak_or_an_ack_that_may_be_another_drives_proves_nothing():
     for text in ("MR 51200", "R1=5"):
         state = MCodeState(MCode(em=1, party=True, checksum=1), "a")
-        procedure = ProcedureRunner(MCODE.perform(state, text))
+        procedure = ProcedureRunner(MCodeFamily(state).perform(text))
         with pytest.raises(NoAnswer, match="it was sent once"):
             procedure.answer(replace(NAKED, doubtful=True))
         assert state.reply_pending
         for doubtful, asks in ((False, False), (True, True)):
             state = MCodeState(MCode(em=1, party=True, checksum=1), "a")
-            procedure = ProcedureRunner(MCODE.perform(state, text))
+            procedure = ProcedureRunner(MCodeFamily(state).perform(text))
             procedure.answer(Reply((), acknowledged=True, doubtful=doubtful))
             assert (procedure.request is not None and procedure.request.text.startswith("PR EF")) is asks
 
@@ -104,7 +104,7 @@ def test_a_nak_that_a_running_programs_prints_follow_may_be_read_and_is_no_reaso
         found = answer(1, 1, NAK + lines * line)
         assert (found.reply.end, found.reply.detail) == (End.NAK, "prints follow the NAK")
     state = MCodeState(MCode(em=1, checksum=1, escape=1))
-    talk = MCODE.perform(state, "MR 1")
+    talk = MCodeFamily(state).perform("MR 1")
     next(talk)
     assert talk.send(Reply(end=End.NAK, detail="prints follow the NAK")).text.startswith("PR ER")
     with pytest.raises(NoAnswer, match="may have been executed and was not sent again"):
@@ -113,7 +113,7 @@ def test_a_nak_that_a_running_programs_prints_follow_may_be_read_and_is_no_reaso
 
 def test_an_error_is_not_read_twice_where_it_may_have_been_read_once():
     state = MCodeState(MCode(em=1, checksum=1, escape=1))
-    talk = MCODE.perform(state, "MR 1")
+    talk = MCodeFamily(state).perform("MR 1")
     next(talk)
     assert talk.send(Reply(end=End.NAK)).text.startswith("PR ER")
     with pytest.raises(NoAnswer, match="the reason could not be read"):
@@ -122,16 +122,16 @@ def test_an_error_is_not_read_twice_where_it_may_have_been_read_once():
 
 def test_a_line_is_not_blamed_for_the_error_of_a_reading_that_noise_made_another_print():
     state = MCodeState(MCode(em=1, checksum=1, escape=1))
-    talk = MCODE.motion(state, Priority.OPERATOR)
+    talk = MCodeFamily(state).motion(Priority.OPERATOR)
     next(talk)
     with pytest.raises(NoAnswer):
         talk.send(Reply(end=End.NAK))
-    assert next(MCODE.perform(state, "MR 1")).text.startswith("PR ER")
+    assert next(MCodeFamily(state).perform("MR 1")).text.startswith("PR ER")
 
 
 def test_a_line_whose_ack_came_late_is_not_blamed_for_an_error_that_came_beside_it():
     state = MCodeState(MCode(em=1, checksum=1, escape=1))
-    talk = MCODE.perform(state, "MR 1")
+    talk = MCodeFamily(state).perform("MR 1")
     next(talk)
     assert talk.send(Reply(end=End.SILENT)).text.startswith("PR EF")
     read = ACK + ACK + sealed(b"1 0~") + b"\r\n"
@@ -147,7 +147,7 @@ def test_a_prompt_in_front_of_a_print_may_be_a_part_of_it_and_acknowledges_nothi
         found = answer(0, 0, data)
         assert (found.reply.end, found.reply.acknowledged, found.reply.prompt) == (End.DONE, False, "")
     state = MCodeState(MCode(em=0, escape=1))
-    talk = MCODE.perform(state, "MR 51200")
+    talk = MCodeFamily(state).perform("MR 51200")
     next(talk)
     assert talk.send(found.reply).text.startswith("PR EF")
 

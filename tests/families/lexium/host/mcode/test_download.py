@@ -6,7 +6,7 @@ from multidrop.base.errors import DriveError, Inexpressible, NoAnswer, Refused, 
 from multidrop.dialects import End, Reply, StopPiece
 from multidrop.dialects.program_files import Held
 from multidrop.families.lexium.host.mcode.codec import MCode
-from multidrop.families.lexium.host.mcode.family import MCODE
+from multidrop.families.lexium.host.mcode.family import MCodeFamily
 from multidrop.families.lexium.host.mcode.state import MCodeState
 from multidrop.families.lexium.manual import program_file
 from multidrop.simulator.cell.spec import Faults
@@ -37,7 +37,7 @@ def download(desk, state, text=PROGRAM, **how):
     progress = []
     lines = program_file.read(text, "x.mxt")
     desk.run(
-        MCODE.programs.download(state, lines, None, lambda done, total: progress.append((done, total))),
+        MCodeFamily(state).programs.download(lines, None, lambda done, total: progress.append((done, total))),
         state,
         **how,
     )
@@ -140,7 +140,7 @@ def test_a_program_whose_end_was_not_seen_is_not_told_as_stored(bench):
 
     with pytest.raises(NoAnswer, match="could not be taken out of program mode"):
         lines = program_file.read("PG 1\nLB G1\nE\nPG\n", "x.mxt")[:3]
-        desk.run(MCODE.programs.download(state, lines, None, lambda done, total: None), state, at=goes)
+        desk.run(MCodeFamily(state).programs.download(lines, None, lambda done, total: None), state, at=goes)
     assert state.programming
 
 
@@ -171,7 +171,7 @@ def test_a_line_too_long_for_this_drive_is_told_before_anything_is_sent(bench):
 def test_a_damaged_frame_in_program_mode_is_sent_again_to_the_same_address():
     state = MCodeState(MCode(em=0, checksum=1, escape=1))
     lines = program_file.read("PG 1\nMR 51200\nE\nPG\n", "x")
-    procedure = ProcedureRunner(MCODE.programs.download(state, lines, Held(), lambda done, total: None))
+    procedure = ProcedureRunner(MCodeFamily(state).programs.download(lines, Held(), lambda done, total: None))
     asked = []
     replies = [
         Reply(prompt="1  "),
@@ -193,7 +193,7 @@ def test_a_damaged_frame_in_program_mode_is_sent_again_to_the_same_address():
 def test_a_way_back_into_program_mode_that_is_not_seen_is_cleaned_up_after():
     state = MCodeState(MCode(em=0, checksum=1, escape=1))
     lines = program_file.read("PG 1\nMR 51200\nE\nPG\n", "x")
-    procedure = ProcedureRunner(MCODE.programs.download(state, lines, Held(), lambda done, total: None))
+    procedure = ProcedureRunner(MCodeFamily(state).programs.download(lines, Held(), lambda done, total: None))
     for reply in (Reply(prompt="1  "), Reply(end=End.NAK, prompt="1  "), Reply(prompt=">"), Reply(("0",), prompt=">")):
         procedure.answer(reply)
     assert procedure.request.text == "PG 1"

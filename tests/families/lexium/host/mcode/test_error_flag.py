@@ -8,7 +8,7 @@ from multidrop.base.errors import DriveError, NoAnswer, Refused
 from multidrop.dialects import End, Hints, Priority
 from multidrop.families.lexium.host.mcode import identify
 from multidrop.families.lexium.host.mcode.codec import MCode
-from multidrop.families.lexium.host.mcode.family import MCODE
+from multidrop.families.lexium.host.mcode.family import MCodeFamily
 from multidrop.families.lexium.host.mcode.framing import sealed
 from tests.support.mcode_drives import Witness, one_drive
 
@@ -37,7 +37,7 @@ def test_while_an_error_stands_values_are_read_and_it_is_told_before_the_next_co
 
 
 def desk_motion(state):
-    [axis] = yield from MCODE.motion(state, Priority.POLL)
+    [axis] = yield from MCodeFamily(state).motion(Priority.POLL)
     return axis
 
 

@@ -55,7 +55,7 @@ FREE = [
 
 
 def named(state, text):
-    found = FAMILY.guards.find(state, text)
+    found = FAMILY(state).guard(text)
     return found.name if found else ""
 
 
@@ -64,13 +64,13 @@ def test_every_form_of_a_guarded_line_is_guarded():
     for name, texts in GUARDED.items():
         for text in (*texts, *map(str.lower, texts)):
             assert named(PARTY, text) == name, text
-            assert FAMILY.guards.word_of(text) == name, text
-            over = MODBUS.guards.find(ModbusState(Modbus()), text)
+            assert FAMILY.word_of(text) == name, text
+            over = MODBUS(ModbusState(Modbus())).guard(text)
             assert (over.name if over else "") == (name if name in REGISTERS else ""), text
 
 
 def test_what_a_line_does_is_said_with_the_line():
-    assert FAMILY.guards.find(ALONE, "cp 1 'all").what == "'cp 1' erases the program and every user variable"
+    assert FAMILY(ALONE).guard("cp 1 'all").what == "'cp 1' erases the program and every user variable"
 
 
 @pytest.mark.parametrize(
@@ -91,7 +91,7 @@ def test_what_a_line_does_is_said_with_the_line():
 def test_the_question_says_all_that_cp_erases(product, line, erased):
     state = MCodeState(MCode(party=True), "a")
     state.identified(product, "")
-    assert FAMILY.guards.find(state, line).what == f"'{line}' erases {erased}"
+    assert FAMILY(state).guard(line).what == f"'{line}' erases {erased}"
 
 
 def test_other_lines_are_free():
@@ -106,7 +106,7 @@ def test_leaving_party_mode_is_guarded_on_a_party_line_only():
 def test_ctrl_c_in_a_print_is_guarded_on_a_party_line_only_and_is_never_a_mere_question():
     line = r'PR "\c"'
     assert (named(PARTY, line), named(ALONE, line), named(ALONE, "a" + line)) == ("PR", "", "PR")
-    assert not FAMILY.guards.only_reads(line) and FAMILY.guards.only_reads("PR P")
+    assert not FAMILY.only_reads(line) and FAMILY.only_reads("PR P")
 
 
 def test_a_line_to_all_that_can_start_a_drive_is_guarded():

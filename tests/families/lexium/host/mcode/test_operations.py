@@ -9,7 +9,7 @@ from multidrop.dialects import DriveState, End, Kind, Owed, Priority, Reply
 from multidrop.families.lexium.host.mcode import identify
 from multidrop.families.lexium.host.mcode.codec import MCode
 from multidrop.families.lexium.host.mcode.exchange import answered, take_out
-from multidrop.families.lexium.host.mcode.family import MCODE
+from multidrop.families.lexium.host.mcode.family import MCodeFamily
 from multidrop.families.lexium.host.mcode.settings import listed
 from multidrop.families.lexium.host.mcode.state import MCodeState
 from tests.support.mcode_drives import one_drive
@@ -123,11 +123,11 @@ def checked() -> DriveState:
 
 def test_a_damaged_frame_is_repeated_and_a_refused_one_never():
     state = checked()
-    script = Script(MCODE.perform(state, "MR 1"), NAKED, Reply(("0",)), ACKED)
+    script = Script(MCodeFamily(state).perform("MR 1"), NAKED, Reply(("0",)), ACKED)
     assert script.asked == ["MR 1", 'PR ER,"~"', "MR 1"]
     assert script.procedure.result == ()
     with pytest.raises(Refused, match="error 21"):
-        Script(MCODE.perform(state, "MR 1"), NAKED, Reply(("21",)), Reply(("0",)))
+        Script(MCodeFamily(state).perform("MR 1"), NAKED, Reply(("21",)), Reply(("0",)))
 
 
 @pytest.mark.parametrize(
@@ -149,21 +149,21 @@ def test_a_nak_while_an_error_may_have_stood_does_not_tell_and_is_never_repeated
 
 def test_while_a_program_runs_the_flag_is_looked_at_before_a_command_with_a_checksum():
     state = checked()
-    script = Script(MCODE.perform(state, "EX AA"), ACKED)
+    script = Script(MCodeFamily(state).perform("EX AA"), ACKED)
     assert script.asked == ["EX AA"] and state.running
-    script = Script(MCODE.perform(state, "MR 1"), Reply(("0 1~",)), ACKED)
+    script = Script(MCodeFamily(state).perform("MR 1"), Reply(("0 1~",)), ACKED)
     assert script.asked == ['PR EF," ",BY,"~"', "MR 1"] and state.running
-    script = Script(MCODE.perform(state, "MR 1"), Reply(("1 0~",)), Reply(("86~",)), ACKED)
+    script = Script(MCodeFamily(state).perform("MR 1"), Reply(("1 0~",)), Reply(("86~",)), ACKED)
     assert script.asked == ['PR EF," ",BY,"~"', 'PR ER,"~"', "MR 1"] and not state.running
     assert "error 86" in state.notes[0] and "an old error" in state.notes[0]
-    assert Script(MCODE.perform(state, "MR 1"), ACKED).asked == ["MR 1"]
+    assert Script(MCodeFamily(state).perform("MR 1"), ACKED).asked == ["MR 1"]
 
 
 def test_a_unit_that_says_nak_while_an_error_stands_is_read_all_the_same():
     state = checked()
-    script = Script(MCODE.perform(state, "PR R1"), Reply(("5~",), flagged=True))
+    script = Script(MCodeFamily(state).perform("PR R1"), Reply(("5~",), flagged=True))
     assert script.procedure.result == ("5",) and state.error
-    script = Script(MCODE.perform(state, "MR 1"), Reply(("86~",), flagged=True), ACKED)
+    script = Script(MCodeFamily(state).perform("MR 1"), Reply(("86~",), flagged=True), ACKED)
     assert script.asked == ['PR ER,"~"', "MR 1"] and not state.error
 
 
@@ -171,24 +171,24 @@ def test_a_frame_is_repeated_three_times_at_most():
     state = checked()
     damaged = [NAKED, Reply(("0",))] * 4
     with pytest.raises(NoAnswer, match="arrived damaged 4 times and was not executed"):
-        Script(MCODE.perform(state, "MR 1"), *damaged)
+        Script(MCodeFamily(state).perform("MR 1"), *damaged)
 
 
 def test_a_nak_whose_reason_cannot_be_read_is_not_repeated():
     state = checked()
     with pytest.raises(NoAnswer, match="the reason could not be read: it is not known whether 'MR 1' was executed"):
-        Script(MCODE.perform(state, "MR 1"), NAKED, Reply(end=End.DAMAGED))
+        Script(MCodeFamily(state).perform("MR 1"), NAKED, Reply(end=End.DAMAGED))
 
 
 def test_a_damaged_answer_is_not_asked_again():
     state = checked()
     with pytest.raises(NoAnswer, match="may have been executed and was not sent again"):
-        Script(MCODE.perform(state, "MR 1"), Reply(end=End.DAMAGED, detail="x"))
+        Script(MCodeFamily(state).perform("MR 1"), Reply(end=End.DAMAGED, detail="x"))
 
 
 def test_a_running_program_under_ck_2_sends_no_ack_and_silence_is_checked():
     state = MCodeState(MCode(em=1, checksum=2, escape=1))
-    script = Script(MCODE.perform(state, "VM=5000"), Reply(end=End.SILENT), Reply(("0 1",)))
+    script = Script(MCodeFamily(state).perform("VM=5000"), Reply(end=End.SILENT), Reply(("0 1",)))
     assert script.asked == ["VM=5000", 'PR EF," ",BY,"~"']
 
 
@@ -196,7 +196,7 @@ def test_silence_of_a_drive_that_runs_no_program_is_a_lost_command():
     state = MCodeState(MCode(em=1, checksum=2, escape=1))
     with pytest.raises(NoAnswer, match="not known whether 'VM=5000' was executed; it was sent once"):
         Script(
-            MCODE.perform(state, "VM=5000"),
+            MCodeFamily(state).perform("VM=5000"),
             Reply(end=End.SILENT),
             Reply(("0 0",), raw=b"\x060 0\xd0\r\n"),
         )
@@ -216,7 +216,7 @@ def test_silence_of_a_drive_that_runs_no_program_is_a_lost_command():
 def test_silence_is_success_only_where_it_must_be(check, text, told, raw, done):
     state = MCodeState(MCode(em=1, checksum=check, escape=1))
     try:
-        Script(MCODE.perform(state, text), Reply(end=End.SILENT), Reply((told,), raw=raw))
+        Script(MCodeFamily(state).perform(text), Reply(end=End.SILENT), Reply((told,), raw=raw))
     except NoAnswer as error:
         assert not done and "not known whether" in str(error)
     else:
@@ -226,14 +226,14 @@ def test_silence_is_success_only_where_it_must_be(check, text, told, raw, done):
 @pytest.mark.parametrize(("check", "raw"), [(0, b"\r\n\r\n0 0\r\n"), (2, b"\x06\x060 0\xd0\r\n")])
 def test_a_sign_that_came_late_is_still_one(check, raw):
     state = MCodeState(MCode(em=1, checksum=check, escape=1))
-    script = Script(MCODE.perform(state, "VM=5000"), Reply(end=End.SILENT), Reply(("0 0",), raw=raw))
+    script = Script(MCodeFamily(state).perform("VM=5000"), Reply(end=End.SILENT), Reply(("0 0",), raw=raw))
     assert len(script.asked) == 2
 
 
 def test_a_print_that_comes_to_nothing_is_not_taken_for_an_answer():
     for state in (MCodeState(MCode(em=1, escape=1)), MCodeState(MCode(em=3, escape=1))):
         with pytest.raises(NoAnswer, match="printed nothing for 'PR R1'"):
-            Script(MCODE.perform(state, "PR R1"), Reply(end=End.SILENT), Reply(("0",)))
+            Script(MCodeFamily(state).perform("PR R1"), Reply(end=End.SILENT), Reply(("0",)))
 
 
 @pytest.mark.parametrize(("em", "party", "check"), MODES)
@@ -247,7 +247,7 @@ def test_a_drive_that_runs_a_program_is_spoken_to_in_every_mode(bench, em, party
     with pytest.raises(Refused, match="error 35"):
         desk.type(state, "PR ZZ")
     assert (desk.type(state, "PR R1"), desk.type(state, "PR BY")) == (("5",), ("1",))
-    assert desk.run(MCODE.motion(state, Priority.POLL))[0].velocity == 0
+    assert desk.run(MCodeFamily(state).motion(Priority.POLL))[0].velocity == 0
     assert desk.type(state, "E") == () and desk.type(state, "PR BY") == ("0",)
 
 
@@ -307,7 +307,7 @@ def test_no_line_follows_a_lost_reply_without_a_mark_and_each_mark_is_another(te
     state = MCodeState(MCode(em=1, party=party), "a" if party else "!")
     state.signature_seen(signs)
     state.reply_outstanding()
-    marks = [ProcedureRunner(MCODE.perform(state, text)).request for _ in range(3)]
+    marks = [ProcedureRunner(MCodeFamily(state).perform(text)).request for _ in range(3)]
     assert [each.text.startswith('PR "~') for each in marks] == [True] * 3
     late = [shown.format(number) for number in (1, 2, 3)]
     assert [[re.fullmatch(each.expect, line) is not None for line in late] for each in marks] == [
@@ -339,7 +339,7 @@ def test_position_and_velocity_come_in_one_print(bench):
     desk, state = one_drive(bench, 1, True, 1)
     desk.type(state, "MR 512000")
     desk.wait(0.5)
-    [axis] = desk.run(MCODE.motion(state, Priority.POLL))
+    [axis] = desk.run(MCodeFamily(state).motion(Priority.POLL))
     assert 0 < axis.position < 512000
     assert axis.velocity > 100000
     assert desk.written[-1].startswith(b'aPR P,"~a",V')
@@ -355,7 +355,7 @@ def test_a_command_to_all_waits_for_no_answer(bench):
 
 def test_a_stop_thrown_into_a_conversation_ends_it():
     state = checked()
-    procedure = ProcedureRunner(MCODE.perform(state, "MR 1"))
+    procedure = ProcedureRunner(MCodeFamily(state).perform("MR 1"))
     with pytest.raises(Stopped):
         procedure.fail(Stopped("stopped"))
     assert procedure.request is None
@@ -364,7 +364,7 @@ def test_a_stop_thrown_into_a_conversation_ends_it():
 def test_a_stop_in_a_question_before_a_line_names_the_line_as_not_sent():
     state = checked()
     state.program_read(error=False, running=True)
-    procedure = ProcedureRunner(MCODE.perform(state, "R2=1"))
+    procedure = ProcedureRunner(MCodeFamily(state).perform("R2=1"))
     assert procedure.request.text.startswith("PR EF")
     with pytest.raises(Stopped, match="stopped; 'R2=1' was not sent"):
         procedure.fail(Stopped("stopped"))
@@ -374,7 +374,7 @@ def test_a_stop_in_the_question_for_the_prompt_names_the_line_for_program_mode_a
     state = checked()
     state.may_be_in_program_mode()
     state.reply_outstanding()
-    procedure = ProcedureRunner(MCODE.perform(state, "R1=7"))
+    procedure = ProcedureRunner(MCodeFamily(state).perform("R1=7"))
     assert procedure.request.text == ""
     with pytest.raises(Stopped, match="stopped; 'R1=7' was not sent"):
         procedure.fail(Stopped("stopped"))
@@ -383,7 +383,7 @@ def test_a_stop_in_the_question_for_the_prompt_names_the_line_for_program_mode_a
 def test_a_line_is_not_sent_after_a_stop_that_came_as_the_echo_mode_was_put_back():
     state = checked()
     state.owes(Owed(3, "", "LMDCM", "", ""))
-    procedure = ProcedureRunner(MCODE.perform(state, "MR 1"))
+    procedure = ProcedureRunner(MCodeFamily(state).perform("MR 1"))
     assert procedure.request.text == "EM=3"
     with pytest.raises(Stopped):
         procedure.fail(Stopped("stopped"))
@@ -398,7 +398,7 @@ def test_where_a_stop_prevents_that_program_mode_is_left_the_mode_is_read_before
     assert procedure.request.text == "PG"
     with pytest.raises(Stopped):
         procedure.fail(Stopped("stopped"))
-    assert ProcedureRunner(MCODE.perform(state, "MR 1")).request.text == ""
+    assert ProcedureRunner(MCodeFamily(state).perform("MR 1")).request.text == ""
 
 
 @pytest.mark.parametrize(("silent", "error"), [(0, False), (1, True)])
@@ -418,7 +418,7 @@ def test_the_error_of_a_pg_too_many_is_read_before_the_next_line(silent, error):
 
 @pytest.mark.parametrize("check", [0, 1])
 def test_a_stop_in_a_reading_without_a_checksum_leaves_an_error_that_no_line_is_blamed_for(check):
-    for reading in (lambda state: MCODE.motion(state, Priority.OPERATOR), lambda state: listed(state, "PR UV")):
+    for reading in (lambda state: MCodeFamily(state).motion(Priority.OPERATOR), lambda state: listed(state, "PR UV")):
         state = MCodeState(MCode(em=1, checksum=check))
         with pytest.raises(Stopped):
             ProcedureRunner(reading(state)).fail(Stopped("stopped"))

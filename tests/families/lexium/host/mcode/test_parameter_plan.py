@@ -6,19 +6,18 @@ from hypothesis import strategies as st
 
 from multidrop.base.errors import Diagnostic
 from multidrop.dialects.values import Permission, differing
-from multidrop.families.lexium.host.mcode.family import MCODE
+from multidrop.families.lexium.host.mcode.values import MCodeParameters
 from tests.support.direct_drive import DirectDrive
 from tests.support.examples import examples
 from tests.support.random_settings import PROGRAM, lines
 
 pytestmark = pytest.mark.slow
 
-PARAMETERS = MCODE.values.parameters
 PRODUCTS = ("LMDOM", "LMDCM", "LMDCM", "LMDCE", "LMM", "MDI", "MDIE", "MDIX")
 
 
 def settings_of(one):
-    return one.run(PARAMETERS.read(one.state, lambda done, total: None))
+    return one.run(MCodeParameters(one.state).read(lambda done, total: None))
 
 
 def random_drive(random, product):
@@ -34,9 +33,9 @@ def random_drive(random, product):
 
 def steps(product, wanted, *present, named=(), program=PROGRAM):
     one = DirectDrive(product, *present, program=program)
-    plan = PARAMETERS.plan(one.state, settings_of(one), wanted, Permission(frozenset(named)))
+    plan = MCodeParameters(one.state).plan(settings_of(one), wanted, Permission(frozenset(named)))
     for change in plan:
-        one.run(PARAMETERS.write(one.state, change))
+        one.run(MCodeParameters(one.state).write(change))
     return [change.text for change in plan], dict(plan.withheld + plan.impossible)
 
 
@@ -49,12 +48,12 @@ def test_no_step_between_any_two_settings_is_refused(random, product):
     wanted = {name: value for name, value in wanted.items() if whole or random.random() < 0.4}
     named = frozenset(name for name in wanted if random.random() < 0.8)
     try:
-        plan = PARAMETERS.plan(here.state, present, wanted, Permission(named))
+        plan = MCodeParameters(here.state).plan(present, wanted, Permission(named))
     except Diagnostic as error:
         assume(whole and "with MS" not in str(error))  # a drive rounds VM up beyond what it takes
         raise
     for change in plan:
-        here.run(PARAMETERS.write(here.state, change))
+        here.run(MCodeParameters(here.state).write(change))
         here.device.advance(here.device.now + 1.0)
     left = {name for name, *_ in differing(settings_of(here).values, wanted) if name in wanted}
     assert left <= {name for name, _ in plan.withheld + plan.impossible}
@@ -91,9 +90,9 @@ def test_both_points_of_an_mdriveplus_clock_are_set_with_one():
 def test_steps_that_change_what_a_position_is_say_so():
     one = DirectDrive("LMDCM")
     present = settings_of(one)
-    remarks = PARAMETERS.plan(one.state, present, {"MS": 16, "RD": 1, "RC": 5}, Permission()).remarks
+    remarks = MCodeParameters(one.state).plan(present, {"MS": 16, "RD": 1, "RC": 5}, Permission()).remarks
     assert len(remarks) == 1 and remarks[0].startswith("MS, RD: the position counter")
-    assert PARAMETERS.plan(one.state, present, {"RC": 5}, Permission()).remarks == ()
+    assert MCodeParameters(one.state).plan(present, {"RC": 5}, Permission()).remarks == ()
 
 
 def test_the_unit_of_motion_comes_before_its_values():
@@ -115,7 +114,7 @@ def test_what_can_move_or_cut_off_the_drive_waits_for_its_name(name, value, pres
     sent, withheld = steps("LMDCM", {name: value}, *present)
     assert sent == [] and list(withheld) == [name]
     one = DirectDrive("LMDCM", *present, program=PROGRAM)
-    plan = PARAMETERS.plan(one.state, settings_of(one), {name: value}, Permission(frozenset({name})))
+    plan = MCodeParameters(one.state).plan(settings_of(one), {name: value}, Permission(frozenset({name})))
     assert [change.name for change in plan] == [name]
 
 
@@ -164,13 +163,17 @@ def test_a_wrong_value_is_one_line_and_no_step(wanted, said):
 def test_a_device_name_is_one_character(name):
     one = DirectDrive("LMDCM")
     with pytest.raises(Diagnostic, match="one letter or digit"):
-        PARAMETERS.plan(one.state, settings_of(one), {"DN": name}, Permission(communication=True))
+        MCodeParameters(one.state).plan(settings_of(one), {"DN": name}, Permission(communication=True))
 
 
 def test_a_name_that_a_neighbour_bears_and_the_end_of_party_mode_are_conflicts():
     one = DirectDrive("LMDCM", "PY=1")
-    plan = PARAMETERS.plan(one.state, settings_of(one), {"DN": "b", "PY": 0}, Permission(communication=True))
-    assert PARAMETERS.conflict(plan, ["b"]) and PARAMETERS.conflict(plan, ["c"]) and not PARAMETERS.conflict(plan, [])
+    plan = MCodeParameters(one.state).plan(settings_of(one), {"DN": "b", "PY": 0}, Permission(communication=True))
+    assert (
+        MCodeParameters(one.state).conflict(plan, ["b"])
+        and MCodeParameters(one.state).conflict(plan, ["c"])
+        and not MCodeParameters(one.state).conflict(plan, [])
+    )
 
 
 def test_trips_need_their_labels():
@@ -181,4 +184,4 @@ def test_trips_need_their_labels():
 def test_a_drive_at_work_is_left_alone(line, said):
     one = DirectDrive("LMDCM", "TT=60000,G1", line, program="PG 1\nLB G1\nRT\nLB G3\nH 5000\nBR G3\nE\nPG")
     one.device.advance(one.device.now + 0.5)
-    assert said in one.run(PARAMETERS.ready(one.state))
+    assert said in one.run(MCodeParameters(one.state).ready())

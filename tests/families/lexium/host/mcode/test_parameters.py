@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import pytest
 
 from multidrop.dialects.values import IO, VARIABLES, Permission
-from multidrop.families.lexium.host.mcode.family import MCODE
+from multidrop.families.lexium.host.mcode.family import MCodeFamily
 from multidrop.families.lexium.manual import parameters as manual
 from multidrop.families.lexium.manual.parameter_plan import types
 from multidrop.families.lexium.simulator.state.models import MODELS
@@ -29,12 +29,12 @@ def desk_of(bench, product, em, party, check, **more):
 
 
 def read(desk, progress=nothing):
-    return desk.bench.run(MCODE.values.parameters.read(desk.state, progress), desk.state)
+    return desk.bench.run(MCodeFamily(desk.state).values.parameters.read(progress), desk.state)
 
 
 def direct(product="LMDCM", *lines, program=""):
     one = DirectDrive(product, *lines, program=program)
-    return one, one.run(MCODE.values.parameters.read(one.state, nothing))
+    return one, one.run(MCodeFamily(one.state).values.parameters.read(nothing))
 
 
 def _agrees_with_the_drive(product, em, party, check, bench):
@@ -122,7 +122,7 @@ def test_a_small_motor_is_not_asked_for_the_inputs_that_it_lacks():
 def test_a_refused_line_is_said_and_not_asked_in_pieces():
     one = DirectDrive("LMDOM")
     one.state.identified("LMDCM", "LMDCM 6.002", "")
-    found = one.run(MCODE.values.parameters.read(one.state, nothing))
+    found = one.run(MCodeFamily(one.state).values.parameters.read(nothing))
     refused = [name for name, reason in found.unread if "refuses" in reason]
     assert "AS" in refused and len(set(one.refused)) == len(one.refused)
     assert one.device.memory.error_flag
@@ -138,16 +138,16 @@ def test_a_print_in_an_unknown_form_takes_no_other_setting_with_it():
         return SimpleNamespace(lines=("TI is odd",) if wrong else answer.lines, refused=answer.refused)
 
     one.device.execute = odd
-    found = one.run(MCODE.values.parameters.read(one.state, nothing))
+    found = one.run(MCodeFamily(one.state).values.parameters.read(nothing))
     assert {"VM", "PF", "F1", "MS"} <= found.values.keys() and {"TI", "TR"} <= dict(found.unread).keys()
 
 
 def test_a_product_of_unknown_name_is_asked_for_what_every_lexium_has():
     one = DirectDrive("LMDCM")
     one.state.identified("LMDXX", "LMDXX 6.002", "")
-    found = one.run(MCODE.values.parameters.read(one.state, nothing))
+    found = one.run(MCodeFamily(one.state).values.parameters.read(nothing))
     assert one.refused == [] and {"VM", "IS1"} <= found.values.keys() and "AS" not in found.values
-    plan = MCODE.values.parameters.plan(one.state, found, {"VM": 5000, "MS": 16}, Permission())
+    plan = MCodeFamily(one.state).values.parameters.plan(found, {"VM": 5000, "MS": 16}, Permission())
     assert [change.text for change in plan] == ["MS=16", "VM=5000"]
 
 
@@ -170,4 +170,4 @@ def test_the_types_of_points_are_those_of_the_drive(product):
 def test_a_snapshot_says_the_rate_that_the_drive_is_set_to(bd, rate):
     one = DirectDrive("LMDCM")
     one.device.memory.values["BD"] = bd
-    assert one.run(MCODE.values.snapshot(one.state, nothing)).baud == rate
+    assert one.run(MCodeFamily(one.state).values.snapshot(nothing)).baud == rate

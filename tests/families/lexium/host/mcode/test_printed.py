@@ -12,7 +12,7 @@ from multidrop.dialects import DriveState
 from multidrop.families.lexium.host.mcode import classify
 from multidrop.families.lexium.host.mcode.codec import MCode
 from multidrop.families.lexium.host.mcode.exchange import sign, signed
-from multidrop.families.lexium.host.mcode.family import MCODE
+from multidrop.families.lexium.host.mcode.family import MCodeFamily
 from multidrop.families.lexium.host.mcode.state import MCodeState
 from multidrop.families.lexium.manual.table import words
 from multidrop.families.lexium.simulator.state.models import MODELS
@@ -164,7 +164,7 @@ def test_what_a_program_of_another_drive_prints_is_no_answer(bench, text, em, ch
                     desk.devices[1].core.printer.announce(f"{line}\r\n")
 
         try:
-            answer = desk.bench.run(MCODE.perform(desk.state, text), desk.state, at=talk)
+            answer = desk.bench.run(MCodeFamily(desk.state).perform(text), desk.state, at=talk)
         except NoAnswer:
             continue  # the two collided, which without a checksum may also take a digit away
         assert "100" not in "".join(answer) and (answer in (("77",), ("v77",)) or not sealed), (moment, answer)
@@ -181,7 +181,7 @@ def test_one_that_is_deaf_to_its_name_is_not_believed(bench):
     with pytest.raises(NoAnswer):
         desk.type("PR R1")
     with pytest.raises(NoAnswer):
-        desk.bench.run(MCODE.motion(desk.state, 0), desk.state)
+        desk.bench.run(MCodeFamily(desk.state).motion(0), desk.state)
 
 
 @pytest.mark.parametrize(("em", "is_party", "check"), MODES)

@@ -5,7 +5,7 @@ import pytest
 from multidrop.base.errors import DriveError, Inexpressible, Refused, Stopped
 from multidrop.dialects import Priority, StopPiece
 from multidrop.families.lexium.host.mcode.codec import MCode
-from multidrop.families.lexium.host.mcode.family import MCODE
+from multidrop.families.lexium.host.mcode.family import MCodeFamily
 from multidrop.families.lexium.host.mcode.state import MCodeState
 from tests.support.cases import for_each
 from tests.support.mcode_drives import MODES, Desk
@@ -43,10 +43,10 @@ def test_in_program_mode_nothing_is_asked(bench):
     desk.type("PG 1")
     sent = len(desk.bench.written)
     for question in (
-        MCODE.motion(desk.state, Priority.POLL),
-        MCODE.busy(desk.state),
-        MCODE.moving(desk.state),
-        MCODE.programs.listing(desk.state, ""),
+        MCodeFamily(desk.state).motion(Priority.POLL),
+        MCodeFamily(desk.state).busy(),
+        MCodeFamily(desk.state).moving(),
+        MCodeFamily(desk.state).programs.listing(""),
     ):
         with pytest.raises(Refused, match="in program mode"):
             desk.bench.run(question)
@@ -100,7 +100,7 @@ def test_a_stop_at_any_step_of_entering_program_mode_leaves_it_known(bench, em, 
             bench.line.stop(bench.now, StopPiece(b"\x1b"))
             bench.wire.receive(b"\x1b", bench.now)
 
-    talk = MCODE.perform(desk.state, "PG 1")
+    talk = MCodeFamily(desk.state).perform("PG 1")
     try:
         desk.bench.run(talk, desk.state, at=stop)
     except Stopped:
@@ -125,7 +125,7 @@ def test_a_refusal_to_store_is_told_though_the_echo_mode_could_not_be_put_back(b
             desk.device.power(False, bench.now)
 
     with pytest.raises(Refused, match="refused 'PG 1': error 41"):
-        desk.bench.run(MCODE.perform(desk.state, "PG 1"), desk.state, at=goes)
+        desk.bench.run(MCodeFamily(desk.state).perform("PG 1"), desk.state, at=goes)
     assert not desk.state.programming and desk.state.settings_unknown
     assert any("may be EM=0 now" in note for note in desk.state.notes)
 

@@ -8,7 +8,7 @@ from multidrop.base.errors import NoAnswer
 from multidrop.dialects.program_files import Difference, Held, Stored
 from multidrop.families.lexium.host.mcode import program_readout as listings
 from multidrop.families.lexium.host.mcode.codec import MCode
-from multidrop.families.lexium.host.mcode.family import MCODE
+from multidrop.families.lexium.host.mcode.family import MCodeFamily
 from multidrop.families.lexium.host.mcode.state import MCodeState
 from multidrop.families.lexium.manual import program_file
 from tests.conftest import Bench
@@ -47,15 +47,15 @@ def stores(desk, *lines):
 
 
 def upload(desk, state):
-    return desk.run(MCODE.programs.upload(state, False), state)
+    return desk.run(MCodeFamily(state).programs.upload(False), state)
 
 
 def download(desk, state, lines):
     file = program_file.read("\n".join(lines), "x")
-    before = desk.run(MCODE.programs.read(state, (), lambda done, total: None), state)
-    sent = desk.run(MCODE.programs.download(state, file, before, lambda done, total: None), state)
-    held = desk.run(MCODE.programs.read(state, (), lambda done, total: None), state)
-    return MCODE.programs.differences(state, sent, held, before)
+    before = desk.run(MCodeFamily(state).programs.read((), lambda done, total: None), state)
+    sent = desk.run(MCodeFamily(state).programs.download(file, before, lambda done, total: None), state)
+    held = desk.run(MCodeFamily(state).programs.read((), lambda done, total: None), state)
+    return MCodeFamily(state).programs.differences(sent, held, before)
 
 
 def listing(desk):
@@ -114,7 +114,7 @@ def test_any_program_replaces_any_other(old, new):
 def test_spelling_is_no_difference(spelled):
     desk, state = drive()
     assert download(desk, state, ["PG 1", "LB g1", spelled, "E", "PG"]) == ()
-    assert MCODE.programs.size(program_file.read(f"PG 1\nLB G1\n{spelled}\nE\nPG", "x")) == 3
+    assert MCodeFamily(drive()).programs.size(program_file.read(f"PG 1\nLB G1\n{spelled}\nE\nPG", "x")) == 3
 
 
 FILE = program_file.read("PG 1\nLB G1\nMR 100\nH\nE\nPG\n", "x")
@@ -137,13 +137,13 @@ def test_each_line_that_differs_is_found(there, found):
     for text in there:
         held.append(Stored(at, text))
         at += {"LB G1": 5, "MR 100": 4, "MR 101": 4, "P=5": 4}.get(text, 2)
-    assert MCODE.programs.differences(state, FILE, Held(tuple(held))) == found
+    assert MCodeFamily(state).programs.differences(FILE, Held(tuple(held))) == found
 
 
 def test_a_program_elsewhere_is_no_difference():
     state = MCodeState(MCode(), "", "!", "LMDCM")
     held = [Stored(1, "LB G1"), Stored(6, "MR 100"), Stored(10, "H"), Stored(12, "E"), Stored(15, "LB X9")]
-    assert MCODE.programs.differences(state, FILE, Held(tuple(held))) == ()
+    assert MCodeFamily(state).programs.differences(FILE, Held(tuple(held))) == ()
 
 
 @given(st.lists(st.text(alphabet="AG1L =.-\t²\x00", max_size=12)))
@@ -155,7 +155,7 @@ def test_whatever_a_drive_lists_is_read(rows):
 
 @given(st.text(alphabet="PG1 LBE\n'VA=7x\"", max_size=60), st.sampled_from([(), ("Q1 = G 5", "A = 1")]))
 def test_a_file_keeps_its_lines_and_gets_the_variables_that_it_lacks(text, names):
-    made = MCODE.programs.refreshed(text, Held(names=names))
+    made = MCodeFamily(drive()).programs.refreshed(text, Held(names=names))
     lines = text.removesuffix("\n").split("\n")
     assert [line for line in made if not line.startswith("VA Q1=5")] == lines and ("VA Q1=5" in made) is bool(names)
 
@@ -173,7 +173,7 @@ def test_a_program_whose_listing_was_lost_is_listed_again():
         return execute(text, now, **how)
 
     device.execute = loses_the_first
-    held = desk.run(MCODE.programs.read(state, (), lambda done, total: None), state)
+    held = desk.run(MCodeFamily(state).programs.read((), lambda done, total: None), state)
     assert lost and [line.text for line in held.lines] == ["LB G1", "MR 100", "E"]
 
 
@@ -197,7 +197,7 @@ def test_a_program_of_which_a_listed_line_was_damaged_is_listed_again(em, late):
         return came
 
     desk.wire.advance = damages_a_line
-    found = desk.run(MCODE.programs.read(state, (), lambda done, total: None), state)
+    found = desk.run(MCodeFamily(state).programs.read((), lambda done, total: None), state)
     assert damaged and [line.text for line in found.lines] == ["LB G1", "MR 100", "E"]
 
 
@@ -224,5 +224,5 @@ def test_without_a_checksum_a_line_with_what_no_drive_lists_is_damaged(em, words
         with pytest.raises(NoAnswer, match="the list may be incomplete: its end or a line was damaged; ask again"):
             desk.type(state, "L")
         return
-    found = desk.run(MCODE.programs.read(state, (), lambda done, total: None), state)
+    found = desk.run(MCodeFamily(state).programs.read((), lambda done, total: None), state)
     assert damaged and [line.text for line in found.lines] == ["LB G1", "MR 100", "E"]

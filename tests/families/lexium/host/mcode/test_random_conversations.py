@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 
 from multidrop.base.errors import DriveError
 from multidrop.dialects import Priority
-from multidrop.families.lexium.host.mcode.family import MCODE
+from multidrop.families.lexium.host.mcode.family import MCodeFamily
 from multidrop.simulator.cell.spec import Faults
 from tests.conftest import Bench
 from tests.support.examples import examples
@@ -52,7 +52,7 @@ class Trial:
         error, printed = "", ()
         try:
             if text == "motion":
-                self.desk.bench.run(MCODE.motion(state, Priority.POLL), state)
+                self.desk.bench.run(MCodeFamily(state).motion(Priority.POLL), state)
             else:
                 printed = self.desk.type(text, who)
         except DriveError as failure:

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from multidrop.base.errors import NoAnswer, Refused
 from multidrop.dialects.program_files import Held, Stored
 from multidrop.families.lexium.host.mcode.download import plan
-from multidrop.families.lexium.host.mcode.family import MCODE
+from multidrop.families.lexium.host.mcode.family import MCodeFamily
 from multidrop.families.lexium.host.mcode.program_readout import GLOBAL, LABEL, LOCAL
 from multidrop.families.lexium.manual import program_file
 from tests.support.mcode_drives import one_drive
@@ -31,7 +31,7 @@ S
 
 def download(desk, state, text, **how):
     lines = program_file.read(text, "x.mxt")
-    desk.run(MCODE.programs.download(state, lines, None, lambda done, total: None), state, **how)
+    desk.run(MCodeFamily(state).programs.download(lines, None, lambda done, total: None), state, **how)
 
 
 def only_reads(desk, since):
@@ -191,11 +191,11 @@ def test_what_was_uploaded_can_be_downloaded_again(bench):
     download(desk, state, PROGRAM)
     desk.type(state, "EX G1")
     desk.wait(0.2)
-    kept = desk.run(MCODE.programs.upload(state, raw=False), state)
+    kept = desk.run(MCodeFamily(state).programs.upload(raw=False), state)
     assert kept[:3] == ("VA Q1=25", "VA Q2=0", "PG 1")
     for _ in range(3):
         download(desk, state, "\n".join(kept))
-    assert desk.run(MCODE.programs.upload(state, raw=False), state) == kept
+    assert desk.run(MCodeFamily(state).programs.upload(raw=False), state) == kept
 
 
 def test_factory_defaults_in_a_file_make_every_name_free():

@@ -6,7 +6,7 @@ from multidrop.dialects import Kind, Request
 from multidrop.dialects.program_files import Held
 from multidrop.families.lexium.host.mcode import codec as codecs
 from multidrop.families.lexium.host.mcode.codec import BETWEEN, EXECUTED, EXECUTING, LIST_QUIET, PATIENT, SHORT, MCode
-from multidrop.families.lexium.host.mcode.family import MCODE
+from multidrop.families.lexium.host.mcode.family import MCodeFamily
 from multidrop.families.lexium.manual import program_file
 from tests.support.mcode_drives import one_drive
 
@@ -23,8 +23,8 @@ def transfers(bench, em, party, check, baud):
     """Seconds of a download and of an upload, and the file that the upload made."""
     desk, state = one_drive(bench, em, party, check, "LMDCM", baud)
     lines = program_file.read(PROGRAM, "x.mxt")
-    down, _ = took(desk, MCODE.programs.download(state, lines, Held(), lambda done, total: None), state)
-    up, made = took(desk, MCODE.programs.upload(state, True), state)
+    down, _ = took(desk, MCodeFamily(state).programs.download(lines, Held(), lambda done, total: None), state)
+    up, made = took(desk, MCodeFamily(state).programs.upload(True), state)
     return down, up, made
 
 
@@ -44,7 +44,9 @@ def test_transfers_in_any_echo_mode_take_little_longer_than_with_all_echoed(benc
 def test_a_program_that_the_file_starts_saves_the_echo_mode_that_was_there(bench, em):
     desk, state = one_drive(bench, em, True, 1, "LMDCM", 0)
     text = "VM=400000\nPG 1\nLB G1\nS\nE\nPG\nVM=300000\nEX G1\n"
-    desk.run(MCODE.programs.download(state, program_file.read(text, "x.mxt"), None, lambda done, total: None), state)
+    desk.run(
+        MCodeFamily(state).programs.download(program_file.read(text, "x.mxt"), None, lambda done, total: None), state
+    )
     desk.wait(2.0)
     device = desk.devices["a"]
     assert (state.restore, state.codec.em, device.memory.echo_mode) == (None, em, em)
@@ -117,7 +119,9 @@ def test_a_list_is_parsed_once_however_its_bytes_come(monkeypatch):
 
 def test_an_empty_line_of_a_program_does_not_cut_a_list_short(bench):
     desk, state = one_drive(bench, 1, False, 0, "LMDCM", 9600)
-    desk.run(MCODE.programs.download(state, program_file.read(PROGRAM, "x.mxt"), None, lambda done, total: None), state)
+    desk.run(
+        MCodeFamily(state).programs.download(program_file.read(PROGRAM, "x.mxt"), None, lambda done, total: None), state
+    )
     printed = []
 
     def prints(desk):
@@ -125,5 +129,5 @@ def test_an_empty_line_of_a_program_does_not_cut_a_list_short(bench):
             printed.append(desk.now)
             desk.line.receive(b"\r\n\r\n", desk.now)
 
-    listed = desk.run(MCODE.perform(state, "PR UV"), state, at=prints)
+    listed = desk.run(MCodeFamily(state).perform("PR UV"), state, at=prints)
     assert printed and [line for line in listed if "=" in line] == ["G1 = 1", "Q1 = G 3"]

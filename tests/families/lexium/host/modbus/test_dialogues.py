@@ -21,16 +21,16 @@ from multidrop.families.lexium.host.modbus import (
     values,
 )
 from multidrop.families.lexium.host.modbus.codec import Modbus, ModbusState, pdu_codec
-from multidrop.families.lexium.host.modbus.family import MODBUS
-from multidrop.families.lexium.host.modbus.motions import MOTIONS
-from multidrop.families.lexium.host.modbus.values import PARAMETERS, UNITS, VALUES
+from multidrop.families.lexium.host.modbus.family import ModbusFamily
+from multidrop.families.lexium.host.modbus.motions import ModbusMotions
+from multidrop.families.lexium.host.modbus.values import ModbusParameters, ModbusUnits, ModbusValues
 from multidrop.families.lexium.manual.grammar import parse
 from multidrop.families.lexium.manual.modbus.registers import REGISTERS
 from tests.support.dialogues import dialogue_tests
 
 USED = (
-    replace, Hints, Kind, Priority, mcode_units, family, MODBUS, codec, framing, limits, mapping, motions, operations,
-    pdu, values, MOTIONS, PARAMETERS, UNITS, VALUES, REGISTERS, Evidence, Move, MoveKind, ORDINARY, Change,
+    replace, Hints, Kind, Priority, mcode_units, family, ModbusFamily, codec, framing, limits, mapping, motions, operations,
+    pdu, values, ModbusMotions, ModbusParameters, ModbusUnits, ModbusValues, REGISTERS, Evidence, Move, MoveKind, ORDINARY, Change,
     Permission, Readings, pdu_codec,
 )  # fmt: skip
 """The names that calls in the files use."""
@@ -47,7 +47,7 @@ def unread():
 
 
 def type_(state, text):
-    return MODBUS.perform(state, text)
+    return ModbusFamily(state).perform(text)
 
 
 def asked(pdu, tag=0):
@@ -72,7 +72,7 @@ def progress(shown):
 
 def parts_read(state, facts):
     """Read every part of the conditions, one after the other."""
-    for part in VALUES.parts(state, facts):
+    for part in ModbusValues(state).parts(facts):
         found = yield from part.read(state)
         facts = {**facts, **found}
     return facts

@@ -10,7 +10,7 @@ from multidrop.base.errors import Inexpressible, NoAnswer, Refused
 from multidrop.dialects import End, Hints, Kind, Priority, Procedure, Reply
 from multidrop.families.lexium.host.modbus import framing, mapping
 from multidrop.families.lexium.host.modbus.codec import Modbus, ModbusState
-from multidrop.families.lexium.host.modbus.family import MODBUS
+from multidrop.families.lexium.host.modbus.family import ModbusFamily
 from multidrop.families.lexium.host.modbus.operations import identify
 from multidrop.families.lexium.manual.modbus.registers import REGISTERS
 from multidrop.families.lexium.simulator.ports.modbus import ModbusPort
@@ -88,7 +88,7 @@ def state(**more):
 
 def type_(text, far, drive=None):
     drive = drive or state()
-    return say(MODBUS.perform(drive, text), far)
+    return say(ModbusFamily(drive).perform(text), far)
 
 
 LOOK = (3, "001f0001")
@@ -271,7 +271,7 @@ def test_a_refused_write_of_raw_registers_names_the_value_that_is_wrong(address,
         return Reply(body=b"\x03\x02\0\0")
 
     with pytest.raises(Refused) as caught:
-        say(MODBUS.registers.write(state(), address, values), far)
+        say(ModbusFamily(state()).registers.write(address, values), far)
     assert named in str(caught.value)
 
 
@@ -288,7 +288,7 @@ def test_an_exception_of_a_request_that_may_be_executed_is_no_refusal(number, te
         return Reply(end=End.REFUSED, body=bytes((asked.body[0] | 0x80, number)))
 
     with pytest.raises(NoAnswer, match=f"'{text}' has no result: exception {number:02} {NAMES[number]} at ") as caught:
-        say(MODBUS.perform(state(), text), answer)
+        say(ModbusFamily(state()).perform(text), answer)
     assert ("it was sent once" in str(caught.value)) != text.startswith("PR")
     assert ("the gateway got no reply" in str(caught.value)) == (number == 11)
 
@@ -299,7 +299,7 @@ def test_a_gateway_without_a_path_is_not_called_the_drives_refusal(text, far):
         return Reply(end=End.REFUSED, body=bytes((asked.body[0] | 0x80, 10)))
 
     with pytest.raises(Refused, match=f"^'{text}' did not reach the drive: exception 10 .*the gateway did not pass"):
-        say(MODBUS.perform(state(), text), answer)
+        say(ModbusFamily(state()).perform(text), answer)
 
 
 @pytest.mark.parametrize("number", [5, 10, 11])
@@ -345,7 +345,7 @@ def test_silence_says_which_number_came(far):
     with pytest.raises(
         NoAnswer, match=r"does not reply \(a reply with transaction number 0 came, .* 7\): it is not kn"
     ):
-        say(MODBUS.perform(state(), "MR 5"), answer)
+        say(ModbusFamily(state()).perform("MR 5"), answer)
 
 
 def test_a_failure_is_told_with_the_drives_own_error_which_is_cleared(far):
@@ -394,7 +394,7 @@ def test_an_error_whose_flag_could_not_be_read_is_told_before_the_next_command_a
 
 def test_an_error_whose_flag_could_not_be_read_before_a_command_may_be_older_than_it():
     far, drive = Far(EF=1, ER=85), state(error=True)
-    procedure = ProcedureRunner(MODBUS.perform(drive, "R2=5"))
+    procedure = ProcedureRunner(ModbusFamily(drive).perform("R2=5"))
     procedure.answer(Reply(end=End.TIMEOUT))
     with pytest.raises(NoAnswer, match=r"error 85: .*may be older than 'R2=5'.*not known whether 'R2=5' was executed"):
         while procedure.request is not None:
@@ -464,7 +464,7 @@ def test_pr_al_clears_no_error():
 
 def test_motion_is_two_requests_of_two_registers():
     far, drive = Far(P=-51200, V=-300), state()
-    (motion,) = say(MODBUS.motion(drive, Priority.POLL), far)
+    (motion,) = say(ModbusFamily(drive).motion(Priority.POLL), far)
     assert (motion.position, motion.velocity) == (-51200, -300)
     assert far.sent == [(3, "00570002"), (3, "00850002")]
 
@@ -472,13 +472,13 @@ def test_motion_is_two_requests_of_two_registers():
 @pytest.mark.parametrize(("name", "ask"), [("BY", "busy"), ("MV", "moving")])
 def test_flags(name, ask):
     drive = state()
-    talk = getattr(MODBUS, ask)
+    talk = getattr(ModbusFamily, ask)
     assert say(talk(drive), Far(**{name: 1})) is True
     assert say(talk(drive), Far()) is False
 
 
 def test_programs_are_for_mcode():
-    assert MODBUS.programs is None and "over Modbus; MCode/TCP" in MODBUS.no_programs
+    assert not ModbusFamily.offers("programs") and "over Modbus; MCode/TCP" in ModbusFamily.no_programs
 
 
 def test_opening_only_reads_and_clears_nothing():
@@ -531,7 +531,7 @@ def test_silence_while_opening_is_no_drive():
 )
 def test_raw_registers(address, count, printed):
     drive = state()
-    assert say(MODBUS.registers.read(drive, address, count), Far(P=-5, HC=5)) == printed
+    assert say(ModbusFamily(drive).registers.read(address, count), Far(P=-5, HC=5)) == printed
 
 
 @pytest.mark.parametrize(
@@ -545,7 +545,7 @@ def test_raw_registers(address, count, printed):
 )
 def test_raw_writes(address, values, sent):
     far, drive = Far(), state()
-    assert say(MODBUS.registers.write(drive, address, values), far) == ()
+    assert say(ModbusFamily(drive).registers.write(address, values), far) == ()
     assert far.sent == [(0x10, sent), LOOK]
 
 
@@ -553,21 +553,21 @@ def test_raw_writes(address, values, sent):
 def test_more_than_two_registers_are_not_asked_for(count):
     drive = state()
     with pytest.raises(Inexpressible, match="1 or 2 registers"):
-        say(MODBUS.registers.read(drive, 0x57, count), Far())
+        say(ModbusFamily(drive).registers.read(0x57, count), Far())
 
 
 def test_outputs_and_identification():
     far, drive = Far(), state()
-    assert say(MODBUS.registers.read_coil(drive, 3), far) == ("O3 = 1",)
-    assert say(MODBUS.registers.write_coil(drive, 2, True), far) == ()
+    assert say(ModbusFamily(drive).registers.read_coil(3), far) == ("O3 = 1",)
+    assert say(ModbusFamily(drive).registers.write_coil(2, True), far) == ()
     assert far.sent[:2] == [(1, "00020001"), (5, "0001ff00")]
-    lines = say(MODBUS.registers.device(drive), far)
+    lines = say(ModbusFamily(drive).registers.device(), far)
     assert lines[:2] == ("vendor: SEM USA", "part number: LMDCE571") and len(lines) == 7
 
 
 def test_requests_say_what_they_are_to_a_person():
     drive = state()
-    talk = MODBUS.perform(drive, "MR 5")
+    talk = ModbusFamily(drive).perform("MR 5")
     request = next(talk)
     assert (request.text, request.kind) == ("MR 5", Kind.COMMAND)
 
@@ -589,11 +589,11 @@ def test_flags_points_settings_and_set_ups_make_the_conditions() -> None:
     device = drive("IS=1,1,0", "OS=2,18,1", "OS=1,16,1", "O1=1", "RC=60", personality="LMDCE")
     port = ModbusPort(device)
     state = ModbusState(Modbus(), product="LMDCE", version="LMDCE 6.002")
-    reader = MODBUS.values
+    reader = ModbusFamily(state).values
     facts: dict[str, Any] = {}
-    for part in reader.parts(state, facts):
-        facts |= carried(port, part.read(state))
-    (found,) = reader.fold(state, facts)
+    for part in reader.parts(facts):
+        facts |= carried(port, part.read())
+    (found,) = reader.fold(facts)
     shown = [(lamp.name, lamp.function, lamp.on) for lamp in found.lamps]
     assert shown[0] == ("1", "home", False)
     assert shown[-3:] == [("1", "", True), ("2", "error", False), ("3", "", False)]
@@ -604,7 +604,7 @@ def test_flags_points_settings_and_set_ups_make_the_conditions() -> None:
 def test_a_disabled_drive_is_read_with_its_flags() -> None:
     port = ModbusPort(drive("DE=0", personality="LMDCE"))
     state = ModbusState(Modbus(), product="LMDCE", version="LMDCE 6.002")
-    reader = MODBUS.values
-    quick = next(part for part in reader.parts(state, {}) if part.name == "state")
+    reader = ModbusFamily(state).values
+    quick = next(part for part in reader.parts({}) if part.name == "state")
     assert not quick.slow
-    assert reader.fold(state, carried(port, quick.read(state)))[0].disabled == "DE=0"
+    assert reader.fold(carried(port, quick.read()))[0].disabled == "DE=0"

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from multidrop.base.errors import NoAnswer, Refused
 from multidrop.families.lexium.host.modbus.codec import Modbus, ModbusState
-from multidrop.families.lexium.host.modbus.family import MODBUS
+from multidrop.families.lexium.host.modbus.family import ModbusFamily
 from multidrop.families.lexium.manual.modbus.registers import REGISTERS, ROWS
 from multidrop.families.lexium.simulator.ports.modbus import ModbusPort
 from tests.support.examples import examples
@@ -38,7 +38,7 @@ SETTINGS = (
 
 def typed(port: ModbusPort, text: str, product: str) -> str:
     """Carry out a typed line over a port of a simulated drive; the text of its refusal, empty for none."""
-    runner = ProcedureRunner(MODBUS.perform(ModbusState(Modbus(), product=product, stranger=""), text))
+    runner = ProcedureRunner(ModbusFamily(ModbusState(Modbus(), product=product, stranger="")).perform(text))
     try:
         while (asked := runner.request) is not None:
             found = Modbus().decode(asked, port.receive(Modbus().encode(asked), 0.0))

@@ -62,10 +62,10 @@ def test_access():
 
 
 def test_a_write_of_raw_registers_is_guarded_as_the_word_that_it_writes():
-    family, state = FAMILIES["modbus"], ModbusState(Modbus())
+    family = FAMILIES["modbus"](ModbusState(Modbus()))
 
     def named(address, *values):
-        found = [family.guards.find(state, line) for line in family.registers.lines(address, values)]
+        found = [family.guard(line) for line in family.registers.lines(address, values)]
         return [each.name for each in found if each]
 
     assert named(0x3C, 1) == ["IP"]
@@ -74,6 +74,6 @@ def test_a_write_of_raw_registers_is_guarded_as_the_word_that_it_writes():
 
 
 def test_a_word_without_a_register_is_refused_and_not_guarded():
-    family, state = FAMILIES["modbus"], ModbusState(Modbus())
+    family = FAMILIES["modbus"](ModbusState(Modbus()))
     assert [family.guards.find(state, text) for text in ("CP", "FD", 'DN="a"', "PR IP", "SL 0")] == [None] * 5
     assert [family.guards.find(state, text).name for text in ("IP", "AS=3")] == ["IP", "AS"]

@@ -10,7 +10,7 @@ from multidrop.base.errors import Inexpressible, NoAnswer, Refused
 from multidrop.dialects import End, Hints, Reply
 from multidrop.families.lexium.host.modbus import framing
 from multidrop.families.lexium.host.modbus.codec import Modbus, ModbusState
-from multidrop.families.lexium.host.modbus.family import MODBUS
+from multidrop.families.lexium.host.modbus.family import ModbusFamily
 from tests.support.procedure import ProcedureRunner
 
 LEXIUM = {1: "LMDCE571", 6: "LMDCE 6.002, Hw: 3.2"}
@@ -53,7 +53,7 @@ def said(talk: Any, far: Far) -> Any:
 
 
 def opened(far: Far) -> ModbusState:
-    (state,) = said(MODBUS.identify(Hints()), far)
+    (state,) = said(ModbusFamily.identify(Hints()), far)
     assert isinstance(state, ModbusState)
     return state
 
@@ -95,12 +95,12 @@ def test_a_state_that_nothing_was_asked_of_is_a_strangers() -> None:
 def test_device_asks_again_and_decides_anew() -> None:
     far = Far(6, 6, LEXIUM, {1: "PLC-7"})
     state = opened(far)
-    assert state.stranger and MODBUS.registers is not None
+    assert state.stranger
     state.take_messages()
-    assert "part number: LMDCE571" in said(MODBUS.registers.device(state), far)
+    assert "part number: LMDCE571" in said(ModbusFamily(state).registers.device(), far)
     assert not state.stranger and state.product == "LMDCE"
     assert state.take_messages()[0] == ["this device identified itself as LMDCE now, so it is used as a Lexium drive"]
-    said(MODBUS.registers.device(state), far)
+    said(ModbusFamily(state).registers.device(), far)
     assert state.stranger and "did not identify itself" in state.take_messages()[0][0]
 
 
@@ -120,7 +120,7 @@ def test_a_line_is_one_request(line: str, pdu: str) -> None:
     far = Far(1, 1)
     state = opened(far)
     far.sent.clear()
-    said(MODBUS.perform(state, line), far)
+    said(ModbusFamily(state).perform(line), far)
     assert [each.hex()[: len(pdu)] for each in far.sent] == [pdu] and not state.last_error and not state.error
 
 
@@ -134,7 +134,7 @@ def test_a_line_that_is_refused_is_one_request_and_no_error_of_a_lexium_is_read(
     far.sent.clear()
     failed = error == 4 and not line.startswith("PR")  # not known: it failed in the execution
     with pytest.raises(NoAnswer if failed else Refused, match=f"exception 0{error}"):
-        said(MODBUS.perform(state, line), far)
+        said(ModbusFamily(state).perform(line), far)
     assert [each.hex()[: len(pdu)] for each in far.sent] == [pdu]
 
 
@@ -142,10 +142,9 @@ def test_raw_registers_are_one_request_each() -> None:
     far = Far(1, 1)
     state = opened(far)
     far.sent.clear()
-    assert MODBUS.registers is not None
-    said(MODBUS.registers.write(state, 0x57, [5]), far)
-    said(MODBUS.registers.write_coil(state, 1, True), far)
-    said(MODBUS.registers.read(state, 0x57, 1), far)
+    said(ModbusFamily(state).registers.write(0x57, [5]), far)
+    said(ModbusFamily(state).registers.write_coil(1, True), far)
+    said(ModbusFamily(state).registers.read(0x57, 1), far)
     assert far.functions == [framing.WRITE_REGISTERS, framing.WRITE_COIL, framing.READ_REGISTERS]
 
 
@@ -154,5 +153,5 @@ def test_all_registers_are_not_read() -> None:
     state = opened(far)
     far.sent.clear()
     with pytest.raises(Inexpressible, match="'PR AL' was not sent"):
-        said(MODBUS.perform(state, "PR AL"), far)
+        said(ModbusFamily(state).perform("PR AL"), far)
     assert not far.sent
