@@ -20,7 +20,7 @@ from multidrop.base.errors import (
 from multidrop.base.files import SourceLine
 from multidrop.dialects.codec import Codec, Priority, Procedure
 from multidrop.dialects.families import family_of, program_languages
-from multidrop.dialects.family import Family, Motion, Programs
+from multidrop.dialects.family import Motion, Programs
 from multidrop.dialects.program_files import Held, ProgramFiles
 from multidrop.dialects.state import DriveState
 from multidrop.dialects.values import Value
@@ -121,9 +121,13 @@ class Drive:
         return self.state.address
 
     @property
-    def family(self) -> Family:
-        """What its family says of it, as it is now: it is another object once the drive was found again after a loss."""
-        return family_of(self.state)
+    def state(self) -> DriveState:
+        """What the host knows of it: another object once it was found again after a loss."""
+        return self._state
+
+    @state.setter
+    def state(self, state: DriveState) -> None:
+        self._state, self.family = state, family_of(state)
 
     @property
     def codec(self) -> Codec:

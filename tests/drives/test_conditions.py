@@ -30,11 +30,11 @@ class Drive:
         self.fails: dict[str, Exception] = {}
         self.read: list[tuple[float, str]] = []
         self.parts = [
-            Part("flags", lambda state: self.part("flags")),
-            Part("limits", lambda state: self.part("limits"), True),
+            Part("flags", lambda: self.part("flags")),
+            Part("limits", lambda: self.part("limits"), True),
         ]
         self.runs: bool | None = None
-        values = SimpleNamespace(parts=lambda state, facts: self.parts, fold=self.fold)
+        values = SimpleNamespace(parts=lambda facts: self.parts, fold=self.fold)
         self.family = SimpleNamespace(values=values)
 
     def part(self, name: str) -> Any:
@@ -52,7 +52,7 @@ class Drive:
         except StopIteration as done:
             return done.value
 
-    def fold(self, state: Any, facts: Any) -> Any:
+    def fold(self, facts: Any) -> Any:
         return (SimpleNamespace(runs=self.runs, facts=dict(facts)),)
 
     async def for_(self, seconds: float) -> list[tuple[float, str]]:

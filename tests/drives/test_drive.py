@@ -1,7 +1,6 @@
 """One drive: what a line to it notes, what is counted, what is refused before it is sent, and its readings."""
 
 import asyncio
-from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -270,8 +269,8 @@ async def test_a_drive_is_calm_where_no_program_runs(runs, calm):
 
 
 def replaced_motion(drive: Drive, *axes: Motion) -> Any:
-    def motion(state: Any, priority: Any) -> Any:
-        yield from real(state, priority)
+    def motion(priority: Any) -> Any:
+        yield from real(priority)
         return axes
 
     real = drive.family.motion
@@ -421,14 +420,15 @@ def otherwise(drive: Drive, **changes: Any) -> None:
 def spoken(drive: Drive, outcome: Any = ("done",), **changes: Any) -> None:
     """Have lines end so, and places of the axis `x` disturbed by each."""
 
-    def perform(state: Any, text: str) -> Any:
+    def perform(text: str) -> Any:
         if isinstance(outcome, Exception):
             raise outcome
         return outcome
         yield
 
-    units = replace(drive.family.units, disturbs=lambda state, text: frozenset("x"))
-    given = {"perform": perform, "units": units, "referencing": lambda state, text: None, **changes}
+    units: Any = drive.family.units
+    units.disturbs = lambda text: frozenset("x")
+    given = {"perform": perform, "units": units, "referencing": lambda text: None, **changes}
     otherwise(drive, **given)
 
 
@@ -459,7 +459,7 @@ async def test_a_line_that_is_stored_disturbs_nothing_and_references_nothing():
     drive.anchored = frozenset("x")
     drive.state.reference_lost("z")
     drive.state.found_storing()
-    spoken(drive, referencing=lambda state, text: Referencing("z", homing=False))
+    spoken(drive, referencing=lambda text: Referencing("z", homing=False))
     assert await drive.send("MR 1") == ("done",)
     assert drive.state.unreferenced == {"z"}
 
@@ -481,7 +481,7 @@ async def homing(drive: Drive, axis: str, text: str = "HM 1") -> list[str]:
         conversation_begins=lambda drive: False,
         conversation_ended=lambda *given: None,
     )
-    spoken(drive, referencing=lambda state, text: Referencing(axis, homing=True))
+    spoken(drive, referencing=lambda text: Referencing(axis, homing=True))
     await drive.send(text)
     return watched
 

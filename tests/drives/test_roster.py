@@ -47,7 +47,7 @@ class Drive:
         self.state = MCodeState(MCode(), name)
         self.motions = MotionRecord()
         self.reads = 0
-        self.family = SimpleNamespace(values=SimpleNamespace(parts=lambda state, facts: ()))
+        self.family = SimpleNamespace(values=SimpleNamespace(parts=lambda facts: ()))
 
     async def motion(self) -> Any:
         self.reads += 1

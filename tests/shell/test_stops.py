@@ -1,7 +1,6 @@
 """What a stop reaches, what it says of what it did not, on simulated lines of every family, in virtual time."""
 
 import asyncio
-from dataclasses import replace
 
 import pytest
 
@@ -210,12 +209,13 @@ async def test_a_drive_that_slows_down_is_waited_for_and_one_that_does_not_is_st
     async with CellSession(tmp_path, bus("press", party("a"))) as shop:
         left = iter(speeds)
 
-        def motion(state, priority):
-            yield state.codec.request(state.address, "PR V")
+        drive = shop.session.selected
+
+        def motion(priority):
+            yield drive.codec.request(drive.address, "PR V")
             return (Motion(0, next(left, 0)),)
 
-        family = replace(shop.session.selected.family, motion=motion)
-        monkeypatch.setattr(shop.session.selected, "family", family)
+        monkeypatch.setattr(drive.family, "motion", motion)
         shop.session.stop()
         await asyncio.sleep(10.0)
         assert [text.removeprefix("press: ") for text in shop.told()[1:]] == said

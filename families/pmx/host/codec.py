@@ -187,3 +187,7 @@ class PmxState(DriveState):
     """One PMX controller."""
 
     codec: Pmx
+
+    @property
+    def who(self) -> str:
+        return self.label or self.address or "the controller"

@@ -306,6 +306,10 @@ class TmclState(DriveState):
     halted: bool = False
     """This session has halted its program between two lines, and has not let it go on."""
 
+    @property
+    def who(self) -> str:
+        return f"module {self.label or self.address}"
+
     def program_halted(self, halted: bool) -> None:
         self.halted = halted
 

@@ -73,7 +73,7 @@ def progress(shown):
 def parts_read(state, facts):
     """Read every part of the conditions, one after the other."""
     for part in ModbusValues(state).parts(facts):
-        found = yield from part.read(state)
+        found = yield from part.read()
         facts = {**facts, **found}
     return facts
 

@@ -75,5 +75,5 @@ def test_a_write_of_raw_registers_is_guarded_as_the_word_that_it_writes():
 
 def test_a_word_without_a_register_is_refused_and_not_guarded():
     family = FAMILIES["modbus"](ModbusState(Modbus()))
-    assert [family.guards.find(state, text) for text in ("CP", "FD", 'DN="a"', "PR IP", "SL 0")] == [None] * 5
-    assert [family.guards.find(state, text).name for text in ("IP", "AS=3")] == ["IP", "AS"]
+    assert [family.guard(text) for text in ("CP", "FD", 'DN="a"', "PR IP", "SL 0")] == [None] * 5
+    assert [family.guard(text).name for text in ("IP", "AS=3")] == ["IP", "AS"]
