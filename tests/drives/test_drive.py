@@ -499,7 +499,7 @@ async def test_the_end_of_a_homing_is_asked_once_and_gives_a_reference_if_it_end
     shop, drive = await drive_a()
     asked = 0
 
-    def homed(state: Any) -> Any:
+    def homed() -> Any:
         nonlocal asked
         asked += 1
         return well
@@ -525,7 +525,7 @@ async def test_what_was_sent_since_a_homing_has_ended_it_unless_it_was_the_homin
         shop.bus.stop([drive])
     elif between == "another homing":
         await homing(drive, "y")
-    otherwise(drive, homed=lambda state: returns(True))
+    otherwise(drive, homed=lambda: returns(True))
     expected = between in ("another homing", "none")
     assert await drive.homing_ended("x") is expected
     assert ("x" not in drive.state.unreferenced) is expected
@@ -540,7 +540,7 @@ async def test_a_homing_that_begins_while_the_end_of_the_last_one_is_asked_has_n
     shop, drive = await drive_a()
     await homing(drive, "x")
 
-    def homed(state: Any) -> Any:
+    def homed() -> Any:
         drive.homings["x"] = (99, 0.0, 0)
         return True
         yield

@@ -93,7 +93,7 @@ async def test_exceptions_of_a_foreign_server_are_refusals():
         with pytest.raises(Refused, match="exception 01 illegal function at function 66"):
             await drive.send("EX A3")
         with pytest.raises(Refused, match="exception 0[23] illegal data (address|value) at register 0x2000"):
-            await drive.run(family_of(drive).registers.read(0x2000, 2))
+            await drive.run(drive.family.registers.read(0x2000, 2))
 
 
 async def test_a_stop_arrives_although_the_server_takes_only_the_first_of_two_requests():

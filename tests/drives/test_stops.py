@@ -429,7 +429,7 @@ async def test_a_bus_that_is_closed_repeats_its_stop_first():
 
 
 async def listing(drive):
-    return await drive.run(drive.programs.listing(drive.state, ""))
+    return await drive.run(drive.programs.listing(""))
 
 
 async def test_no_poll_is_stored_in_a_program():

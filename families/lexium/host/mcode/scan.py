@@ -316,6 +316,7 @@ class MCodeScan(Scan):
     title = "MCode"
     bauds = (4800, 9600, 19200, 38400, 115200)
     clears = CLEARS
+    erases = True
     names = NAMES
 
     def places(self, reach: Reach) -> int:
@@ -329,6 +330,9 @@ class MCodeScan(Scan):
 
     def erase(self) -> Procedure[None]:
         return erase()
+
+    def asked(self, reach: Reach) -> str:
+        return "all names, with and without a checksum"
 
 
 SCAN = MCodeScan()

@@ -472,9 +472,9 @@ def test_motion_is_two_requests_of_two_registers():
 @pytest.mark.parametrize(("name", "ask"), [("BY", "busy"), ("MV", "moving")])
 def test_flags(name, ask):
     drive = state()
-    talk = getattr(ModbusFamily, ask)
-    assert say(talk(drive), Far(**{name: 1})) is True
-    assert say(talk(drive), Far()) is False
+    talk = getattr(ModbusFamily(drive), ask)
+    assert say(talk(), Far(**{name: 1})) is True
+    assert say(talk(), Far()) is False
 
 
 def test_programs_are_for_mcode():
