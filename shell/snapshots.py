@@ -18,7 +18,7 @@ from multidrop.shell.channel import running, transferring
 from multidrop.shell.workspace import Workspace
 from multidrop.simulator import cells
 from multidrop.simulator.cell.writer import BusText, DriveText, write
-from multidrop.simulator.families import FAMILIES, snapshots_of
+from multidrop.simulator.families import FAMILIES
 from multidrop.simulator.floor import Floor
 
 FORBIDDEN = "#@:/ "
@@ -69,7 +69,7 @@ async def read(workspace: Workspace, drive: Drive) -> Snapshot:
 
 def described(snapshot: Snapshot) -> DriveText:
     """The table of a drive in a cell file."""
-    return snapshots_of(FAMILIES[snapshot.kind]).describe(snapshot)
+    return FAMILIES[snapshot.kind].describe(snapshot)
 
 
 async def _bus(workspace: Workspace, bus: Bus, failures: list[DriveError], scales: Scales) -> BusText:

@@ -26,7 +26,7 @@ from multidrop.simulator.families import BY_PERSONALITY
 from multidrop.simulator.motor_files import with_motor
 
 if TYPE_CHECKING:
-    from multidrop.simulator.family import Family
+    from multidrop.simulator.family import SimulatedFamily
 
 SCHEMES = ("pty", "tcp", "udp")
 """Of endpoints; families add those of `own_ports`, and features others (`EndpointKind`)."""
@@ -53,7 +53,7 @@ DRIVE_KEYS = (
 class Reader:
     """Reads cells with drives of some families, given by personality."""
 
-    def __init__(self, families: Mapping[str, Family]) -> None:
+    def __init__(self, families: Mapping[str, type[SimulatedFamily]]) -> None:
         self._families = families
 
     def load(self, path: str | Path, allow: Sequence[Path] = ()) -> Cell:

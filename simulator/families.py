@@ -8,12 +8,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
-from multidrop.base.errors import Diagnostic
 from multidrop.base.on_demand import OnDemand
 from multidrop.simulator.declared import simulated
 
 if TYPE_CHECKING:
-    from multidrop.simulator.family import Family, Snapshots
+    from multidrop.simulator.family import SimulatedFamily
     from multidrop.simulator.program_run import Programs
 
 
@@ -21,21 +20,16 @@ def _personalities() -> dict[str, str]:
     return {personality: each.record for each in simulated().values() for personality in each.personalities}
 
 
-FAMILIES: Mapping[str, Family] = OnDemand(lambda: {name: each.record for name, each in simulated().items()})
+FAMILIES: Mapping[str, type[SimulatedFamily]] = OnDemand(
+    lambda: {name: each.record for name, each in simulated().items()}
+)
 """By name."""
 PROGRAMS: Mapping[str, Programs] = OnDemand(
     lambda: {name: each.programs for name, each in simulated().items() if each.programs}
 )
 """The runs of program files, by the name of their family."""
-BY_PERSONALITY: Mapping[str, Family] = OnDemand(_personalities)
+BY_PERSONALITY: Mapping[str, type[SimulatedFamily]] = OnDemand(_personalities)
 
 
-def snapshots_of(family: Family) -> Snapshots:
-    """Find how drives of a family become tables of a cell file, and back. Raises Diagnostic."""
-    if family.snapshots is None:
-        raise Diagnostic(f"the simulator has no snapshots of the family {family.name}")
-    return family.snapshots
-
-
-def family_of(personality: str) -> Family:
+def family_of(personality: str) -> type[SimulatedFamily]:
     return BY_PERSONALITY[personality]

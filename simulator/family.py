@@ -1,12 +1,14 @@
-"""The record of a simulated family: what the cell, the floor, program tests and `/sim` need to know of its drives."""
+"""The class of a simulated family: what the cell, the floor, program tests and `/sim` need to know of its drives."""
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from types import MappingProxyType
-from typing import NamedTuple, Protocol
+from typing import ClassVar, NamedTuple, Protocol
 
+from multidrop.base.errors import Diagnostic
 from multidrop.dialects.family import Motion
 from multidrop.dialects.values import Snapshot, Value
 from multidrop.simulator.cell.spec import DriveSpec
@@ -107,32 +109,43 @@ class StoredProgram:
     labels: tuple[str, ...] = ()
 
 
-@dataclass(frozen=True)
-class Snapshots:
-    """Drives of a family between units and cell files."""
+class SimulatedFamily(ABC):
+    """The simulated drives of one language. The class itself is what cells and the floor ask."""
 
-    describe: Callable[[Snapshot], DriveText]
-    """Make the table of a drive that was read."""
-    wanted: Callable[[DriveSpec], Mapping[str, Value]]
-    """The settings of a drive in a cell file, as the host's side of the family names them."""
-    program: Callable[[DriveSpec], StoredProgram]
-    """The program of a drive in a cell file. Raises Diagnostic for one that the drive refuses."""
-
-
-@dataclass(frozen=True)
-class Family:
-    """One family of simulated drives. `name` is also that of its dialect on the host's side.
-
-    `ethernet` are the personalities that are reached over Ethernet, alone on their bus. `addressed`: a drive replies
-    only to its own address; otherwise a shared bus needs party mode.
-    """
-
-    name: str
-    read_drive: Callable[[Table, Folder], DriveSpec]
-    build: Callable[[DriveSpec, Place], Unit]
-    ethernet: frozenset[str] = frozenset()
-    addressed: bool = False
-    snapshots: Snapshots | None = None
-    """None: a unit cannot become a drive in a cell file."""
-    keys: tuple[str, ...] = ()
+    name: ClassVar[str]
+    """That of the language on the host's side."""
+    ethernet: ClassVar[frozenset[str]] = frozenset()
+    """The personalities that are reached over Ethernet, alone on their bus."""
+    addressed: ClassVar[bool] = False
+    """A drive replies only to its own address; otherwise a shared bus needs party mode."""
+    keys: ClassVar[tuple[str, ...]] = ()
     """Keys of `[[bus.drive]]` that only its drives have."""
+
+    @classmethod
+    @abstractmethod
+    def read_drive(cls, table: Table, folder: Folder) -> DriveSpec:
+        """Read the table of a drive in a cell file. Raises Diagnostic."""
+
+    @classmethod
+    @abstractmethod
+    def build(cls, spec: DriveSpec, place: Place) -> Unit:
+        """Build a drive that is powered up. Raises Diagnostic for settings that it refuses, and for a program."""
+
+    @classmethod
+    def describe(cls, snapshot: Snapshot) -> DriveText:
+        """Make the table of a drive that was read. Raises Diagnostic where the family makes none."""
+        raise cls._none()
+
+    @classmethod
+    def wanted(cls, spec: DriveSpec) -> Mapping[str, Value]:
+        """The settings of a drive in a cell file, as the host's side of the family names them. Raises Diagnostic."""
+        raise cls._none()
+
+    @classmethod
+    def program(cls, spec: DriveSpec) -> StoredProgram:
+        """The program of a drive in a cell file. Raises Diagnostic for one that the drive refuses."""
+        return StoredProgram()
+
+    @classmethod
+    def _none(cls) -> Diagnostic:
+        return Diagnostic(f"the simulator has no snapshots of the family {cls.name}")

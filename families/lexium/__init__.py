@@ -30,7 +30,7 @@ FAMILY = Feature(
         Dialect("modbus", f"{HERE}.host.modbus.family:ModbusFamily", scheme="modbus"),
         Simulated(
             "mcode",
-            f"{HERE}.simulator.family:MCODE",
+            f"{HERE}.simulator.family:SimulatedLexium",
             ("LMDOM", "LMDCM", "LMDOE", "LMDCE", "LMM", "MDI", "MDIE", "MDIX"),
             f"{HERE}.simulator.program_run:RUNS",
             own_port="modbus",

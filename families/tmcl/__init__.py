@@ -26,7 +26,7 @@ FAMILY = Feature(
         ),
         Simulated(
             "tmcl",
-            f"{HERE}.simulator.family:TMCL",
+            f"{HERE}.simulator.family:SimulatedTmcl",
             (
                 "TMCM",
                 "TMCM-1140",

@@ -7,7 +7,7 @@ from multidrop.dialects.family import Motion
 from multidrop.dialects.values import Levels, Snapshot
 from multidrop.simulator import cells
 from multidrop.simulator.cell.writer import BusText, write
-from multidrop.simulator.families import FAMILIES, family_of, snapshots_of
+from multidrop.simulator.families import FAMILIES, family_of
 from multidrop.simulator.family import Place, Shadow, Unit
 from multidrop.simulator.wire import Transmission
 
@@ -112,7 +112,7 @@ def make(snapshot: Snapshot, begun: float, registers: bool, alone: bool) -> tupl
 
     `begun`: the time of the host's clock from which it lives. `alone`: no other drive is on the line.
     """
-    described = snapshots_of(FAMILIES[snapshot.kind]).describe(snapshot)
+    described = FAMILIES[snapshot.kind].describe(snapshot)
     spec = cells.read(write([BusText(NAME, [described])]), NAME).buses[0].drives[0]
     unit = family_of(spec.personality).build(spec, Place(alone=alone))
     if unit.shadow is None:

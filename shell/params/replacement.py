@@ -23,14 +23,14 @@ from multidrop.shell.params.work import Options, check_ready, send
 from multidrop.shell.programs import transfers
 from multidrop.simulator import cells
 from multidrop.simulator.cell.writer import BusText, write
-from multidrop.simulator.families import family_of, snapshots_of
+from multidrop.simulator.families import family_of
 
 if TYPE_CHECKING:
     from multidrop.dialects.values import Snapshot
     from multidrop.drives.drive import Drive
     from multidrop.shell.session import Session
     from multidrop.simulator.cell.spec import Cell, DriveSpec
-    from multidrop.simulator.family import Snapshots
+    from multidrop.simulator.family import SimulatedFamily
 
 UNNAMED = "!"
 """The name of a drive that has none of its own."""
@@ -247,8 +247,8 @@ class _Replacement:
         self._session.notify(f"{self._name}: verified: it is as {self._spec.name!r} in {self._file}", outcome=True)
 
 
-def _tables(spec: DriveSpec) -> Snapshots:
-    return snapshots_of(family_of(spec.personality))
+def _tables(spec: DriveSpec) -> type[SimulatedFamily]:
+    return family_of(spec.personality)
 
 
 def _spec(snapshot: Snapshot) -> DriveSpec:

@@ -13,7 +13,6 @@ from pymodbus.simulator import DataType, SimData, SimDevice
 
 from multidrop.base.errors import NoAnswer, Refused, TransportLost
 from multidrop.dialects import Hints, Priority
-from multidrop.dialects.families import family_of
 from multidrop.drives import stopping
 from multidrop.drives.bus import Bus
 from multidrop.drives.drive import still

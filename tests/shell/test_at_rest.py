@@ -55,7 +55,9 @@ class Moving:
             def motions(self) -> Motions:
                 return Motions(self.state)
 
-        monkeypatch.setattr(Drive, "family", property(lambda drive: Own(drive.state)))
+        monkeypatch.setattr(
+            Drive, "family", property(lambda drive: Own(drive.state), lambda drive, found: None), raising=False
+        )
 
     def _velocity(self) -> int:
         self.read += 1

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import ast
-from importlib.resources.abc import Traversable
 from pathlib import Path
 from struct import Struct
 
@@ -13,11 +12,11 @@ from multidrop.base.errors import Diagnostic
 from multidrop.families.lexium.simulator.state.models import MODELS
 from multidrop.simulator.cell.drive_keys import WORLD_KEYS, common_keys, read_worlds
 from multidrop.simulator.cell.spec import DriveSpec, WorldSpec
-from multidrop.simulator.cell.table import Table
+from multidrop.simulator.cell.table import Folder, Table
 from multidrop.simulator.cells import Reader
 from multidrop.simulator.declared import simulated
 from multidrop.simulator.families import BY_PERSONALITY, FAMILIES, PROGRAMS, family_of
-from multidrop.simulator.family import Family, Place, Unit
+from multidrop.simulator.family import Place, SimulatedFamily, Unit
 from multidrop.simulator.wire import Transmission, Wire
 from multidrop.simulator.world import World
 
@@ -75,7 +74,7 @@ class Module:
     def supply(self, on: bool, now: float) -> None: ...
 
 
-def read_drive(table: Table, folder: Traversable) -> DriveSpec:
+def read_drive(table: Table, folder: Folder) -> DriveSpec:
     name = table.text("name", "1")
     if not (name.isascii() and name.isdigit() and 1 <= int(name) <= 255):
         raise table.wrong("name", "must be 1 to 255")
@@ -88,7 +87,21 @@ def build(spec: DriveSpec, place: Place) -> Unit:
     return Unit(Module(), Frames(int(spec.name)), worlds, inputs=range(8), counts=4095)
 
 
-TOY = Family("toy", read_drive, build, addressed=True)
+class Toy(SimulatedFamily):
+    """The third family."""
+
+    name = "toy"
+    addressed = True
+
+    @classmethod
+    def read_drive(cls, table: Table, folder: Folder) -> DriveSpec:
+        return read_drive(table, folder)
+
+    @classmethod
+    def build(cls, spec: DriveSpec, place: Place) -> Unit:
+        return build(spec, place)
+
+
 CELL = """
 [[bus]]
 name = "lab"
@@ -116,7 +129,7 @@ def run(wire: Wire, until: float = 10.0) -> bytes:
 
 
 def test_a_cell_reads_drives_of_the_families_that_it_is_given() -> None:
-    cell = Reader({**BY_PERSONALITY, "TOYM": TOY}).read(CELL)
+    cell = Reader({**BY_PERSONALITY, "TOYM": Toy}).read(CELL)
     first, second = cell.buses[0].drives
     assert (first.personality, first.name, second.name) == ("TOYM", "13", "27")
     assert first.further == (WorldSpec(), WorldSpec(home=(-5, 5)))

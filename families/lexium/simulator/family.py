@@ -37,7 +37,7 @@ from multidrop.simulator.cell.drive_keys import (
 from multidrop.simulator.cell.spec import DriveSpec, WorldSpec
 from multidrop.simulator.cell.table import Folder, Table, quoted, shown
 from multidrop.simulator.cell.writer import DriveText, Entry, plain, remark
-from multidrop.simulator.family import Family, Place, Shadow, Snapshots, StoredProgram, Unit
+from multidrop.simulator.family import Place, Shadow, SimulatedFamily, StoredProgram, Unit
 from multidrop.simulator.wire import Transmission
 from multidrop.simulator.world import REVOLUTION, World
 
@@ -266,9 +266,6 @@ def _names(rows: Iterable[Row], variables: Iterable[str]) -> frozenset[str]:
     return frozenset((*variables, *(each[1].upper() for each in found if each is not None)))
 
 
-SNAPSHOTS = Snapshots(describe, wanted, program)
-
-
 DEFAULT = 96
 """BD from the factory."""
 ETHERNET = frozenset(name for name, model in MODELS.items() if model.ethernet)
@@ -335,4 +332,28 @@ def _at_baud(spec: DriveSpec, baud: int) -> DriveSpec:
     return replace(spec, set={"BD": code, **spec.set})
 
 
-MCODE = Family(name="mcode", read_drive=read_drive, build=build, snapshots=SNAPSHOTS, ethernet=ETHERNET)
+class SimulatedLexium(SimulatedFamily):
+    """Simulated Lexium drives and MDrivePlus."""
+
+    name = "mcode"
+    ethernet = ETHERNET
+
+    @classmethod
+    def read_drive(cls, table: Table, folder: Folder) -> DriveSpec:
+        return read_drive(table, folder)
+
+    @classmethod
+    def build(cls, spec: DriveSpec, place: Place) -> Unit:
+        return build(spec, place)
+
+    @classmethod
+    def describe(cls, snapshot: Snapshot) -> DriveText:
+        return describe(snapshot)
+
+    @classmethod
+    def wanted(cls, spec: DriveSpec) -> Mapping[str, Value]:
+        return wanted(spec)
+
+    @classmethod
+    def program(cls, spec: DriveSpec) -> StoredProgram:
+        return program(spec)

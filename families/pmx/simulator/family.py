@@ -39,7 +39,7 @@ from multidrop.simulator.cell.spec import DriveSpec
 from multidrop.simulator.cell.spec import Value as Setting
 from multidrop.simulator.cell.table import Folder, Table, quoted
 from multidrop.simulator.cell.writer import DriveText, Entry, plain, remark
-from multidrop.simulator.family import Effort, Family, Place, Shadow, Snapshots, StoredProgram, Unit, UsbSide
+from multidrop.simulator.family import Effort, Place, Shadow, SimulatedFamily, StoredProgram, Unit, UsbSide
 
 NAMES_OF_AXES = ("x", "y")
 INPUTS, COUNTS = range(1, 9), 5000
@@ -153,7 +153,7 @@ def build(spec: DriveSpec, place: Place) -> Unit:
         shadow=_shadow(device),
         inputs=INPUTS,
         counts=COUNTS,
-        usb=UsbSide(lambda: f"2ED{device.controller.settings.number}", device.execute),
+        usb=UsbSide(lambda: f"2ED{device.controller.settings.number}", lambda text, now: device.execute(text, now)),
     )
 
 
@@ -192,10 +192,28 @@ def _shadow(device: PmxDevice) -> Shadow:
     return Shadow(rest, motion, align, awaits, efforts, {name: axis.rotor for name, axis in axes.items()})
 
 
-PMX = Family(
-    name="pmx",
-    read_drive=read_drive,
-    build=build,
-    snapshots=Snapshots(describe, wanted, program),
-    addressed=True,
-)
+class SimulatedPmx(SimulatedFamily):
+    """Simulated PMX controllers."""
+
+    name = "pmx"
+    addressed = True
+
+    @classmethod
+    def read_drive(cls, table: Table, folder: Folder) -> DriveSpec:
+        return read_drive(table, folder)
+
+    @classmethod
+    def build(cls, spec: DriveSpec, place: Place) -> Unit:
+        return build(spec, place)
+
+    @classmethod
+    def describe(cls, snapshot: Snapshot) -> DriveText:
+        return describe(snapshot)
+
+    @classmethod
+    def wanted(cls, spec: DriveSpec) -> Mapping[str, Value]:
+        return wanted(spec)
+
+    @classmethod
+    def program(cls, spec: DriveSpec) -> StoredProgram:
+        return program(spec)

@@ -50,7 +50,7 @@ from multidrop.simulator.cell.spec import DriveSpec
 from multidrop.simulator.cell.spec import Value as Setting
 from multidrop.simulator.cell.table import Folder, Table, quoted
 from multidrop.simulator.cell.writer import DriveText, Entry, remark
-from multidrop.simulator.family import Effort, Family, Place, Shadow, Snapshots, StoredProgram, Unit
+from multidrop.simulator.family import Effort, Place, Shadow, SimulatedFamily, StoredProgram, Unit
 from multidrop.simulator.wire import Port, Transmission
 
 VERSION_FORM = re.compile(r"\d{4}V\d{3}", re.ASCII)
@@ -325,11 +325,29 @@ def _shadow(device: TmclModule, names: Sequence[str]) -> Shadow:
     return Shadow(device.unwatch, motion, align, awaits, efforts, shafts)
 
 
-TMCL = Family(
-    name="tmcl",
-    read_drive=read_drive,
-    build=build,
-    snapshots=Snapshots(describe, wanted, program),
-    addressed=True,
-    keys=("any_address",),
-)
+class SimulatedTmcl(SimulatedFamily):
+    """Simulated TMCL modules."""
+
+    name = "tmcl"
+    addressed = True
+    keys = ("any_address",)
+
+    @classmethod
+    def read_drive(cls, table: Table, folder: Folder) -> DriveSpec:
+        return read_drive(table, folder)
+
+    @classmethod
+    def build(cls, spec: DriveSpec, place: Place) -> Unit:
+        return build(spec, place)
+
+    @classmethod
+    def describe(cls, snapshot: Snapshot) -> DriveText:
+        return describe(snapshot)
+
+    @classmethod
+    def wanted(cls, spec: DriveSpec) -> Mapping[str, Value]:
+        return wanted(spec)
+
+    @classmethod
+    def program(cls, spec: DriveSpec) -> StoredProgram:
+        return program(spec)
