@@ -218,17 +218,20 @@ class Codec(ABC):
         """Return the reply after a quiet time, where it has no end of its own; None: wait for the timeout."""
         return Decoded(Reply(), len(buffer)) if request.kind is Kind.QUIET else None
 
-    @abstractmethod
     def on_timeout(self, request: Request, buffer: bytes) -> Decoded:
         """Return the outcome when time is up: TIMEOUT, or DAMAGED where bytes were received."""
+        if not buffer:
+            return Decoded(Reply(end=End.TIMEOUT), 0)
+        return Decoded(Reply(end=End.DAMAGED, detail=f"heard {buffer[:48].decode('latin-1')!r}"), len(buffer))
 
     def quiet_time(self, request: Request, buffer: bytes) -> float:
         """Seconds of quiet after which the line calls `on_quiet`."""
         return request.settle or 0.0
 
-    @abstractmethod
     def parse_unsolicited(self, buffer: bytes) -> tuple[tuple[str, ...], int]:
         """Lines received while no request is open, and how many bytes they took."""
+        whole = buffer[: max(map(buffer.rfind, (b"\r", b"\n"))) + 1]
+        return tuple(filter(None, re.split("[\r\n]+", whole.decode("latin-1")))), len(whole)
 
     @abstractmethod
     def stop(self, addresses: Sequence[str], sure: bool = True, half_sent: bool = False) -> bytes:
@@ -237,9 +240,9 @@ class Codec(ABC):
         Not `sure`: their settings may have changed. `half_sent`: no byte may end the line that a drive's buffer holds.
         """
 
-    @abstractmethod
     def stop_again(self, addresses: Sequence[str], sure: bool = True) -> Sequence[StopPiece]:
         """The stop to repeat, in pieces."""
+        return [StopPiece(self.stop(addresses, sure))]
 
     @abstractmethod
     def hears_stop(self, data: bytes, address: str, sure: bool = True) -> bool:

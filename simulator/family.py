@@ -11,6 +11,7 @@ from typing import ClassVar, NamedTuple, Protocol
 from multidrop.base.errors import Diagnostic
 from multidrop.dialects.family import Motion
 from multidrop.dialects.values import Snapshot, Value
+from multidrop.simulator.cell.drive_keys import common_keys
 from multidrop.simulator.cell.spec import DriveSpec
 from multidrop.simulator.cell.table import Folder, Table
 from multidrop.simulator.cell.writer import DriveText
@@ -122,9 +123,9 @@ class SimulatedFamily(ABC):
     """Keys of `[[bus.drive]]` that only its drives have."""
 
     @classmethod
-    @abstractmethod
     def read_drive(cls, table: Table, folder: Folder) -> DriveSpec:
-        """Read the table of a drive in a cell file. Raises Diagnostic."""
+        """Read the table of a drive in a cell file; by default its name and what all have. Raises Diagnostic."""
+        return DriveSpec(**common_keys(table, folder), name=table.text("name", DriveSpec.name))
 
     @classmethod
     @abstractmethod
