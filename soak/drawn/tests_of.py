@@ -44,7 +44,7 @@ class Map:
     blocks: dict[str, dict[str, list[tuple[list[int], list[int]]]]]
 
     def of(self, path: str, line: int, source: bytes) -> list[MeasuredTest]:
-        """The tests that execute a line of a file: first those of `make quick`, of these the module's own, then fast ones.
+        """The tests that execute a line of a file: those of `make quick` first, of these the module's own.
 
         So there is time for the module's own tests of a line that hundreds of others execute, too.
         """
