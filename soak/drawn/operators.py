@@ -18,7 +18,7 @@ COMPUTED = {
     ast.LShift: ">>", ast.RShift: "<<", ast.BitAnd: "|", ast.BitOr: "&",
 }  # fmt: skip
 
-SAME_IN_ANY_ORDER = {"isinstance", "cast", "TypeVar", "NamedTuple", "min", "max"}
+SAME_IN_ANY_ORDER = {"isinstance", "cast", "TypeVar", "NamedTuple", "min", "max", "suppress"}
 """Functions of which the swapped arguments are the same, or an error at once."""
 
 
@@ -247,7 +247,9 @@ class _Finder(ast.NodeVisitor):
             self.generic_visit(node)
 
     def _swap(self, first: ast.expr, second: ast.expr, call: ast.Call) -> None:
-        if isinstance(call.func, ast.Name) and call.func.id in SAME_IN_ANY_ORDER:
+        called = call.func
+        name = called.id if isinstance(called, ast.Name) else called.attr if isinstance(called, ast.Attribute) else ""
+        if name in SAME_IN_ANY_ORDER:
             return
         (start, first_end), (second_start, end) = self._place(first), self._place(second)
         between = self.source[first_end:second_start].decode()

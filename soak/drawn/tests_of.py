@@ -44,7 +44,10 @@ class Map:
     blocks: dict[str, dict[str, list[tuple[list[int], list[int]]]]]
 
     def of(self, path: str, line: int, source: bytes) -> list[MeasuredTest]:
-        """The tests that execute a line of a file, those of `make quick` first, and of these the fast ones."""
+        """The tests that execute a line of a file: those of `make quick` first, of these the module's own.
+
+        So there is time for the module's own tests of a line that hundreds of others execute, too.
+        """
         inner = [each for each in functions(source) if each[1] <= line <= each[2]]
         name, first = (inner[-1][0], inner[-1][1]) if inner else ("", 1)
         blocks = self.blocks.get(path, {}).get(name, [])
@@ -52,7 +55,11 @@ class Map:
         if not found:
             found = [tests for blocks in self.blocks.get(path, {}).values() for _, tests in blocks]
         numbers = {number for tests in found for number in tests}
-        return sorted((self.tests[number] for number in numbers), key=lambda each: (not each.quick, each.seconds))
+        own = f"/test_{Path(path).stem}.py::"
+        return sorted(
+            (self.tests[number] for number in numbers),
+            key=lambda each: (not each.quick, own not in each.node, each.seconds),
+        )
 
 
 def kept() -> Map:

@@ -232,6 +232,17 @@ def test_after_a_break_nothing_is_written_until_the_wire_has_been_quiet():
     assert run.written[0] == (round(1.05 + QUIET, 4), b"PR P\r")
 
 
+@pytest.mark.parametrize(("cut", "doubtful"), [("PR A", True), ("", False)])
+def test_what_comes_after_a_break_may_be_the_reply_to_what_was_in_flight_before(cut, doubtful):
+    line = Line(QUIETLY)
+    if cut:
+        line.ask(request(cut))
+    line.events(0.0)
+    line.cut_off(1.0, begun=False)
+    line.ask(request("PR P"))
+    assert LineRun(line, 3.0, {2.0: b"\r\n7\r\n"}, start=1.0).doubts == [("PR P", doubtful)]
+
+
 @pytest.mark.parametrize("every", [0.005, 0.02, 0.033, 0.05, 0.1])
 def test_a_stop_key_that_is_held_down_keeps_no_piece_of_the_stop_from_the_wire(every):
     line = Line(MCode())

@@ -14,6 +14,8 @@ from multidrop.drives.poller import AFTER_DEFECT, Due, Poller, Subscription
 from multidrop.drives.readings import Seen
 from multidrop.drives.telemetry import Value, _MotionPoller, _ValuePoller
 from multidrop.families.lexium.host.mcode.codec import MCode
+from tests.support.cell_session import party
+from tests.support.simulated_bus import SimulatedBus
 from tests.support.told_link import ToldLink
 
 pytestmark = pytest.mark.virtual
@@ -419,3 +421,14 @@ async def test_a_value_that_gets_three_naks_in_a_row_counts_as_refused():
         roster.at("a").asked[-1][1](Outcome((), NoAnswer("NAK"), None, transaction(End.NAK)))
     await asyncio.sleep(60)
     assert link.told == [("a: NAK to 'I4'; it is not read again", "a", True)] and len(roster.at("a").asked) == 3
+
+
+async def test_values_are_read_twenty_times_a_second_unless_another_period_is_asked_for():
+    shop = await SimulatedBus(party("a")).open("a")
+    for period, least, most in ((None, 18, 21), (0.5, 2, 3)):
+        value, before = Value("a", "VM"), len(shop.events)
+        telemetry = shop.bus.telemetry
+        reading = telemetry.read([value]) if period is None else telemetry.read([value], period)
+        await asyncio.sleep(1)
+        reading.close()
+        assert least <= sum(isinstance(each, Valued) for each in shop.events[before:]) <= most

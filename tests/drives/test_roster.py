@@ -226,6 +226,15 @@ async def test_a_drive_that_replies_again_is_looked_at_where_something_is_known_
     assert [text.split(":")[0] for text, *_ in link.told] == ["c was restarted (sign-on; position 5 now)"]
 
 
+@pytest.mark.parametrize(("sign", "counted"), [("", 1), ("sign-on", 0)])
+async def test_a_restart_that_a_look_finds_ends_the_motions_and_one_with_a_sign_has_done_so_before(sign, counted):
+    drive = Drive("a", at(0), rested={"": 5})
+    restarts, link, (a,) = looking(drive)
+    restarts.replied_again(a, sign)
+    await asyncio.sleep(2)
+    assert drive.motions.restarts == counted and len(link.told) == 1
+
+
 async def test_a_look_that_is_under_way_is_not_begun_again():
     drive = Drive("a", at(5))
     restarts, _, (a,) = looking(drive)
@@ -441,6 +450,30 @@ async def test_the_address_of_all_drives_is_not_listed_and_is_set_like_the_first
     assert roster.conversation_begins(to_all) is False
     assert roster.unlisted == {} and to_all.codec == roster.at("a").codec
     assert not to_all.state.settings_unknown
+
+
+async def test_a_drive_that_is_listed_is_not_one_that_was_only_addressed():
+    shop, roster = await roster_of("a", "b")
+    assert roster.conversation_begins(roster.at("b")) is False
+    assert roster.unlisted == {} and len(roster.all_drives) == 2
+
+
+async def test_an_address_of_a_line_of_strangers_is_one_and_of_a_line_of_known_drives_is_none():
+    roster = SimulatedBus(party("a")).bus.roster
+    roster.family = FAMILIES["modbus"]
+    device = roster.at("")
+    assert roster.strange and device.state.stranger
+    device.state.identified("LMDCE", "6.0")
+    roster.drives[""] = device
+    assert not roster.strange and roster.at("other").state.stranger == ""
+
+
+async def test_a_homing_of_a_drive_of_the_list_is_watched_to_its_end():
+    shop, roster = await roster_of("a")
+    drive: Any = Drive("a", at(5))
+    roster.homes(drive, "x")
+    await asyncio.sleep(2)
+    assert [each for each in shop.told if "homing" in each] == ["a x is referenced: the homing has ended"]
 
 
 async def test_a_drive_that_gets_another_address_is_listed_under_it():

@@ -96,6 +96,15 @@ def test_there_is_no_draft_of_what_is_not_there(store: MacroStore, folder: Path)
     assert not folder.exists()
 
 
+def test_there_is_no_draft_of_a_macro_that_appears_meanwhile(
+    store: MacroStore, folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(store, "contents", lambda name: None)
+    with pytest.raises(Diagnostic, match="no macro 'm'"):
+        begin_draft(store, folder, "m")
+    assert not folder.exists()
+
+
 def test_a_draft_that_cannot_be_written_is_told(store: MacroStore, folder: Path) -> None:
     folder.parent.mkdir()
     folder.write_text("in the way")

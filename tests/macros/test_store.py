@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from multidrop.base.errors import Diagnostic
 from multidrop.macros import Macro, MacroStore, Step, format_macro, parse_macro
 from multidrop.macros.store import listed
-from multidrop.macros.toml_format import with_values
+from multidrop.macros.toml_format import quoted, with_values
 
 SHUTTLE = Macro("shuttle", (Step(0.0, "@b EX Ga"), Step(1.25, 'PR "x \\ y"')), key="F3", note="to and fro")
 GOOD = 'name = "a"\n[[step]]\nafter = 0\nline = "MR 1"\n'
@@ -309,6 +309,22 @@ def test_remarks_anywhere_survive_a_change_of_the_key(remark: str, note: str) ->
     except Diagnostic:
         return  # a control character within a remark
     assert with_values(text, {"key": "F12"}, "x") == text.replace('key = "F2"', 'key = "F12"')
+
+
+@pytest.mark.parametrize(
+    ("text", "changed"),
+    [
+        ("a = 'x'\n", "a = 'x'\nkey = 'F2'\n"),
+        ("a = 'x'", "a = 'x'\nkey = 'F2'\n"),
+        ("a = 'x'\r\n", "a = 'x'\r\nkey = 'F2'\r\n"),
+        ("a = 'x'\nb = 1\r\n", "a = 'x'\nkey = 'F2'\nb = 1\r\n"),
+        ("# remark\r\na = 'x'\nb = 1\n", "# remark\r\na = 'x'\nkey = 'F2'\r\nb = 1\n"),
+        ("[a]\nb = 1\n", "key = 'F2'\n[a]\nb = 1\n"),
+        ("a = [\n1]\n", "key = 'F2'\na = [\n1]\n"),
+    ],
+)
+def test_a_new_key_stands_behind_the_first_statement_and_ends_as_the_lines_before_it(text: str, changed: str) -> None:
+    assert with_values(text, {"key": "F2"}, "x") == changed.replace("'F2'", quoted("F2"))
 
 
 @pytest.mark.fork

@@ -133,6 +133,15 @@ def test_two_macros_on_a_key_are_not_exported() -> None:
         exported([Macro("f2", (Step(0, "H"),)), Macro("m", (Step(0, "H"),), "F2")])
 
 
+@pytest.mark.parametrize(
+    ("seconds", "pause"),
+    [(0.05, "^m"), (1, "^p"), (5, "^p^p^p^p^p"), (5.95, "^p" * 5 + "^m" * 19), (6, "^d6000"), (0.01, "^d10")],
+)
+def test_a_pause_up_to_six_seconds_is_spelt_out_in_seconds_and_twentieths(seconds: float, pause: str) -> None:
+    macro = Macro("f3", [Step(0, "H"), Step(0, f"/sleep {seconds}"), Step(0, "PR P")], "F3")
+    assert exported([macro]) == f"F3 H^M{pause}PR P^M\n"
+
+
 def test_sleeps_become_pauses() -> None:
     macro = Macro("m", (Step(0, "H"), Step(0, "/sleep 1.5"), Step(0.5, "PR P"), Step(7, "5")), "F3", "a note")
     assert exported([macro]) == "F3 H^M^p^m^m^m^m^m^m^m^m^m^mPR P^M^d6950^m5^M ; a note\n"

@@ -260,6 +260,19 @@ def test_what_fails_before_the_program_has_no_line_of_it(run: Run, tmp_path: Pat
     assert [(each["line"], each["ok"]) for each in lines] == [(0, False)] and last["summary"]["failed"] == 1
 
 
+def test_a_signal_while_the_end_is_reported_cuts_nothing_off(run: Run, tmp_path: Path, monkeypatch: Any) -> None:
+    (tmp_path / "cell.toml").write_text("frob = 1\n")
+    say = python_program.fail
+
+    def fail(failure: BaseException) -> int:
+        signal.raise_signal(signal.SIGINT)
+        return say(failure)
+
+    monkeypatch.setattr(python_program, "fail", fail)
+    done = run("print('never')")
+    assert done.returncode == 2 and done.stderr.startswith("cell.toml:1: ") and done.stderr.count("\n") == 1
+
+
 def test_a_traceback_has_the_frames_of_the_program_for_each_of_its_exceptions(run: Run) -> None:
     text = (
         "def ask():\n    a.send('VM=5')\ndef turn():\n    try:\n        ask()\n    except Exception as refusal:\n"

@@ -4,9 +4,14 @@ import json
 import re
 import shlex
 import time
+from types import SimpleNamespace
 
 import pytest
 
+from multidrop.base.errors import TransportLost
+from multidrop.commands import scan
+from multidrop.shell.connect.scheme import Scheme
+from multidrop.shell.finding.scanning import Scanning
 from multidrop.shell.prompt.terminal_input import PAUSE
 from tests.support.front_door import read_to_end
 
@@ -41,6 +46,41 @@ def test_a_rescue_names_its_steps_and_ends_once_a_drive_replies(multidrop):
     done = multidrop("rescue", "sim:#eth")
     assert done.returncode == 0 and "LMDCE" in done.stdout
     assert done.stderr.startswith("step 1: search with MCode; this moves and changes nothing\nopen with: ")
+
+
+@pytest.mark.parametrize(("names", "code", "set_plain"), [("a", 0, ["a"]), ("ab", 2, [])])
+def test_plain_is_for_a_drive_that_is_alone(multidrop, monkeypatch, names, code, set_plain):
+    done_to = []
+
+    class Found:
+        def __init__(self, session, scanning):
+            self.found = scanning.found
+
+        async def run(self, bauds, everything, erase):
+            self.found += [SimpleNamespace(state=SimpleNamespace(address=name)) for name in names]
+
+        async def make_plain(self, drive):
+            done_to.append(drive.state.address)
+
+    monkeypatch.setattr(scan, "Rescue", Found)
+    monkeypatch.setattr(scan, "_conclude", lambda *_: None)
+    done = multidrop("rescue", "sim:#eth", "--plain")
+    assert (done.returncode, done_to) == (code, set_plain)
+    assert ("--plain is for a drive that is alone; a, b replied" in done.stderr) == bool(code)
+
+
+@pytest.mark.parametrize(("count", "said"), [(1, ["1 has gone"]), (2, ["1 has gone", "2 has gone"])])
+def test_a_port_that_is_lost_in_a_search_is_named_where_others_are_searched_too(multidrop, monkeypatch, count, said):
+    lost = []
+
+    async def run(self, bauds, everything):
+        lost.append(self)
+        raise TransportLost(f"{len(lost)} has gone")
+
+    monkeypatch.setattr(Scanning, "run", run)
+    monkeypatch.setattr(Scheme, "searched", lambda self, text: [text] * count)
+    done = multidrop("scan", "sim:#eth")
+    assert (done.returncode, done.stdout, done.stderr.splitlines()) == (3, "", said)
 
 
 @pytest.mark.parametrize(

@@ -12,6 +12,7 @@ import pytest
 
 from multidrop.base.errors import DriveError, NoAnswer, Refused
 from multidrop.drives.drive import confirmed_motion
+from multidrop.shell.motions import perform, sequence
 from multidrop.shell.waits import in_motion
 from tests.support.cases import for_each
 from tests.support.cell_session import CellSession, bus, party, pmx
@@ -90,6 +91,23 @@ async def test_one_drive_that_does_not_reply_keeps_no_line_from_the_others(shop:
     with pytest.raises(NoAnswer) as caught:
         await sent(shop.session, "@press:b SL 5000")
     assert str(caught.value).startswith("b does not reply: 'SL 5000' was not sent")
+
+
+@for_each("certain, stopped", [(True, [False]), (False, [True])])
+async def test_a_stop_that_may_have_been_executed_counts_as_one_of_this_sequence(
+    shop: CellSession, certain: bool, stopped: list[bool]
+) -> None:
+    def work() -> Any:
+        raise Refused("it, or another line", certain=certain)
+        yield
+
+    drive = shop.session.drive("press", "a")
+    async with shop.session.automations.run():
+        await shop.session.run("@press:a MA 90000")
+        with pytest.raises(Refused):
+            await perform(shop.session, drive, ["SL 0"], work())
+        assert [each.stopped for each in drive.motions.open_of(sequence(shop.session))] == stopped
+        shop.session.automations.leave()
 
 
 # What is in motion

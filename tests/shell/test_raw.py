@@ -24,13 +24,14 @@ ALONE = 'personality = "LMDCM"\nset = { EM = 0 }'
 
 
 @asynccontextmanager
-async def opened(folder, *drives, query="", reconnect=False):
+async def opened(folder, *drives, query="", reconnect=False, identified=lambda bus: None):
     """A line in raw mode from the beginning."""
     shop = CellSession(folder, bus("line", *(drives or (ALONE,)), baud=0))
     await shop.session.close()
     settings = Settings({}, folder / "config", folder / "state", data=folder / "data")
     shop.session = Session(settings, raw=True, reconnect=reconnect)
     shop.session.subscribe(shop.events.append)
+    shop.session.hooks.identified.append(identified)
     await shop.session.open_all([shop.url + query])
     try:
         yield shop
@@ -336,3 +337,9 @@ async def test_a_line_that_a_drive_has_replied_to_asks_nothing(shop):
     await say(shop, "PR P")
     await shop.session.run("/raw off")
     assert "line" not in shop.session.raw
+
+
+async def test_a_line_that_is_opened_raw_is_told_to_features_as_one_that_is_open(tmp_path):
+    told = []
+    async with opened(tmp_path, identified=told.append) as shop:
+        assert told == list(shop.session.buses.values())

@@ -1,6 +1,8 @@
 """What a stop reaches, what it says of what it did not, on simulated lines of every family, in virtual time."""
 
 import asyncio
+from dataclasses import replace
+from datetime import datetime
 
 import pytest
 
@@ -361,3 +363,18 @@ async def test_where_the_stop_key_may_be_swallowed_nothing_moves_before_it_came_
             shop.session.stop("Ctrl+X")
         await shop.session.run(ALL[0])
         assert shop.moving() == {"press:a"}
+
+
+@pytest.mark.parametrize("fate", [Fate.STANDING, Fate.STARTED, Fate.NOT_KNOWN])
+def test_the_banner_is_the_longest_wording_that_fits_and_at_worst_the_shortest(fate):
+    fates = (fate,) if fate is Fate.STANDING else (fate, Fate.STANDING)
+    tally = stop_report.Tally(
+        datetime(2026, 1, 2, 3, 4, 5),
+        tuple(stop_report.Found(each, f"drive {at}", "press") for at, each in enumerate(fates)),
+    )
+    whole = stop_report.headline(tally)
+    wordings = {stop_report.headline(tally, width) for width in range(1, len(whole) + 1)}
+    shortest = min(wordings, key=len)
+    assert whole in wordings and stop_report.headline(tally, 1) == shortest
+    for width in range(len(shortest), len(whole) + 1):
+        assert len(stop_report.headline(tally, width)) == max(len(each) for each in wordings if len(each) <= width)

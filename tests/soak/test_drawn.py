@@ -88,6 +88,14 @@ def test_the_lesser_of_two_values_is_the_same_in_any_order() -> None:
     assert len(mutants("line.py", b"def f(a, b):\n    return [min(a, b), g(a, b)]\n")) == 2
 
 
+def test_errors_that_are_caught_or_suppressed_are_the_same_in_any_order() -> None:
+    source = b"def f(a):\n    try:\n        with suppress(A, B), contextlib.suppress(C, D):\n            b = a\n"
+    source += b"    except (A, B):\n        b = isinstance(a, (A, B)) or isinstance(a, C)\n"
+    assert changes(source) == {
+        ("isinstance(a, (A, B)) or isinstance(a, C)", "((isinstance(a, (A, B))) and (isinstance(a, C)))")
+    }
+
+
 def test_each_mutant_is_another_program_and_names_its_function() -> None:
     whole = ast.dump(ast.parse(SOURCE))
     for each in mutants("line.py", SOURCE):
@@ -147,6 +155,9 @@ def test_the_tests_of_a_line_are_those_that_executed_it_the_fast_ones_first(tmp_
     assert made.of(path, first, source) == [fast, process, slow], "those of make quick first"
     assert made.of(path, last, source) == [process, slow]
     assert made.of(path, first, b"\n\n" + source) == [fast, process, slow], "a new line elsewhere moves nothing"
+    own = MeasuredTest("tests/base/test_atomic.py::own", 9.0, True)
+    again = Map([*made.tests, own], {path: {name: [([0], [0, 1, 2, 3])]}})
+    assert again.of(path, first, source) == [own, fast, process, slow], "those of the module before them"
     assert name in made.blocks[path] and made.of("macros/model.py", 1, b"") == []
 
 

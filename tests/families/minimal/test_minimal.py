@@ -89,4 +89,4 @@ async def test_what_it_lacks_is_one_line_and_sends_nothing(cell: CellSession, li
         await cell.session.run(line.replace("{", f"{tmp_path}/").replace("}", ""))
     assert str(failure.value).startswith(LACKS[line]) and "\n" not in str(failure.value)
     assert cell.session.buses["line"].drives["A"].requests == sent
-    assert not (tmp_path / "s.toml").exists() and not (tmp_path / "x.csv").exists()
+    assert not (tmp_path / "x.csv").exists() and not (tmp_path / "a.toml").exists()

@@ -1,6 +1,7 @@
 """Several URLs at once: side by side, in their order, and no one waits for another."""
 
 import asyncio
+from types import SimpleNamespace
 
 import pytest
 
@@ -9,6 +10,7 @@ from multidrop.dialects import Hints
 from multidrop.shell import stop_report
 from multidrop.shell.configuration import Settings
 from multidrop.shell.connect.opening import Opened
+from multidrop.shell.openings import label
 from multidrop.shell.session import Session
 from multidrop.transports import Unreachable
 from tests.support.cell_session import CellSession, bus, party
@@ -216,3 +218,20 @@ async def test_lines_of_one_host_are_named_by_their_ports(tmp_path):
     await floor.session.open("tcp://cell:5033")
     assert list(floor.session.buses)[2:] == ["cell", "spare", "cell-5033"]
     await floor.session.close()
+
+
+@pytest.mark.parametrize(
+    ("labels", "addresses", "names"),
+    [
+        ({"a": "left"}, ["a"], ["left"]),
+        ({"a": "left"}, ["z"], ["left"]),
+        ({"a": "left"}, ["a", "z"], ["left", ""]),
+        ({"a": "left", "b": "right"}, ["z"], [""]),
+        ({"a": "left", "b": "right"}, ["b", "a"], ["right", "left"]),
+        ({}, ["a"], [""]),
+    ],
+)
+async def test_a_drive_has_the_name_of_its_address_and_a_sole_one_the_sole_name(labels, addresses, names):
+    drives = {each: SimpleNamespace(address=each, label="old") for each in addresses}
+    label(SimpleNamespace(drives=drives), SimpleNamespace(labels=labels))
+    assert [each.label for each in drives.values()] == names

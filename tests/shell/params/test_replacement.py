@@ -81,7 +81,9 @@ async def test_a_second_run_only_saves_as_no_drive_tells_what_is_saved(tmp_path)
     async with CellSession(tmp_path, unit(FRESH)) as cell:
         await applied(cell, tmp_path)
         before = cell.session.drive().commands
+        cell.session.addressed.clear()
         await applied(cell, tmp_path)
+        assert cell.session.addressed == {("line", "b")}, "a wait without an address is for it"
         assert cell.session.drive().commands == before + 1
         assert cell.told()[-1] == "b: verified: it is as 'b' in machine.toml"
 

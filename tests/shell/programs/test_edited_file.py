@@ -166,6 +166,15 @@ def test_a_text_whose_file_is_gone_is_not_saved_and_keeps_its_line_ends(tmp_path
     assert path.read_bytes() == b"H\r\n"
 
 
+def test_the_name_of_a_content_is_32_characters_and_that_of_no_file_is_that_of_an_empty_one(tmp_path: Path) -> None:
+    path = tmp_path / "a.mxt"
+    absent = EditedFile(path).digest
+    path.write_bytes(b"")
+    assert EditedFile(path).digest == absent and len(absent) == 32
+    path.write_bytes(b"PG\n")
+    assert EditedFile(path).digest != absent and len(EditedFile(path).digest) == 32
+
+
 def test_an_outdated_text_is_asked_about_before_it_is_saved(tmp_path: Path) -> None:
     path = tmp_path / "a.mxt"
     path.write_text("H\n")

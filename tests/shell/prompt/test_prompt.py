@@ -3,6 +3,7 @@
 import asyncio
 import contextlib
 import io
+from types import SimpleNamespace
 
 import pytest
 from prompt_toolkit.output import ColorDepth
@@ -11,6 +12,7 @@ from multidrop.base.errors import Diagnostic, Stopped
 from multidrop.macros import Macro, Step
 from multidrop.shell.events import Failed, Progressed
 from multidrop.shell.macro_arguments import value_fields
+from multidrop.shell.prompt import prompt
 from multidrop.shell.prompt.terminal_input import PAUSE, at_terminal
 from multidrop.shell.prompt.view import PlainOutput
 from multidrop.shell.verbs.session import overview
@@ -400,3 +402,16 @@ async def test_a_paste_is_entered_line_by_line_with_enter_and_a_hidden_line_in_i
 async def test_the_keys_of_flow_control_do_nothing(typist):
     typist.send("/drives\x13\x11\r")
     await until(lambda: typist.entered == ["/drives"])
+
+
+async def test_what_is_wrong_in_the_configuration_is_said_before_anything_is_opened(monkeypatch, capsys):
+    def begun(work):
+        work.close()
+        said.append(capsys.readouterr().err)
+        return 3
+
+    said = []
+    found = SimpleNamespace(problems=["multidrop.toml:1: frob", "multidrop.toml:2: frob"])
+    monkeypatch.setattr(prompt.configuration, "load", lambda lenient: found)
+    monkeypatch.setattr(asyncio, "run", begun)
+    assert prompt.run(["sim:"]) == 3 and said == ["multidrop.toml:1: frob\nmultidrop.toml:2: frob\n"]

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from prompt_toolkit.keys import Keys
 
-from multidrop.shell.prompt.keys import BEGIN, END, KeyboardInput
+from multidrop.shell.prompt.keys import BEGIN, END, STALLED, KeyboardInput
 
 PIECES = ["MR 5", "\r", BEGIN, END, "\x1b[A", "\x1b", "PR P\r", "é"]
 
@@ -83,3 +83,28 @@ async def test_a_paste_that_a_stop_was_in_is_dropped_to_its_end_in_pieces(cut):
 async def test_a_paste_behind_the_old_one_is_a_paste():
     found, _ = await read([BEGIN + "MR 5\x18 6\r" + END + BEGIN + "PR P\r" + END])
     assert found == [(Keys.BracketedPaste, "PR P\r")]
+
+
+@pytest.mark.virtual
+async def test_a_paste_without_an_end_is_said_once_and_again_where_a_stop_came_in_it():
+    typed, told = Typed(), []
+    made = KeyboardInput(typed)
+    made.notify = told.append
+    typed.typed = BEGIN + "MR 5"
+    while typed.typed:
+        made.read_keys()
+    await asyncio.sleep(3 * STALLED)
+    assert len(told) == 1 and told[0].startswith("a paste has not ended")
+    assert made.forget("").endswith("MR 5")
+    await asyncio.sleep(3 * STALLED)
+    assert told == told[:1] * 2
+
+
+@pytest.mark.virtual
+async def test_a_stop_without_a_paste_says_nothing_of_one():
+    typed, told = Typed(), []
+    made = KeyboardInput(typed)
+    made.notify = told.append
+    made.forget("MR 5")
+    await asyncio.sleep(3 * STALLED)
+    assert told == []
