@@ -1,7 +1,6 @@
 """What a stop reaches, what it says of what it did not, on simulated lines of every family, in virtual time."""
 
 import asyncio
-from dataclasses import replace
 from datetime import datetime
 
 import pytest
