@@ -480,7 +480,7 @@ class Units(OfDrive):
         return None
 
     def setting(self, name: str) -> tuple[str, Takes] | None:
-        """What a setting holds: its axis, and how that counts; None: no quantity. Without it: as the line that sets it."""
+        """What a setting holds: its axis, and how that counts; None: no quantity. Else as the line that sets it."""
         return None
 
     def setting_name(self, axis: str, name: str) -> str:

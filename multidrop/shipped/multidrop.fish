@@ -409,7 +409,7 @@ complete -c multidrop -n '_shtab_multidrop_using relay' -l no-config -d 'read no
 complete -c multidrop -n '_shtab_multidrop_using; and test $_shtab_multidrop_npos -eq 0' -a scan -d 'Find the drives on a port: baud rates, names, modes; ask before what another drive may take for an error.'
 complete -c multidrop -n '_shtab_multidrop_using scan' -s h -l help -d 'show this help message and exit'
 complete -c multidrop -n '_shtab_multidrop_using scan' -l baud -x -d 'this baud rate only'
-complete -c multidrop -n '_shtab_multidrop_using scan' -l dialect -xka "mcode pmx tmcl" -d 'this language only'
+complete -c multidrop -n '_shtab_multidrop_using scan' -l dialect -xka "mcode modbus pmx tmcl" -d 'this language only'
 complete -c multidrop -n '_shtab_multidrop_using scan' -l json -d 'print one JSON object a drive'
 complete -c multidrop -n '_shtab_multidrop_using scan' -l all -d 'go on after the first drives that reply; with --dialect, ask also the addresses at which its drives are not expected'
 complete -c multidrop -n '_shtab_multidrop_using scan' -l yes -d 'answer every question with yes beforehand'

@@ -245,7 +245,7 @@ $_shtab_multidrop_choices = @{
     '_shtab_multidrop_program_test___language' = @('mcode', 'pmx', 'tmcl')
     '_shtab_multidrop_program_test___personality' = @('LMDOM', 'LMDCM', 'LMDOE', 'LMDCE', 'LMM', 'MDI', 'MDIE', 'MDIX', 'PMX', 'TMCM', 'TMCM-1140', 'TMCM-1141', 'TMCM-1161', 'TMCM-1240', 'TMCM-1241', 'TMCM-1260', 'TMCM-1276', 'TMCM-3110', 'TMCM-6110', 'TMCM-6214')
     '_shtab_multidrop_rescue___dialect' = @('mcode', 'pmx')
-    '_shtab_multidrop_scan___dialect' = @('mcode', 'pmx', 'tmcl')
+    '_shtab_multidrop_scan___dialect' = @('mcode', 'modbus', 'pmx', 'tmcl')
     '_shtab_multidrop_twin_pos_0' = @('fit')
 }
 $_shtab_multidrop_nargs = @{

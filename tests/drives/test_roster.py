@@ -10,6 +10,7 @@ import pytest
 
 from multidrop.base.errors import DriveError, NoAnswer
 from multidrop.dialects import Hints, Motion, Owed
+from multidrop.dialects.families import FAMILIES
 from multidrop.drives.events import Restarted
 from multidrop.drives.motion_record import MotionRecord
 from multidrop.drives.roster import PAUSE, Restarts, Roster, _compare, _shown, _text

@@ -21,9 +21,9 @@ from multidrop.families.pmx.manual import program_file
 from tests.support.dialogues import dialogue_tests
 
 USED = (
-    replace, Hints, Kind, Priority, Ending, Evidence, Move, MoveKind, Outcome, family, PmxFamily, codec, motions, operations,
-    programs, units, values, PmxMotions, PmxDebugging, PmxUnits, PmxActions, PmxParameters, PmxValues, Held, Stored, Reach, ORDINARY,
-    Change, Permission, Plan, Readings,
+    replace, Hints, Kind, Priority, Ending, Evidence, Move, MoveKind, Outcome, family, PmxFamily, codec, motions,
+    operations, programs, units, values, PmxMotions, PmxDebugging, PmxUnits, PmxActions, PmxParameters, PmxValues,
+    Held, Stored, Reach, ORDINARY, Change, Permission, Plan, Readings,
 )  # fmt: skip
 """The names that calls in the files use."""
 

@@ -24,9 +24,10 @@ from multidrop.families.tmcl.manual.modules import module_of
 from tests.support.dialogues import dialogue_tests
 
 USED = (
-    replace, Hints, Kind, Owed, Priority, Started, Ending, Evidence, Move, MoveKind, Outcome, Held, Stored, family,
-    TmclFamily, codec, motions, operations, programs, units, values, TmclMotions, TmclDebugging, TmclPrograms, TmclUnits, TmclActions,
-    TmclParameters, TmclValues, Call, Command, module_of, ORDINARY, Change, Permission, Plan, Readings,
+    replace, Hints, Kind, Owed, Priority, Started, Ending, Evidence, Move, MoveKind, Outcome, Held, Stored,
+    family, TmclFamily, codec, motions, operations, programs, units, values, TmclMotions, TmclDebugging,
+    TmclPrograms, TmclUnits, TmclActions, TmclParameters, TmclValues, Call, Command, module_of, ORDINARY, Change,
+    Permission, Plan, Readings,
 )  # fmt: skip
 """The names that calls in the files use."""
 

@@ -44,10 +44,11 @@ from multidrop.families.lexium.manual import program_file
 from tests.support.dialogues import dialogue_tests
 
 USED = (
-    replace, Hints, Kind, Owed, Priority, Started, Looking, family, MCodeFamily, before_request, classify, codec, debugging,
-    download, exchange, framing, identify, identity, motions, operations, program_readout, programs, reply_parser,
-    scan, settings, units, values, MCodeMotions, Place, Unconfirmed, MCodeUnits, MCodeParameters, MCodeValues, Ending, Evidence, Move,
-    MoveKind, Outcome, Held, Stored, Reach, Remembered, ORDINARY, Change, Permission, Plan, Readings,
+    replace, Hints, Kind, Owed, Priority, Started, Looking, family, MCodeFamily, before_request, classify, codec,
+    debugging, download, exchange, framing, identify, identity, motions, operations, program_readout, programs,
+    reply_parser, scan, settings, units, values, MCodeMotions, Place, Unconfirmed, MCodeUnits, MCodeParameters,
+    MCodeValues, Ending, Evidence, Move, MoveKind, Outcome, Held, Stored, Reach, Remembered, ORDINARY, Change,
+    Permission, Plan, Readings,
 )  # fmt: skip
 """The names that calls in the files use."""
 

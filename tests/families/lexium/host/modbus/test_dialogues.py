@@ -29,9 +29,9 @@ from multidrop.families.lexium.manual.modbus.registers import REGISTERS
 from tests.support.dialogues import dialogue_tests
 
 USED = (
-    replace, Hints, Kind, Priority, mcode_units, family, ModbusFamily, codec, framing, limits, mapping, motions, operations,
-    pdu, values, ModbusMotions, ModbusParameters, ModbusUnits, ModbusValues, REGISTERS, Evidence, Move, MoveKind, ORDINARY, Change,
-    Permission, Readings, pdu_codec,
+    replace, Hints, Kind, Priority, mcode_units, family, ModbusFamily, codec, framing, limits, mapping, motions,
+    operations, pdu, values, ModbusMotions, ModbusParameters, ModbusUnits, ModbusValues, REGISTERS, Evidence,
+    Move, MoveKind, ORDINARY, Change, Permission, Readings, pdu_codec,
 )  # fmt: skip
 """The names that calls in the files use."""
 ERRORS = (framing.NotModbus,)
