@@ -9,7 +9,7 @@ from typing import Any, ClassVar, NamedTuple
 from multidrop.base.errors import Inexpressible
 from multidrop.dialects.codec import Procedure
 from multidrop.dialects.program_files import Held, Stored
-from multidrop.dialects.state import OfDrive
+from multidrop.dialects.state import OfDrive, who
 
 Neighbours = Sequence[str]
 """The addresses of the drives on a line."""
@@ -43,7 +43,7 @@ class Debugging(OfDrive, ABC):
 
     def lacking(self, what: str) -> Procedure[Any]:
         """The conversation that stands for what the drives lack. Raises Inexpressible."""
-        raise Inexpressible(f"{self.state.who}: {what}; nothing was sent")
+        raise Inexpressible(f"{who(self.state)}: {what}; nothing was sent")
         yield  # a conversation
 
     @abstractmethod

@@ -14,7 +14,7 @@ from typing import TypeVar
 from multidrop.base.errors import NoAnswer, Refused, Stopped
 from multidrop.base.text import visible
 from multidrop.dialects.codec import End, Kind, Procedure, Reply, Request
-from multidrop.dialects.state import OfDrive
+from multidrop.dialects.state import OfDrive, who
 
 T = TypeVar("T")
 
@@ -24,7 +24,7 @@ class Exchange(OfDrive, ABC):
 
     @property
     def _who(self) -> str:
-        return self.state.who
+        return who(self.state)
 
     @abstractmethod
     def mark(self, request: Request, after: bool) -> Procedure[tuple[str, ...] | None]:

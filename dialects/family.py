@@ -17,7 +17,7 @@ from multidrop.base.errors import Diagnostic, Inexpressible
 from multidrop.base.files import SourceLine, lines_of_text
 from multidrop.dialects.codec import Codec, Priority, Procedure
 from multidrop.dialects.program_files import Difference, Held
-from multidrop.dialects.state import DriveState, OfDrive, Owed, Remembered
+from multidrop.dialects.state import DriveState, OfDrive, Owed, Remembered, who
 
 if TYPE_CHECKING:
     from multidrop.dialects.certifying import Certifying
@@ -233,7 +233,7 @@ class Programs(OfDrive, ABC):
     def upload(self, raw: bool) -> Procedure[Sequence[str]]:
         """Read the drive's program as a file that can be downloaded; `raw`: in its stored form. Raises Refused."""
         held = yield from self.read((), lambda done, total: None)
-        held.check_program(self.state.who)
+        held.check_program(who(self.state))
         return self.file(held, raw)
 
 
@@ -427,7 +427,7 @@ class Family(OfDrive, ABC):
 
     def status(self) -> Printed:
         """The drive's state in words, one line for each part; a family that offers none reports none."""
-        raise Inexpressible(f"{self.state.who}: such drives do not report their state in words; nothing was sent")
+        raise Inexpressible(f"{who(self.state)}: such drives do not report their state in words; nothing was sent")
         yield
 
     def guard(self, text: str) -> Guard | None:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass, field
+from typing import ClassVar
 
 from multidrop.dialects.codec import Codec
 
@@ -86,6 +87,10 @@ class ErrorsRead:
 class DriveState:
     """One drive: its codec, its identity, and what is uncertain about it."""
 
+    title: ClassVar[str] = ""
+    """What stands before its name or address in messages."""
+    unnamed: ClassVar[str] = "the drive"
+    """What it is called where it has neither."""
     codec: Codec
     address: str = ""
     name: str = ""
@@ -128,11 +133,6 @@ class DriveState:
     """The name that a person gave it, which is shown in place of its address."""
     stranger: str = ""
     """Why this device may be no drive of its family: multidrop sends it only what a person types. Empty: it is one."""
-
-    @property
-    def who(self) -> str:
-        """The drive in a message."""
-        return self.label or self.address or "the drive"
 
     # Messages for a person
 
@@ -238,6 +238,12 @@ class DriveState:
     def owes_nothing(self) -> None:
         """Forget the settings to restore: they are restored, or restoring is given up."""
         self.restore = None
+
+
+def who(state: DriveState) -> str:
+    """The drive in a message."""
+    name = state.label or state.address
+    return f"{state.title}{name}" if name else state.unnamed
 
 
 class OfDrive:

@@ -20,7 +20,7 @@ from multidrop.base.errors import Diagnostic, Inexpressible, Refused
 from multidrop.base.files import rows
 from multidrop.base.text import real
 from multidrop.dialects.codec import Priority, Procedure
-from multidrop.dialects.state import OfDrive
+from multidrop.dialects.state import OfDrive, who
 
 # Settings, and the steps that change them
 
@@ -148,7 +148,7 @@ class Parameters(OfDrive):
 
     def read(self, progress: Progress) -> Procedure[Readings]:
         """Read every setting."""
-        raise Inexpressible(f"{self.state.who}: no settings of such drives are known; nothing was sent")
+        raise Inexpressible(f"{who(self.state)}: no settings of such drives are known; nothing was sent")
         yield  # a conversation
 
     def plan(self, present: Readings, wanted: Mapping[str, Value], permission: Permission) -> Plan:
@@ -162,12 +162,12 @@ class Parameters(OfDrive):
 
     def write(self, change: Change) -> Procedure[object]:
         """Carry out a step, and make sure of it."""
-        raise Inexpressible(f"{self.state.who}: no settings of such drives are known; nothing was sent")
+        raise Inexpressible(f"{who(self.state)}: no settings of such drives are known; nothing was sent")
         yield
 
     def save(self) -> Procedure[object]:
         """Keep the settings over power-off."""
-        raise Inexpressible(f"{self.state.who}: such drives keep no settings, as far as is known; nothing was sent")
+        raise Inexpressible(f"{who(self.state)}: such drives keep no settings, as far as is known; nothing was sent")
         yield
 
     def conflict(self, plan: Plan, others: Collection[str]) -> str:
@@ -404,11 +404,11 @@ class Actions(OfDrive):
 
     def run(self, axis: str, velocity: int | str) -> tuple[str, ...]:
         """The lines that run at a velocity with a sign; it may be a quantity. Raises Inexpressible."""
-        raise Inexpressible(f"{self.state.who}: no line of such drives runs at a velocity; nothing was sent")
+        raise Inexpressible(f"{who(self.state)}: no line of such drives runs at a velocity; nothing was sent")
 
     def output(self, number: int, on: bool) -> str:
         """The line that switches an output. Raises Inexpressible."""
-        raise Inexpressible(f"{self.state.who}: no line of such drives switches an output; nothing was sent")
+        raise Inexpressible(f"{who(self.state)}: no line of such drives switches an output; nothing was sent")
 
     def clear(self, axis: str) -> str:
         """The line that clears the error of an axis, where reading does not; empty: reading does."""
@@ -441,7 +441,7 @@ class Values(OfDrive):
 
     def snapshot(self, progress: Progress) -> Procedure[Snapshot]:
         """Read everything of a drive that a cell file needs. Raises Refused, NoAnswer or Inexpressible."""
-        raise Inexpressible(f"{self.state.who}: no settings of such drives are known; nothing was sent")
+        raise Inexpressible(f"{who(self.state)}: no settings of such drives are known; nothing was sent")
         yield  # a conversation
 
     def parts(self, facts: Facts) -> Sequence[Part]:
@@ -454,11 +454,11 @@ class Values(OfDrive):
 
     def check(self, word: str) -> str:
         """Return a word as the drive spells it; nothing is sent. Raises Diagnostic for one that must not be polled."""
-        raise Diagnostic(f"{self.state.who}: no value {word}", "", "valid: position, velocity")
+        raise Diagnostic(f"{who(self.state)}: no value {word}", "", "valid: position, velocity")
 
     def first(self, word: str) -> Procedure[float]:
         """Read the value of a word for a person; verify that the drive has it. Raises Refused, NoAnswer or Stopped."""
-        raise Inexpressible(f"{self.state.who}: no value {word}; nothing was sent")
+        raise Inexpressible(f"{who(self.state)}: no value {word}; nothing was sent")
         yield
 
     def again(self, word: str, priority: Priority) -> Procedure[float]:

@@ -56,7 +56,7 @@ def requests(codec: Codec) -> list[Request]:
     address = ADDRESSES[codec.family] if getattr(codec, "party", True) else ""
     for line in BINARY.get(codec.family, LINES):
         try:
-            asked = next(family.perform(family.new_state(codec, address), line), None)
+            asked = next(family(family.new_state(codec, address)).perform(line), None)
         except DriveError:
             continue
         if asked is not None:
@@ -227,12 +227,11 @@ def _typed(text: str) -> None:
     for family in FAMILIES.values():
         state = family.new_state(family.codec, ADDRESSES[family.name])
         family.codec.starts_motion(parsed.text)
-        if family.guards is not None:
-            family.guards.find(state, parsed.text)
+        family(state).guard(parsed.text)
         family.language.hint(parsed.text)
         family.language.complete(parsed.text)
         try:
-            asked = next(family.perform(parsed.text), None)
+            asked = next(family(state).perform(parsed.text), None)
             if asked is not None:
                 assert family.codec.encode(asked)
         except DriveError as problem:

@@ -111,7 +111,7 @@ class Reader:
 
     def _drive(self, table: Table, folder: Folder) -> DriveSpec:
         name = table.values.get("personality")
-        if name not in self._families:
+        if isinstance(name, str) and name not in self._families:
             registry.load_others()
         own = self._families[name].keys if isinstance(name, str) and name in self._families else ()
         table.only(*DRIVE_KEYS, *own)

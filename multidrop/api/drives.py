@@ -20,7 +20,7 @@ from multidrop.base.errors import Diagnostic, DriveError, Inexpressible, Refused
 from multidrop.base.text import visible
 from multidrop.dialects import Motion
 from multidrop.dialects.units import QUANTITY
-from multidrop.dialects.values import DISABLE, ENABLE, Actions, Conditions
+from multidrop.dialects.values import DISABLE, ENABLE, Conditions
 from multidrop.dialects.values import Value as Fact
 from multidrop.drives.drive import still
 from multidrop.shell import stop_report, waits
@@ -165,10 +165,6 @@ class AsyncDrive(DriveFacts):
         self.programs = AsyncPrograms(calls, drive)
         self.parameters = AsyncParameters(calls, drive)
 
-    @property
-    def _actions(self) -> Actions:
-        return self._drive.family.values.actions
-
     # Lines
 
     async def send(self, line: str) -> list[str]:
@@ -191,7 +187,7 @@ class AsyncDrive(DriveFacts):
 
         `[LINE]` asks with a line that prints one value.
         """
-        name = self._actions.word(str(name), self.axis)
+        name = self._drive.family.values.actions.word(str(name), self.axis)
         line = name.startswith("[") and name.endswith("]")
         word = Word(name[1:-1] if line else name, self._target, line)
         shell = self._calls.shell
@@ -201,7 +197,7 @@ class AsyncDrive(DriveFacts):
 
     async def write(self, name: str | int, value: Value) -> None:
         """Give a word of the drive a value. Raises Refused; Diagnostic where its language has no such form."""
-        name = self._actions.word(str(name), self.axis)
+        name = self._drive.family.values.actions.word(str(name), self.axis)
         text = value if isinstance(value, str) else short_text_of(value, f"{name} of {self.name}")
         line = self._drive.family.assign(name, text) if _WORD.fullmatch(name) else None
         if line is None:
@@ -228,7 +224,7 @@ class AsyncDrive(DriveFacts):
 
         Where the language has no such line, the setting of the velocity stays at it, and a unit is refused.
         """
-        await self._move(self._actions.run(_first(self), _amount(velocity, unit)), False)
+        await self._move(self._drive.family.values.actions.run(_first(self), _amount(velocity, unit)), False)
 
     async def _move(self, lines: tuple[str, ...], beyond: bool = False) -> None:
         self._check_executes()
@@ -252,7 +248,7 @@ class AsyncDrive(DriveFacts):
         await self._calls.run(lambda: waits.wait(shell, timeout, idle=idle, drives=[drive], said="wait"))
         for axis in [each for each in drive.homings if each not in drive.homed]:
             well = await self._calls.run(partial(drive.homing_ended, axis))
-            if not (well or self._actions.no_error) and await self.error() is not None:
+            if not (well or self._drive.family.values.actions.no_error) and await self.error() is not None:
                 raise DriveError(f"{self.name}: the homing has ended with an error; read_error() reads and clears it")
         if self._calls.returns is not None:
             await self.motion()
@@ -265,7 +261,7 @@ class AsyncDrive(DriveFacts):
         wanted, shell, timeout = waits.condition(condition), self._calls.shell, seconds(timeout, "wait_for")
         if wanted is None or wanted.target:
             raise Diagnostic(f"no condition {condition!r}", self.name, "valid: as in wait_for('I1=1')")
-        wanted = replace(wanted, word=self._actions.word(wanted.word, self.axis))
+        wanted = replace(wanted, word=self._drive.family.values.actions.word(wanted.word, self.axis))
         units = shell.units if wanted.quantity else None
         await self._calls.run(lambda: waits.wait_value(shell, self._drive, wanted, timeout, units, "wait_for"))
 
@@ -277,7 +273,7 @@ class AsyncDrive(DriveFacts):
         `mode`: what it looks for, as the family has it: `home` (the switch), `index`. Raises Diagnostic with the
         choices; a direction is left out where the drive's own settings fix it.
         """
-        modes = self._actions.homings(_first(self))
+        modes = self._drive.family.values.actions.homings(_first(self))
         lines = modes.get(mode or next(iter(modes)))
         if lines is None:
             raise Diagnostic(f"no mode {mode}", f"home() of {self.name}", f"valid: {', '.join(modes)}")
@@ -328,7 +324,7 @@ class AsyncDrive(DriveFacts):
     async def set_output(self, number: int, value: bool) -> None:
         """Switch an output on or off, by its number in the drive's language. Raises Refused where it has none."""
         self._check_executes()
-        await self._calls.run(lambda: self._send(self._actions.output(number, bool(value))))
+        await self._calls.run(lambda: self._send(self._drive.family.values.actions.output(number, bool(value))))
 
     async def inputs(self) -> dict[int | str, bool]:
         """Read the inputs: True is active. By number, and by function where they have one: `home`, `lim+`, `lim-`."""
@@ -337,7 +333,7 @@ class AsyncDrive(DriveFacts):
             if not lamp.output and lamp.on is not None:
                 found |= {int(lamp.name): lamp.on} if lamp.name.isdigit() else {}
                 found |= {lamp.function: lamp.on} if lamp.function else {}
-        for number, line in self._actions.ports().items():
+        for number, line in self._drive.family.values.actions.ports().items():
             found[number] = bool(await self.read(f"[{line}]"))
         return found
 
@@ -352,13 +348,13 @@ class AsyncDrive(DriveFacts):
 
         Raises Inexpressible where its family has no error to read.
         """
-        if why := self._actions.no_error:
+        if why := self._drive.family.values.actions.no_error:
             raise Inexpressible(f"{self.name}: {why}")
         return fault_of(await self._conditions(slow=False))
 
     async def read_error(self) -> Fault | None:
         """Read the error **and clear it**; None: there was none. Raises as `error`."""
-        found, actions = None, self._actions
+        found, actions = None, self._drive.family.values.actions
         if not actions.error:
             found = await self.error()
         elif code := await self.read(actions.error):

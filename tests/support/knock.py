@@ -12,7 +12,7 @@ from multidrop.base.feature import Feature
 from multidrop.dialects.codec import Codec, Decoded, End, Kind, Priority, Procedure, Reply, Request
 from multidrop.dialects.families import Dialect
 from multidrop.dialects.family import Family, Hints, Motion, Printed
-from multidrop.dialects.state import DriveState
+from multidrop.dialects.state import DriveState, who
 from multidrop.simulator.cell.spec import DriveSpec
 from multidrop.simulator.declared import Simulated
 from multidrop.simulator.family import Place, SimulatedFamily, Unit
@@ -77,7 +77,7 @@ class KnockFamily(Family):
         reply = yield self.codec.request(self.state.address, text, priority)
         if reply.end is not End.DONE:
             kind = Refused if reply.end is End.REFUSED else NoAnswer
-            raise kind(f"{self.state.who}: '{text}' was {'refused' if kind is Refused else 'sent once: no reply'}")
+            raise kind(f"{who(self.state)}: '{text}' was {'refused' if kind is Refused else 'sent once: no reply'}")
         return reply.lines
 
     def motion(self, priority: Priority) -> Generator[Request, Reply, tuple[Motion, ...]]:

@@ -186,8 +186,6 @@ def _fits(request: Request, text: str) -> bool:
 class PmxState(DriveState):
     """One PMX controller."""
 
-    codec: Pmx
+    unnamed = "the controller"
 
-    @property
-    def who(self) -> str:
-        return self.label or self.address or "the controller"
+    codec: Pmx

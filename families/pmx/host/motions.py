@@ -15,8 +15,9 @@ from dataclasses import replace
 from multidrop.dialects.codec import Procedure
 from multidrop.dialects.family import ADDRESSES
 from multidrop.dialects.motions import NOTHING, Effect, Ending, Evidence, Motions, Move, MoveKind, Outcome, Signs
+from multidrop.dialects.state import who
 from multidrop.families.pmx.host.codec import PmxState
-from multidrop.families.pmx.host.operations import PROGRAMS, number, who
+from multidrop.families.pmx.host.operations import PROGRAMS, number
 from multidrop.families.pmx.manual import table
 
 BOTH = frozenset(axis.lower() for axis in table.AXES)

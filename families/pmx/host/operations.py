@@ -12,6 +12,7 @@ from multidrop.dialects.codec import End, Kind, Priority, Procedure, Reply, Requ
 from multidrop.dialects.exchange import Exchange
 from multidrop.dialects.family import Hints, Motion, Referencing
 from multidrop.dialects.scanning import WINDOW, Found, Outcome, Reach, Scan, Step
+from multidrop.dialects.state import who
 from multidrop.families.pmx.host.codec import FACTORY, Pmx, PmxState
 from multidrop.families.pmx.manual import table
 from multidrop.families.pmx.manual.help import suggestion, syntax
@@ -26,10 +27,6 @@ from multidrop.families.pmx.manual.help import suggestion, syntax
 MARK = "Q"
 """The first letter of a sync mark; no command begins with it."""
 INTEGER = r"-?\d{1,19}"
-
-
-def who(state: PmxState) -> str:
-    return state.who
 
 
 def _mark(state: PmxState, request: Request, sent: bool) -> Procedure[tuple[str, ...] | None]:

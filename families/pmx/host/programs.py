@@ -17,8 +17,9 @@ from multidrop.dialects.codec import End, Procedure
 from multidrop.dialects.debugging import Debugging, Look, Neighbours
 from multidrop.dialects.family import Printed, Programs, Progress
 from multidrop.dialects.program_files import Difference, Held, Stored, first_difference
+from multidrop.dialects.state import who
 from multidrop.families.pmx.host.codec import PmxState
-from multidrop.families.pmx.host.operations import OK, PROGRAMS, answered, moving, number, perform, who
+from multidrop.families.pmx.host.operations import OK, PROGRAMS, answered, moving, number, perform
 from multidrop.families.pmx.manual import program_file, script_checker
 from multidrop.families.pmx.manual.program_file import RAW, Undecodable
 from multidrop.families.pmx.manual.script_compiler import EMPTY, ERASED, LINES

@@ -19,7 +19,7 @@ from functools import partial
 
 from multidrop.base.errors import Diagnostic, Inexpressible
 from multidrop.dialects.codec import Priority, Procedure, Request
-from multidrop.dialects.state import DriveState
+from multidrop.dialects.state import DriveState, who
 from multidrop.dialects.values import (
     COMMUNICATION,
     VARIABLES,
@@ -58,7 +58,6 @@ from multidrop.families.pmx.host.operations import (
     moving,
     number,
     perform,
-    who,
 )
 from multidrop.families.pmx.host.programs import listing
 from multidrop.families.pmx.manual import table

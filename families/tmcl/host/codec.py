@@ -292,6 +292,8 @@ def late_reply_to(command: int) -> str:
 class TmclState(DriveState):
     """One module."""
 
+    title, unnamed = "module ", "module "
+
     codec: Tmcl
     lost_commands: set[int] = field(default_factory=set)
     """Commands whose replies did not come, and may come late."""
@@ -305,10 +307,6 @@ class TmclState(DriveState):
 
     halted: bool = False
     """This session has halted its program between two lines, and has not let it go on."""
-
-    @property
-    def who(self) -> str:
-        return f"module {self.label or self.address}"
 
     def program_halted(self, halted: bool) -> None:
         self.halted = halted

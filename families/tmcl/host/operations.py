@@ -14,6 +14,7 @@ from multidrop.dialects.codec import End, Kind, Priority, Procedure, Reply, Requ
 from multidrop.dialects.exchange import Exchange
 from multidrop.dialects.family import ADDRESSES, Hints, Motion, Referencing
 from multidrop.dialects.owed_settings import repaired
+from multidrop.dialects.state import who
 from multidrop.families.tmcl.host.codec import (
     FACTORY,
     LENGTH,
@@ -55,10 +56,6 @@ MARKS = (
 ANY_VALUE = r"-?\d+"
 END = "133 0, 0, 0"
 """The line that ends download mode."""
-
-
-def who(state: TmclState) -> str:
-    return state.who
 
 
 def answered(state: TmclState, request: Request) -> Procedure[Reply]:

@@ -20,8 +20,9 @@ from multidrop.dialects.codec import Procedure
 from multidrop.dialects.debugging import Debugging, Look, Neighbours, Stepped
 from multidrop.dialects.family import Printed, Programs, Progress
 from multidrop.dialects.program_files import Difference, Held, Stored, first_difference, numbered
+from multidrop.dialects.state import who
 from multidrop.families.tmcl.host.codec import TmclState, call_of, line_in, parse_reply
-from multidrop.families.tmcl.host.operations import LACKS, answered, busy, moving, perform, read, store, who
+from multidrop.families.tmcl.host.operations import LACKS, answered, busy, moving, perform, read, store
 from multidrop.families.tmcl.manual import program_file
 from multidrop.families.tmcl.manual.commands import Call, Command, Global, parameter
 from multidrop.families.tmcl.manual.instructions import EMPTY, MEMORY, Word, spelled

@@ -13,6 +13,7 @@ from functools import partial
 from multidrop.base.errors import Diagnostic, Refused
 from multidrop.dialects.codec import Priority, Procedure
 from multidrop.dialects.program_files import Held
+from multidrop.dialects.state import who
 from multidrop.dialects.values import (
     BY,
     COMMUNICATION,
@@ -41,7 +42,7 @@ from multidrop.dialects.values import (
 )
 from multidrop.families.tmcl.host.codec import TmclState
 from multidrop.families.tmcl.host.motions import DRIVER_FAULTS
-from multidrop.families.tmcl.host.operations import busy, motors, moving, perform, read, who
+from multidrop.families.tmcl.host.operations import busy, motors, moving, perform, read
 from multidrop.families.tmcl.host.programs import read_held
 from multidrop.families.tmcl.manual.commands import (
     STARTING_PARAMETERS,

@@ -19,11 +19,12 @@ from multidrop.base.errors import Diagnostic, Inexpressible, NoAnswer, Refused
 from multidrop.dialects.codec import Decoded, End, Kind, Procedure, Reply, Request
 from multidrop.dialects.debugging import Debugging, Look, Neighbours, Stepped
 from multidrop.dialects.program_files import Stored
+from multidrop.dialects.state import who
 from multidrop.families.lexium.host.mcode.codec import MCode
 from multidrop.families.lexium.host.mcode.exchange import printed_value
 from multidrop.families.lexium.host.mcode.framing import printable
 from multidrop.families.lexium.host.mcode.operations import flag, listing, perform
-from multidrop.families.lexium.host.mcode.state import MCodeState, who
+from multidrop.families.lexium.host.mcode.state import MCodeState
 from multidrop.families.lexium.manual.grammar import Name, Number, parsed
 from multidrop.families.lexium.manual.mnemonic import MDRIVE_PLUS
 from multidrop.families.lexium.manual.table import lookup

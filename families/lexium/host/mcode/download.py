@@ -21,6 +21,7 @@ from multidrop.base.text import counted
 from multidrop.dialects.codec import End, Kind, Procedure, Request
 from multidrop.dialects.family import Progress
 from multidrop.dialects.program_files import LOCKED, Held
+from multidrop.dialects.state import who
 from multidrop.families.lexium.host.mcode import classify
 from multidrop.families.lexium.host.mcode.before_request import before_request
 from multidrop.families.lexium.host.mcode.exchange import (
@@ -44,7 +45,7 @@ from multidrop.families.lexium.host.mcode.program_readout import (
     read,
     size,
 )
-from multidrop.families.lexium.host.mcode.state import MCodeState, described, who
+from multidrop.families.lexium.host.mcode.state import MCodeState, described
 from multidrop.families.lexium.manual.program_checker import slips
 from multidrop.families.lexium.manual.program_file import ProgramLine
 

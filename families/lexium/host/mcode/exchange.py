@@ -10,10 +10,11 @@ from functools import lru_cache
 from multidrop.base.errors import DriveError, Inexpressible, NoAnswer, Refused, Stopped
 from multidrop.dialects.codec import End, Kind, Priority, Procedure, Reply, Request
 from multidrop.dialects.exchange import unanswered
+from multidrop.dialects.state import who
 from multidrop.families.lexium.host.mcode import classify
 from multidrop.families.lexium.host.mcode.classify import INTEGER, NOTHING
 from multidrop.families.lexium.host.mcode.framing import ACK, UNPRINTED
-from multidrop.families.lexium.host.mcode.state import MCodeState, described, who
+from multidrop.families.lexium.host.mcode.state import MCodeState, described
 from multidrop.families.lexium.manual import errors
 from multidrop.families.lexium.manual.errors import ErrorNumber
 

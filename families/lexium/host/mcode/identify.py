@@ -24,7 +24,7 @@ from dataclasses import replace
 from multidrop.base.errors import Inexpressible, NoAnswer
 from multidrop.dialects.codec import Kind, Procedure, Reply, Request
 from multidrop.dialects.family import Hints
-from multidrop.dialects.state import Remembered
+from multidrop.dialects.state import Remembered, who
 from multidrop.families.lexium.host.mcode.codec import NOBODY, TO_PARTY, MCode
 from multidrop.families.lexium.host.mcode.identity import (
     BRIEF,
@@ -38,7 +38,7 @@ from multidrop.families.lexium.host.mcode.identity import (
     write_stop,
 )
 from multidrop.families.lexium.host.mcode.operations import put_back_found
-from multidrop.families.lexium.host.mcode.state import MCodeState, Place, Unconfirmed, who
+from multidrop.families.lexium.host.mcode.state import MCodeState, Place, Unconfirmed
 from multidrop.families.lexium.manual.statements import UNNAMED
 
 IN_TEXT = TEXT + b"\n\n"

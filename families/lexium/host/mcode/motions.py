@@ -16,13 +16,13 @@ from dataclasses import replace
 from multidrop.base.errors import DriveError
 from multidrop.dialects.codec import Procedure
 from multidrop.dialects.motions import NOTHING, Effect, Ending, Evidence, Motions, Move, MoveKind, Outcome, Signs
-from multidrop.dialects.state import DriveState
+from multidrop.dialects.state import DriveState, who
 from multidrop.dialects.values import Value
 from multidrop.families.lexium.host.mcode import classify, exchange, operations
 from multidrop.families.lexium.host.mcode.before_request import before_request, value_of
 from multidrop.families.lexium.host.mcode.classify import INTEGER
 from multidrop.families.lexium.host.mcode.settings import listed
-from multidrop.families.lexium.host.mcode.state import MCodeState, described, earlier_error, refuse_in_program, who
+from multidrop.families.lexium.host.mcode.state import MCodeState, described, earlier_error, refuse_in_program
 from multidrop.families.lexium.manual import errors, parameters, points
 from multidrop.families.lexium.manual.errors import ErrorNumber as E
 from multidrop.families.lexium.manual.grammar import Number, Statement, parsed

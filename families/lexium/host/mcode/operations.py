@@ -12,13 +12,13 @@ from multidrop.dialects.codec import End, Kind, Priority, Procedure, Reply, Requ
 from multidrop.dialects.exchange import unsent_if_stopped
 from multidrop.dialects.family import Motion
 from multidrop.dialects.owed_settings import repaired
-from multidrop.dialects.state import Owed
+from multidrop.dialects.state import Owed, who
 from multidrop.families.lexium.host.mcode import classify, exchange
 from multidrop.families.lexium.host.mcode.before_request import before_request, find_again, first_print, value_of
 from multidrop.families.lexium.host.mcode.classify import INTEGER
 from multidrop.families.lexium.host.mcode.codec import EVERY_DRIVE, MCode
 from multidrop.families.lexium.host.mcode.identity import find, set_wire
-from multidrop.families.lexium.host.mcode.state import MCodeState, Place, refuse_in_program, report_error, who
+from multidrop.families.lexium.host.mcode.state import MCodeState, Place, refuse_in_program, report_error
 from multidrop.families.lexium.manual import grammar
 from multidrop.families.lexium.manual.grammar import Number, Unary, parsed
 from multidrop.families.lexium.manual.mnemonic import EXPANDED

@@ -13,12 +13,13 @@ from multidrop.base.files import SourceLine, split_lines
 from multidrop.dialects.codec import Procedure
 from multidrop.dialects.family import Progress
 from multidrop.dialects.program_files import Held, Stored
+from multidrop.dialects.state import who
 from multidrop.families.lexium.host.mcode import classify
 from multidrop.families.lexium.host.mcode.codec import EVERY_DRIVE
 from multidrop.families.lexium.host.mcode.exchange import REPEATS
 from multidrop.families.lexium.host.mcode.operations import flag, immediate, listing, perform
 from multidrop.families.lexium.host.mcode.settings import listed
-from multidrop.families.lexium.host.mcode.state import MCodeState, who
+from multidrop.families.lexium.host.mcode.state import MCodeState
 from multidrop.families.lexium.manual import editing, help, program_file
 from multidrop.families.lexium.manual.grammar import Compare, Name, parsed
 from multidrop.families.lexium.manual.statements import size_of

@@ -14,12 +14,13 @@ from multidrop.dialects.certifying import Certifying, Occupied
 from multidrop.dialects.codec import Procedure
 from multidrop.dialects.family import Printed, Programs, Progress
 from multidrop.dialects.program_files import Difference, Held, Stored, first_difference
+from multidrop.dialects.state import who
 from multidrop.families.lexium.host.mcode import classify, operations, program_readout
 from multidrop.families.lexium.host.mcode.before_request import value_of
 from multidrop.families.lexium.host.mcode.download import clears_itself, download
 from multidrop.families.lexium.host.mcode.operations import immediate
 from multidrop.families.lexium.host.mcode.program_readout import FileProgram
-from multidrop.families.lexium.host.mcode.state import MCodeState, who
+from multidrop.families.lexium.host.mcode.state import MCodeState
 from multidrop.families.lexium.manual import guards
 from multidrop.families.lexium.manual.grammar import Argument, Compare, LineError, Name, Number, Statement, Unary, parse
 from multidrop.families.lexium.manual.mnemonic import ETHERNET, EXPANDED

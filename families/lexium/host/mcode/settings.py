@@ -8,6 +8,7 @@ from dataclasses import replace
 
 from multidrop.base.errors import NoAnswer, Refused
 from multidrop.dialects.codec import End, Kind, Priority, Procedure, Request
+from multidrop.dialects.state import who
 from multidrop.dialects.values import (
     VARIABLES,
     Plan,
@@ -30,7 +31,7 @@ from multidrop.families.lexium.host.mcode.exchange import (
     value,
 )
 from multidrop.families.lexium.host.mcode.operations import perform
-from multidrop.families.lexium.host.mcode.state import MCodeState, refuse_in_program, who
+from multidrop.families.lexium.host.mcode.state import MCodeState, refuse_in_program
 from multidrop.families.lexium.manual import parameters as manual
 from multidrop.families.lexium.manual.mnemonic import ENCODER, MDRIVE_ENCODER, Mnemonic
 from multidrop.families.lexium.manual.parameters import Form, form_of

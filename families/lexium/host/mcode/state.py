@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 
 from multidrop.base.errors import Refused
 from multidrop.dialects.exchange import Looking
-from multidrop.dialects.state import DriveState, Remembered
+from multidrop.dialects.state import DriveState, Remembered, who
 from multidrop.families.lexium.host.mcode.codec import MCode
 from multidrop.families.lexium.manual import errors
 
@@ -163,10 +163,6 @@ class MCodeState(DriveState):
 
 
 # Phrases that several messages about an MCode drive share.
-
-
-def who(state: DriveState) -> str:
-    return state.who
 
 
 def refuse_in_program(state: MCodeState, then: str = "") -> None:

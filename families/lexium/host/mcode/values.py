@@ -10,7 +10,7 @@ from functools import partial
 from multidrop.base.errors import Diagnostic, NoAnswer, Refused
 from multidrop.dialects.codec import End, Priority, Procedure
 from multidrop.dialects.program_files import LOCKED
-from multidrop.dialects.state import DriveState
+from multidrop.dialects.state import DriveState, who
 from multidrop.dialects.values import (
     Actions,
     Change,
@@ -52,7 +52,7 @@ from multidrop.families.lexium.host.mcode.settings import (
     rows_of_list,
     save,
 )
-from multidrop.families.lexium.host.mcode.state import MCodeState, refuse_in_program, who
+from multidrop.families.lexium.host.mcode.state import MCodeState, refuse_in_program
 from multidrop.families.lexium.manual import parameter_plan, points
 from multidrop.families.lexium.manual import parameters as manual
 from multidrop.families.lexium.manual.mnemonic import EVERY, EXPANDED

@@ -14,8 +14,9 @@ from multidrop.dialects.certifying import Certifying
 from multidrop.dialects.codec import End, Kind, Priority, Procedure, Reply, Request
 from multidrop.dialects.exchange import unanswered
 from multidrop.dialects.family import Hints, Motion
+from multidrop.dialects.state import who
 from multidrop.families.lexium.host.mcode.classify import starts_motion
-from multidrop.families.lexium.host.mcode.state import described, earlier_error, report_error, who
+from multidrop.families.lexium.host.mcode.state import described, earlier_error, report_error
 from multidrop.families.lexium.host.modbus import framing, limits, mapping
 from multidrop.families.lexium.host.modbus.codec import UNKNOWN, USER, Modbus, ModbusState, pdu_codec
 from multidrop.families.lexium.host.modbus.mapping import Reading

@@ -13,6 +13,7 @@ from functools import partial
 
 from multidrop.base.errors import Diagnostic, Inexpressible, NoAnswer, Refused
 from multidrop.dialects.codec import Priority, Procedure, Request
+from multidrop.dialects.state import who
 from multidrop.dialects.units import Basis, Field, Takes, Units
 from multidrop.dialects.values import (
     Actions,
@@ -37,7 +38,6 @@ from multidrop.families.lexium.host.mcode import units
 from multidrop.families.lexium.host.mcode.classify import WHOLE
 from multidrop.families.lexium.host.mcode.motions import cause
 from multidrop.families.lexium.host.mcode.settings import rows_of_list
-from multidrop.families.lexium.host.mcode.state import who
 from multidrop.families.lexium.host.mcode.values import SNAPSHOT_WORDS, snapshot_of
 from multidrop.families.lexium.host.modbus import framing, mapping
 from multidrop.families.lexium.host.modbus.codec import ModbusState, pdu_codec

@@ -137,13 +137,13 @@ def test_each_line_that_differs_is_found(there, found):
     for text in there:
         held.append(Stored(at, text))
         at += {"LB G1": 5, "MR 100": 4, "MR 101": 4, "P=5": 4}.get(text, 2)
-    assert MCodeFamily(state).programs.differences(FILE, Held(tuple(held))) == found
+    assert MCodeFamily(state).programs.differences(FILE, Held(tuple(held)), None) == found
 
 
 def test_a_program_elsewhere_is_no_difference():
     state = MCodeState(MCode(), "", "!", "LMDCM")
     held = [Stored(1, "LB G1"), Stored(6, "MR 100"), Stored(10, "H"), Stored(12, "E"), Stored(15, "LB X9")]
-    assert MCodeFamily(state).programs.differences(FILE, Held(tuple(held))) == ()
+    assert MCodeFamily(state).programs.differences(FILE, Held(tuple(held)), None) == ()
 
 
 @given(st.lists(st.text(alphabet="AG1L =.-\t²\x00", max_size=12)))
