@@ -27,6 +27,8 @@ PATCHES = ROOT / "soak" / "mutants"
 ALL = "all"
 HEAD = re.compile(r"# (.+); seen by (.+)\n")
 BROKE = re.compile(r"^seed (\d+): broke ([^,\n]+)", re.M)
+EXCEPTION, RAISED = "an exception", "Traceback"
+"""What sees a mutant with which a seed cannot be lived, and how its process says so."""
 LEFT_OUT = shutil.ignore_patterns(".*", "__pycache__", "docs", "tests", "bench", "fuzz", "packaging")
 """What no seed needs of the tree."""
 LONGEST = 3600.0
@@ -103,7 +105,9 @@ def caught(name: str, seeds: range, steps: int, jobs: int = 0) -> Caught:
             text, problem = _lived(tree, left, steps, jobs)
             took = time.monotonic() - began
             if (found := BROKE.search(text)) is None:
-                return Caught(name, "", 0, len(seeds), took, (problem or text).strip())
+                ends = (each for each in left if RAISED in _lived(tree, range(each, each + 1), steps, 1)[1])
+                seed = next(ends, 0) if RAISED in problem else 0
+                return Caught(name, EXCEPTION * bool(seed), seed, len(seeds), took, (problem or text).strip())
             seed, rule = int(found[1]), found[2]
             if not result(Life(seed, whole(seed, steps))).breaches:
                 return Caught(name, rule, seed, seed - seeds.start + 1, took, "\n".join(text.splitlines()[:2]))
