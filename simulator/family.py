@@ -94,7 +94,7 @@ class Unit:
     connect: Callable[[], Connection] | None = None
     shadow: Shadow | None = None
     """None: it cannot run beside a real drive."""
-    usb: UsbSide | None = None
+    on_usb: UsbSide | None = None
     """None: it has no USB."""
 
 

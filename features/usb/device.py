@@ -109,5 +109,5 @@ def sides(floor: Floor, bus: str) -> list[UsbController]:
     buses = _SIDES.setdefault(floor, {})
     if bus not in buses:
         units = [each.unit for each in floor.drives if each.bus == bus]
-        buses[bus] = [UsbController(each.device, each.usb) for each in units if each.usb is not None]
+        buses[bus] = [UsbController(each.device, each.on_usb) for each in units if each.on_usb is not None]
     return buses[bus]

@@ -153,7 +153,7 @@ def build(spec: DriveSpec, place: Place) -> Unit:
         shadow=_shadow(device),
         inputs=INPUTS,
         counts=COUNTS,
-        usb=UsbSide(lambda: f"2ED{device.controller.settings.number}", lambda text, now: device.execute(text, now)),
+        on_usb=UsbSide(lambda: f"2ED{device.controller.settings.number}", lambda text, now: device.execute(text, now)),
     )
 
 
