@@ -8,6 +8,7 @@ import pytest
 
 from multidrop.dialects.families import DEFAULT, FAMILIES, dialects, family_of, languages, program_languages, seen
 from multidrop.dialects.family import Hints
+from multidrop.dialects.motions import NO_SIGNS
 from multidrop.shell.connect import urls
 from multidrop.shell.connect.schemes import schemes
 from tests.support.paths import ROOMS, ROOT
@@ -66,3 +67,12 @@ def test_each_language_is_listed_once_and_each_ending_means_one_family() -> None
 def test_whole_messages_of_the_family_are_not_called_another_language_or_baud_rate() -> None:
     assert seen(bytes.fromhex("00000000000301ab05"), "modbus") == ""
     assert all("another language" in seen(b"SSH-2.0-OpenSSH\r\n", name) for name in ("modbus", "mcode"))
+
+
+@pytest.mark.parametrize("name", FAMILIES)
+@pytest.mark.parametrize("axis", ["", "x", "0"])
+def test_signs_that_could_not_be_read_show_no_place_and_no_program(name: str, axis: str) -> None:
+    """The drive was away as they were asked for; the line behind them goes on."""
+    family = FAMILIES[name]
+    motions = family(family.new_state(family.codec, "")).motions
+    assert motions.place(NO_SIGNS, axis) is None and not motions.runs(NO_SIGNS)

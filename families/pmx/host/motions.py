@@ -118,15 +118,15 @@ def old(state: PmxState, found: Signs, own: bool) -> Procedure[Signs]:
 
 
 def place(found: Signs, axis: str) -> int | None:
-    """Where the distance of a move counts from: from 0 with ABS, from the axis at rest with INC."""
-    if found["MM"] != DISTANCES:
-        return 0
+    """Where the distance of a move counts from: from 0 with ABS, from the axis at rest with INC; None: not read."""
+    if (mode := found.get("MM")) != DISTANCES:
+        return None if mode is None else 0
     return None if found[f"MST{axis.upper()}"] & table.MOVING else found[f"P{axis.upper()}"]
 
 
 def runs(found: Signs) -> bool:
     """Whether a program runs."""
-    return any(found[f"SASTAT{program}"] == RUNNING for program in PROGRAMS)
+    return any(found.get(f"SASTAT{program}") == RUNNING for program in PROGRAMS)
 
 
 # At its end

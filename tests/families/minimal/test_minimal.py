@@ -15,6 +15,7 @@ from multidrop.drives.events import Sample
 from multidrop.shell.events import OnBus
 from tests.support import knock
 from tests.support.cell_session import CellSession, bus, drive
+from tests.support.paths import THERE
 
 pytestmark = pytest.mark.virtual
 
@@ -73,12 +74,15 @@ LACKS = {
     "/params backup {a.toml} A": "A: no settings of such drives are known; nothing was sent",
     "/params save A": "A: such drives keep no settings, as far as is known; nothing was sent",
     "/register A 5": "A: no registers; ",
-    "/plot A.SPEED --to {x.csv}": "A: no value SPEED; valid: position, velocity",
     "/snapshot {s.toml}": "A: no settings of such drives are known; nothing was sent",
-    "/twin on A": "A: no settings of such drives are known; nothing was sent",
     "/help SPEED": "/help: no verb or command SPEED",
     "/units A 5 mm/turn": "/units: the scale 5 mm/turn is by the motor's turn: nothing tells how it counts; ",
 }
+OF_FEATURES = {
+    "plot_files": ("/plot A.SPEED --to {x.csv}", "A: no value SPEED; valid: position, velocity"),
+    "twins": ("/twin on A", "A: no settings of such drives are known; nothing was sent"),
+}
+LACKS |= dict(said for feature, said in OF_FEATURES.items() if feature in THERE)
 
 
 @pytest.mark.parametrize("line", LACKS)

@@ -13,6 +13,7 @@ import pytest
 
 from multidrop.__main__ import main
 from tests.support.front_door import Called, Done, at_terminal
+from tests.support.paths import THERE
 
 
 def test_a_watcher_joins_one_screen_and_opens_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -22,7 +23,7 @@ def test_a_watcher_joins_one_screen_and_opens_nothing(tmp_path: Path, monkeypatc
     assert at_terminal(tmp_path, "tui", "--join", "ssh://pc").returncode == 5
     assert join.calls == [("",), ("ssh://pc",)]
     said = "tui --join: a watcher opens nothing itself; give --join alone, or with ssh://HOST\n"
-    for more in ("sim:", "--share", "--raw", "--twin"):
+    for more in ("sim:", "--share", "--raw", *("--twin",) * ("twins" in THERE)):
         assert at_terminal(tmp_path, "tui", more, "--join") == Done(2, "", said)
     assert len(join.calls) == 2
 
