@@ -13,7 +13,7 @@ from contextvars import ContextVar
 from dataclasses import replace
 from typing import TypeVar
 
-from multidrop.base.errors import Inexpressible, MotionFailed, NoAnswer, Refused, Stopped
+from multidrop.base.errors import Inexpressible, MotionFailed, NoAnswer, Refused, Stopped, TransportLost
 from multidrop.dialects import Procedure
 from multidrop.dialects.motions import NO_SIGNS, Ending, Evidence, Motions, MoveKind, Outcome, Signs, joined
 from multidrop.drives.drive import NOT_SENT, Check, Drive, still
@@ -190,7 +190,7 @@ class _Line:
             drive = each.drive
             if any(map(_motions(drive).fails, drive.state.errors.since(each.errors))):
                 for course in each.suspects:
-                    failed = await drive.run(_sign_of(drive, course)) if course.open else None
+                    failed = await _sign_read(drive, course) if course.open else None
                     if failed is not None:
                         self._report(drive, failed, fate)
 
@@ -210,6 +210,18 @@ def _sign_of(drive: Drive, course: Course) -> Procedure[Ending | None]:
     if found is None or found.outcome in (Outcome.REACHED, Outcome.STOPPED):
         return None
     return _judged(drive, course, found)
+
+
+async def _sign_read(drive: Drive, course: Course) -> Ending | None:
+    """The same in a conversation of its own: where it fails, the line before it has its outcome all the same."""
+    try:
+        return await drive.run(_sign_of(drive, course))
+    except (Refused, NoAnswer, TransportLost) as error:
+        return _judged(drive, course, _unread(course, error))
+
+
+def _unread(course: Course, error: Exception) -> Ending:
+    return Ending(Outcome.UNKNOWN, course.move.axis, reason=f"its end could not be read ({error})")
 
 
 def _evidence(drive: Drive, course: Course) -> Evidence:
@@ -275,7 +287,7 @@ class Watch:
                 if found is None:
                     found = await drive.run(motions.judge(axis, _evidence(drive, course)))
             except (Refused, NoAnswer) as error:
-                found = Ending(Outcome.UNKNOWN, axis, reason=f"its end could not be read ({error})")
+                found = _unread(course, error)
             if found is None:
                 return None
             endings.append(_judged(drive, course, found))

@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 
-from multidrop.base.errors import DriveError, MotionFailed, NoAnswer, Refused
+from multidrop.base.errors import DriveError, MotionFailed, NoAnswer, Refused, TransportLost
 from multidrop.dialects import Procedure
 from multidrop.dialects.motions import Ending
 from multidrop.shell import motions
@@ -176,6 +176,27 @@ async def test_a_motion_whose_end_cannot_be_read_is_a_failure(
         failure = await failed(session, "MR 100", "/wait stopped", "R1=777")
         assert (failure.outcome, failure.reason) == ("unknown", f"its end could not be read ({error})")
         assert await value(session, "R1") == 0
+
+
+@pytest.mark.parametrize("error", [NoAnswer("a does not reply"), Refused("a refused it"), TransportLost("unplugged")])
+async def test_a_line_keeps_its_outcome_where_the_end_of_a_motion_before_it_cannot_be_read(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, error: Exception
+) -> None:
+    def unread(*_: object) -> Procedure[Ending | None]:
+        raise error
+        yield
+
+    async with at_limit(tmp_path) as session:
+        own: Any = session.drive().family.motions
+        own.judge = unread
+        monkeypatch.setattr(motions, "_motions", lambda drive: own)
+        failure = await failed(session, "MA 90000", "/sleep 5", "R1=777")
+        assert failure.outcome == "unknown"
+        assert str(failure).startswith(
+            f"a stopped: its end could not be read ({error}); a: error 83: plus limit reached"
+        )
+        assert "it refused 'R1=777', or that came by itself and it was executed" in str(failure)
+        assert await value(session, "R1") == 777
 
 
 async def test_a_move_replaced_by_the_same_script_is_no_failure(tmp_path: Path) -> None:
