@@ -46,7 +46,8 @@ def word(result: tuple[str, ...] | BaseException, notices: list[str], line: str)
         return Word.UNKNOWN
     if isinstance(result, Refused):
         return Word.REFUSED
-    return Word.DONE if f"'{line}' was executed before " in text else Word.NOT_EXECUTED
+    executed = f"'{line}' was executed"  # before something else failed, or behind a motion that had failed
+    return Word.DONE if f"{executed} before " in text or text.endswith(executed) else Word.NOT_EXECUTED
 
 
 class Witness:

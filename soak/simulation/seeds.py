@@ -59,6 +59,7 @@ FIXED = {
     204461: "the rest of a TMCL frame that was half-sent at a stop (of the simulation itself)",
     205993: "a raw text that came late, whose error the next line was blamed for (of the simulation itself)",
     400375: "an executed line whose outcome was that of a reading after it, which got no reply",
+    401472: "a line behind a motion that failed, which the host calls executed (of the simulation itself)",
     400077: "a line for all controllers that was agreed to as its port was lost, which ended the prompt",
     206631: "a script's line that came as PG ended program mode (of the simulation itself)",
     206861: "a line of a download that came as a datagram once program mode had ended (of the simulation itself)",

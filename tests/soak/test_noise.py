@@ -108,6 +108,8 @@ def test_without_a_checksum_a_lost_command_may_have_been_damaged():
         ("a: 'S' was executed before the stop", Word.DONE),
         ("the line was lost; 'S' was executed before that", Word.DONE),
         ("the line was lost; 'EM=1' was executed before that", Word.NOT_EXECUTED),
+        ("a stopped at 3 of 9: stalled; 'S' was executed", Word.DONE),
+        ("a stopped at 3 of 9: stalled; 'S' was not sent", Word.NOT_EXECUTED),
     ],
 )
 def test_the_judge_reads_what_the_host_says(text, expected):
