@@ -1,7 +1,8 @@
 """Mutants: defects planted in a copy of the program, each of which some seed has to see.
 
 A mutant is a patch, `soak/mutants/NAME.patch`. Its first line says what it breaks, and the rule that saw it first. The
-copy has the rooms with their links; a process of its own lives the seeds there, and ends at the first that breaks.
+copy has the rooms with their links; a process of its own lives the seeds there, and ends at the first that breaks. A
+mutant that no seed sees any more names a quick test in place of a rule.
 """
 
 from __future__ import annotations
@@ -29,8 +30,9 @@ HEAD = re.compile(r"# (.+); seen by (.+)\n")
 BROKE = re.compile(r"^seed (\d+): broke ([^,\n]+)", re.M)
 EXCEPTION, RAISED = "an exception", "Traceback"
 """What sees a mutant with which a seed cannot be lived, and how its process says so."""
-LEFT_OUT = shutil.ignore_patterns(".*", "__pycache__", "docs", "tests", "bench", "fuzz", "packaging")
-"""What no seed needs of the tree."""
+LEFT_OUT = shutil.ignore_patterns(".*", "__pycache__", "docs", "bench", "fuzz", "packaging")
+"""What neither a seed nor a test needs of the tree."""
+TEST = re.compile(r"tests/\S+::\w+$")
 LONGEST = 3600.0
 """Real seconds that the seeds of one mutant take at most."""
 
@@ -99,8 +101,11 @@ def planted(name: str) -> Iterator[Path]:
 
 def caught(name: str, seeds: range, steps: int, jobs: int = 0) -> Caught:
     """Live seeds with a mutant until one breaks a rule that it holds without the mutant."""
-    began, left = time.monotonic(), seeds
+    began, left, (_, test) = time.monotonic(), seeds, head(name)
     with planted(name) as tree:
+        if TEST.match(test):
+            failed, said = _tested(tree, test)
+            return Caught(name, "a test" * failed, 0, 1, time.monotonic() - began, said)
         while left:
             text, problem = _lived(tree, left, steps, jobs)
             took = time.monotonic() - began
@@ -113,6 +118,14 @@ def caught(name: str, seeds: range, steps: int, jobs: int = 0) -> Caught:
                 return Caught(name, rule, seed, seed - seeds.start + 1, took, "\n".join(text.splitlines()[:2]))
             left = range(seed + 1, seeds.stop)
     return Caught(name, "", 0, len(seeds), took, f"seed {seed} breaks a rule without it too")
+
+
+def _tested(tree: Path, test: str) -> tuple[bool, str]:
+    """Run a test in a tree; return whether it failed, and what was said of it."""
+    command = (sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "-p", "no:xdist", "--tb=no", test)
+    environment = os.environ | {"PYTHONPATH": str(tree), "PYTHONDONTWRITEBYTECODE": "1"}
+    done = subprocess.run(command, cwd=tree, env=environment, capture_output=True, text=True, timeout=LONGEST)
+    return done.returncode == 1, done.stdout.strip()
 
 
 def _lived(tree: Path, seeds: range, steps: int, jobs: int) -> tuple[str, str]:

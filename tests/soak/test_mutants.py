@@ -12,7 +12,7 @@ import pytest
 from soak.simulation import mutants
 from soak.simulation.__main__ import main
 from soak.simulation.judges.judge import RULES
-from soak.simulation.mutants import Caught, applied, caught, head, names
+from soak.simulation.mutants import TEST, Caught, applied, caught, head, names
 from tests.support.paths import ROOT
 
 pytestmark = pytest.mark.fork
@@ -29,7 +29,13 @@ def test_each_mutant_applies_to_the_tree() -> None:
 
 def test_there_are_30_mutants_and_one_for_each_rule() -> None:
     assert len(names()) >= 30
-    assert {head(name)[1] for name in names()} == NAMES
+    assert {head(name)[1] for name in names() if not TEST.match(head(name)[1])} == NAMES
+
+
+def test_a_test_that_sees_a_mutant_is_there() -> None:
+    named = [head(name)[1].split("::") for name in names() if TEST.match(head(name)[1])]
+    gone = [each for file, each in named if not re.search(rf"def {each}\(|dialogue_tests\(", (ROOT / file).read_text())]
+    assert named and gone == []
 
 
 def test_a_mutant_that_is_missing_is_named_with_its_reason() -> None:
