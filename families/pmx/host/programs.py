@@ -16,7 +16,7 @@ from multidrop.base.text import whole
 from multidrop.dialects.codec import End, Procedure
 from multidrop.dialects.debugging import Debugging, Look, Neighbours
 from multidrop.dialects.family import Printed, Programs, Progress
-from multidrop.dialects.program_files import Difference, Held, Stored, first_difference
+from multidrop.dialects.program_files import Difference, Held, Stored
 from multidrop.families.pmx.host.codec import PmxState
 from multidrop.families.pmx.host.operations import OK, PROGRAMS, answered, moving, number, perform, who
 from multidrop.families.pmx.manual import program_file, script_checker
@@ -184,11 +184,6 @@ def differences(
     return tuple(found)
 
 
-def to_send(state: PmxState, lines: Sequence[SourceLine], held: Held) -> Procedure[str]:
-    yield from ()
-    return first_difference(differences(state, lines, held), "controller")
-
-
 def start(lines: Sequence[SourceLine], label: str) -> str:
     marks = {token for _, _, token in program_file.compiled(lines) if token.startswith("PS")} or {"PS0"}
     if f"PS{label}" not in marks:
@@ -220,6 +215,8 @@ class PmxPrograms(Programs):
 
     state: PmxState
 
+    keeper = "controller"
+
     def listing(self, place: str) -> Printed:
         return listing(self.state, place)
 
@@ -245,9 +242,6 @@ class PmxPrograms(Programs):
 
     def differences(self, lines: Sequence[SourceLine], held: Held, before: Held | None) -> Sequence[Difference]:
         return differences(self.state, lines, held, before)
-
-    def to_send(self, lines: Sequence[SourceLine], held: Held) -> Procedure[str]:
-        return to_send(self.state, lines, held)
 
     def start(self, lines: Sequence[SourceLine], label: str) -> str:
         return start(lines, label)

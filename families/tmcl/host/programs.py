@@ -19,7 +19,7 @@ from multidrop.base.text import counted, whole
 from multidrop.dialects.codec import Procedure
 from multidrop.dialects.debugging import Debugging, Look, Neighbours, Stepped
 from multidrop.dialects.family import Printed, Programs, Progress
-from multidrop.dialects.program_files import Difference, Held, Stored, first_difference, numbered
+from multidrop.dialects.program_files import Difference, Held, Stored, numbered
 from multidrop.families.tmcl.host.codec import TmclState, call_of, line_in, parse_reply
 from multidrop.families.tmcl.host.operations import LACKS, answered, busy, moving, perform, read, store, who
 from multidrop.families.tmcl.manual import program_file
@@ -202,11 +202,6 @@ def differences(
     return tuple(found)
 
 
-def to_send(state: TmclState, lines: Sequence[SourceLine], held: Held) -> Procedure[str]:
-    yield from ()
-    return first_difference(differences(state, lines, held), "module")
-
-
 def start(lines: Sequence[SourceLine], label: str) -> str:
     made = program_file.assembled(lines)
     address = made.labels.get(label.upper(), whole(label, 0, max(len(made.lines) - 1, 0)))
@@ -232,6 +227,7 @@ class TmclPrograms(Programs):
     state: TmclState
 
     remark = "//"
+    keeper = "module"
 
     def listing(self, place: str) -> Printed:
         return listing(self.state, place)
@@ -258,9 +254,6 @@ class TmclPrograms(Programs):
 
     def differences(self, lines: Sequence[SourceLine], held: Held, before: Held | None) -> Sequence[Difference]:
         return differences(self.state, lines, held, before)
-
-    def to_send(self, lines: Sequence[SourceLine], held: Held) -> Procedure[str]:
-        return to_send(self.state, lines, held)
 
     def start(self, lines: Sequence[SourceLine], label: str) -> str:
         return start(lines, label)
