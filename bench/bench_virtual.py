@@ -16,7 +16,7 @@ sys.path.insert(0, str(Path(__file__).parent.parent))
 from report import Row, alone, main
 
 from multidrop.families.lexium.manual import program_file
-from multidrop.families.lexium.simulator.program_run import ProgramRun
+from multidrop.families.lexium.simulator.program_run import MCodeRun
 from multidrop.simulator.cell.spec import DriveSpec, WorldSpec
 from multidrop.simulator.program_run import Summary
 
@@ -54,7 +54,7 @@ def run(text: str) -> tuple[float, Summary, int]:
     """Seconds, how it ended, and how many lines were printed."""
     lines = program_file.read(f"{SETUP}{text}E\nPG\n", "bench.mxt")
     begin = time.process_time()
-    events = list(ProgramRun(DriveSpec(world=WORLD), lines, "bench.mxt").run(until=MINUTES * 60))
+    events = list(MCodeRun(DriveSpec(world=WORLD), lines, "bench.mxt").run(until=MINUTES * 60))
     seconds = time.process_time() - begin
     end = events[-1]
     assert isinstance(end, Summary) and end.ended == "until" and not end.errors, end

@@ -16,7 +16,7 @@ from multidrop.base.comments import unsent
 from multidrop.base.errors import Diagnostic, Inexpressible
 from multidrop.base.files import SourceLine, lines_of_text
 from multidrop.dialects.codec import Codec, Priority, Procedure
-from multidrop.dialects.program_files import Difference, Held
+from multidrop.dialects.program_files import Difference, Held, first_difference
 from multidrop.dialects.state import DriveState, OfDrive, Owed, Remembered, who
 
 if TYPE_CHECKING:
@@ -156,6 +156,8 @@ class Programs(OfDrive, ABC):
     """Begins a remark in a file."""
     clearing: ClassVar[str] = ""
     """The line that erases all programs; empty: there is none."""
+    keeper: ClassVar[str] = "drive"
+    """What holds the programs, for a person."""
     begins: ClassVar[tuple[str, ...]] = ()
     """The words of lines that begin or end a program, or erase it with everything else."""
 
@@ -197,9 +199,10 @@ class Programs(OfDrive, ABC):
     def differences(self, lines: Sequence[SourceLine], held: Held, before: Held | None) -> Sequence[Difference]:
         """Compare the lines of a file with what a drive holds. `before`: what it held before the file was sent."""
 
-    @abstractmethod
     def to_send(self, lines: Sequence[SourceLine], held: Held) -> Procedure[str]:
-        """Return why a file must be sent; empty where the drive holds all of it."""
+        """Return why a file must be sent; empty where the drive holds all of it, by default all of its lines."""
+        return first_difference(self.differences(lines, held, None), self.keeper)
+        yield  # a conversation
 
     @abstractmethod
     def start(self, lines: Sequence[SourceLine], label: str) -> str:

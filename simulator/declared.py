@@ -17,7 +17,7 @@ class Simulated(NamedTuple):
     personalities: tuple[str, ...]
     """The products, by the names that a cell file gives them."""
     programs: str = ""
-    """The place of its `Programs`; empty: there are no program files."""
+    """The place of its `ProgramRun`; empty: there are no program files."""
     own_port: str = ""
     """The scheme of the port of its own that an Ethernet drive has, where each client gets the replies to its own
     messages; empty: there is none."""

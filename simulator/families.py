@@ -13,7 +13,7 @@ from multidrop.simulator.declared import simulated
 
 if TYPE_CHECKING:
     from multidrop.simulator.family import SimulatedFamily
-    from multidrop.simulator.program_run import Programs
+    from multidrop.simulator.program_run import ProgramRun
 
 
 def _personalities() -> dict[str, str]:
@@ -24,7 +24,7 @@ FAMILIES: Mapping[str, type[SimulatedFamily]] = OnDemand(
     lambda: {name: each.record for name, each in simulated().items()}
 )
 """By name."""
-PROGRAMS: Mapping[str, Programs] = OnDemand(
+PROGRAMS: Mapping[str, type[ProgramRun]] = OnDemand(
     lambda: {name: each.programs for name, each in simulated().items() if each.programs}
 )
 """The runs of program files, by the name of their family."""

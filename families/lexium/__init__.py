@@ -32,7 +32,7 @@ FAMILY = Feature(
             "mcode",
             f"{HERE}.simulator.family:SimulatedLexium",
             ("LMDOM", "LMDCM", "LMDOE", "LMDCE", "LMM", "MDI", "MDIE", "MDIX"),
-            f"{HERE}.simulator.program_run:RUNS",
+            f"{HERE}.simulator.program_run:MCodeRun",
             own_port="modbus",
         ),
         Demo(f"{HERE}.simulator"),

@@ -25,7 +25,7 @@ FAMILY = Feature(
                 ("ascript", "a-script", "pmx"),
             ),
         ),
-        Simulated("pmx", f"{HERE}.simulator.family:SimulatedPmx", ("PMX",), f"{HERE}.simulator.program_run:RUNS"),
+        Simulated("pmx", f"{HERE}.simulator.family:SimulatedPmx", ("PMX",), f"{HERE}.simulator.program_run:AScriptRun"),
         UsbModule("pmx", "a PMX controller", "Performax controller", 0x1589, 0xA101, ("Arcus", "Performax USB")),
         Demo(f"{HERE}.simulator"),
         Examples("program list", ("program list 'sim:#pmx'",)),

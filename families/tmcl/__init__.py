@@ -40,7 +40,7 @@ FAMILY = Feature(
                 "TMCM-6110",
                 "TMCM-6214",
             ),
-            f"{HERE}.simulator.program_run:RUNS",
+            f"{HERE}.simulator.program_run:TmclRun",
         ),
         Examples("scan", ("scan /dev/ttyUSB0 --dialect tmcl --all",)),
     ),

@@ -76,8 +76,7 @@ def examine_text(text: str, file: str, personality: str, language: str = "", enc
         mostly_wrong = 3 * len({each.line for each in errors(problems)}) >= lines > 0
         if mostly_wrong and (other := _other_language(text, language)) is not None:
             return Checked(file, [other])
-    refusals = PROGRAMS[language].refusals  # what a simulated drive refuses beyond what the text alone shows
-    more = refusals(text, file, personality, problems) if refusals is not None else []
+    more = PROGRAMS[language].refusals(text, file, personality, problems)  # what a simulated drive refuses besides
     problems = in_order([*problems, *more])
     if errors(problems):
         return Checked(file, problems)

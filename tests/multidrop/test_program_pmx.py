@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 from multidrop.families.pmx.manual import program_file
-from multidrop.families.pmx.simulator.program_run import ProgramRun
+from multidrop.families.pmx.simulator.program_run import AScriptRun
 from multidrop.simulator.cell.spec import DriveSpec
 from multidrop.simulator.cells import read
 from multidrop.simulator.program_run import Event, Summary
@@ -32,7 +32,7 @@ def program(multidrop: Command) -> Command:
 
 def tried(text: str, until: float, inputs: str = "[]", more: str = "") -> tuple[list[Event], Summary]:
     (_, bus) = read(CELL.format(inputs=inputs) + more, "cell").buses
-    trial = ProgramRun(bus.drives[0], program_file.read(text, "a.prg"), "a.prg")
+    trial = AScriptRun(bus.drives[0], program_file.read(text, "a.prg"), "a.prg")
     *events, end = trial.run("", until)
     assert isinstance(end, Summary)
     return [each for each in events if not isinstance(each, Summary)], end
@@ -146,4 +146,4 @@ def test_the_controller_comes_from_a_cell(program: Command, tmp_path: Path) -> N
 
 def test_another_personality_is_refused() -> None:
     with pytest.raises(Exception, match="does not run A-SCRIPT"):
-        ProgramRun(replace(DriveSpec(), personality="LMM"), [], "a.prg")
+        AScriptRun(replace(DriveSpec(), personality="LMM"), [], "a.prg")

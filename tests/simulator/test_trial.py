@@ -6,14 +6,14 @@ import pytest
 
 from multidrop.base.errors import Diagnostic
 from multidrop.families.lexium.manual import program_file
-from multidrop.families.lexium.simulator.program_run import ProgramRun
+from multidrop.families.lexium.simulator.program_run import MCodeRun
 from multidrop.simulator.cell.spec import DriveSpec, WorldSpec
 from multidrop.simulator.program_run import LONGEST, Event, Summary
 
 
 def tried(text: str, label: str = "", until: float | None = None, **spec: object) -> list[Event]:
     lines = program_file.read(text, "a.mxt")
-    return list(ProgramRun(DriveSpec(**spec), lines, "a.mxt").run(label, until))  # type: ignore[arg-type]
+    return list(MCodeRun(DriveSpec(**spec), lines, "a.mxt").run(label, until))  # type: ignore[arg-type]
 
 
 def end(events: list[Event]) -> Summary:

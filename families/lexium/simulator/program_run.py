@@ -1,21 +1,18 @@
-"""A program file run on one simulated drive, in virtual time: no clock, no wire, no event loop.
+"""An MCode file run on one simulated drive.
 
 The file is loaded as by a download: declarations are carried out at time 0, the program is stored; S is skipped, since
-nothing is to be kept. Then the drive's time goes from event to event, so that ten minutes of holding cost nothing, and
-up to `SLICE` further, so that a line of the program costs little. The run ends with the program, when nothing can ever
-happen any more, or when its time is over.
+nothing is to be kept.
 """
 
 from __future__ import annotations
 
-from collections.abc import Container, Iterator, Sequence
+from collections.abc import Container, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from math import inf
 
 from multidrop.base.errors import Diagnostic
-from multidrop.base.files import split_lines
-from multidrop.base.text import counted, whole
+from multidrop.base.text import whole
 from multidrop.dialects.program_files import Problem, errors
 from multidrop.families.lexium.manual import program_file
 from multidrop.families.lexium.manual.errors import ErrorNumber
@@ -26,24 +23,19 @@ from multidrop.families.lexium.manual.program_file import ProgramLine
 from multidrop.families.lexium.manual.statements import size_of
 from multidrop.families.lexium.simulator.device import MCodeDevice
 from multidrop.families.lexium.simulator.state.errors import CRLF, Failure, Fault
-from multidrop.families.lexium.simulator.state.expressions import Read
-from multidrop.families.lexium.simulator.state.models import MODELS
 from multidrop.families.lexium.simulator.state.program_memory import SPACE, Program
 from multidrop.families.lexium.simulator.stored_setups import refused_later
 from multidrop.simulator.cell.spec import DriveSpec
 from multidrop.simulator.program_run import (
-    NO_DEBUGGING,
     BreakPoint,
     Debugging,
     Event,
-    Load,
-    Programs,
+    ProgramRun,
+    Reader,
     Recorder,
     Summary,
     Value,
     Values,
-    break_point,
-    looks,
 )
 from multidrop.simulator.world import World
 
@@ -60,49 +52,42 @@ def printed(t: float, text: str) -> Event:
     return Event(t, {"print": text}, shown)
 
 
-class ProgramRun:
+class MCodeRun(ProgramRun):
     """One file on one drive. Raises Diagnostic for a drive that refuses its settings."""
 
-    def __init__(self, spec: DriveSpec, lines: Sequence[ProgramLine], name: str, source: Sequence[str] = ()) -> None:
-        if spec.personality not in MODELS:
-            raise Diagnostic(f"a {spec.personality} does not run MCode", name, f"valid: {', '.join(MODELS)}")
-        self._lines, self._name, self._personality = lines, name, spec.personality
-        self._source = source
-        self._recorder: Recorder | None = None
+    name = "mcode"
+    title = "MCode"
+    drive = DriveSpec()
+    breaks = "LINE or LABEL, or with ,PASSES"
+    watches = "a variable or flag, or a name with VA"
+    complete = "E"
+
+    def __init__(self, spec: DriveSpec, lines: Sequence[ProgramLine], file: str, source: Sequence[str] = ()) -> None:
+        super().__init__(spec, file, source)
+        self._lines, self._personality = lines, spec.personality
         self._device = MCodeDevice(replace(spec, program="", program_name=""), World(spec.world))
         self._interpreter, self._program = self._device.interpreter, self._device.program
+        self.running = self._device.thread
         self._failures: list[Failure] = []
         self._last: Failure | None = None
         self._device.errors.failures = self._failures
         self._device.prints()
         self._stored: dict[int, ProgramLine] = {}
         self._executed: dict[int, ProgramLine] = {}
-        self._held, self._stuck = "", False
-        self._errors: list[int] = []
+        self._held = ""
         self._active: tuple[int, ...] = ()
-        self._switched: list[Event] = []
 
-    def run(self, label: str = "", until: float | None = None, debugging: Debugging = NO_DEBUGGING) -> Iterator[Event]:
-        """Load the file and run it from a label or an address (SU, else address 1), for `until` seconds at most.
+    @classmethod
+    def parsed(cls, text: str, file: str) -> Sequence[ProgramLine]:
+        return program_file.read(text, file)
 
-        The last event is a Summary. A file with a refused line is not run. Raises Diagnostic if there is nothing to
-        run.
-        """
-        yield from self._load()
-        if self._errors:
-            yield self._summary("error")
-            return
-        self._start(label)
-        if debugging.wanted:
-            self._recorder = self._recording(debugging)
-            self._interpreter.watch(self._before, self._after)
-        elif debugging.outputs:
-            self._interpreter.watch(None, self._outputs)
-        yield from self._execute(until)
+    @classmethod
+    def refusals(cls, text: str, file: str, personality: str, found: Sequence[Problem]) -> list[Problem]:
+        return refusals(text, file, personality, found)
 
-    def refusals(self) -> Iterator[Event]:
+    def refused(self) -> Iterator[Event]:
         """Load the file without running it; return the refused lines. A refused PG counts as PG 1."""
-        return (each for each in self._load(anywhere=True) if each.problem)
+        return (each for each in self.load(anywhere=True) if each.problem)
 
     @property
     def program(self) -> Program:
@@ -111,7 +96,7 @@ class ProgramRun:
 
     # Loading.
 
-    def _load(self, anywhere: bool = False) -> Iterator[Event]:
+    def load(self, anywhere: bool = False) -> Iterator[Event]:
         device = self._device
         for line in self._lines:
             if anywhere and device.programming is None and line.section == "program" and line.mark is None:
@@ -125,7 +110,7 @@ class ProgramRun:
             self._held += answer.tail
             if answer.refused:
                 code = self._failures[-1].code
-                self._errors.append(code)
+                self.errors.append(code)
                 yield self._failed(Failure(0.0, code, 0), line, "refused")
                 if address is None and line.section == "program" and not anywhere:
                     return
@@ -133,8 +118,11 @@ class ProgramRun:
                 self._stored[address] = line
         self._failures.clear()
 
-    def _start(self, label: str) -> None:
-        """Start the program. A download takes longer than a calibration that its header has begun (AS)."""
+    def begin(self, label: str, debugging: Debugging) -> None:
+        """Start at a label or an address (SU, else address 1).
+
+        A download takes longer than a calibration that its header has begun (AS).
+        """
         device = self._device
         device.motor.hmt.settle(0.0)
         if not device.running or label:
@@ -148,40 +136,31 @@ class ProgramRun:
                 what = f"nothing to run at {label}" if label else "no SU, and nothing at address 1"
                 there = ", ".join(sorted(labels)) or "it has none"
                 hint = f"valid for --run: an address, or a label of the program ({there})"
-                raise Diagnostic(what, self._name, hint) from None
+                raise Diagnostic(what, self.file, hint) from None
         index = self._interpreter.linked.index
         self._executed = {index[at]: line for at, line in sorted(self._stored.items()) if at in index}
+        if debugging.wanted:
+            self.recorder = self.recording(debugging, Recorder)
+            self._interpreter.watch(self._before, self._after)
+        elif debugging.outputs:
+            self._interpreter.watch(None, self._switched)
 
     # The trace, and break points.
 
-    def _recording(self, debugging: Debugging) -> Recorder:
-        """Look at the lines that a person follows. Raises Diagnostic for a place or a name that is not there."""
-        readers = {name.upper(): self._reader(name.upper()) for name in debugging.watch}
-        valid = "LINE or LABEL, or with ,PASSES"
+    def reader(self, name: str) -> Reader | None:
+        return self._device.language.reader(name)
 
-        def values() -> Values:
-            found: dict[str, Value] = {}
-            for name, read in readers.items():
-                with suppress(Fault):  # a variable that is not declared yet is left out
-                    found[name] = read()
-            return found
+    def values(self, readers: Mapping[str, Reader]) -> Values:
+        found: dict[str, Value] = {}
+        for name, read in readers.items():
+            with suppress(Fault):  # a variable that is not declared yet is left out
+                found[name] = read()
+        return found
 
-        everything = debugging.trace and not readers
-        return Recorder(
-            debugging,
-            self._source,
-            {self._line_of(point := break_point(each, self._name, valid)): point for each in debugging.breaks},
-            (lambda: self._device.memory.values) if everything else values,
-        )
+    def unnamed(self, trace: bool) -> Values:
+        return self._device.memory.values if trace else {}
 
-    def _reader(self, name: str) -> Read:
-        read = self._device.language.reader(name)
-        if read is None:
-            raise Diagnostic(f"no variable {name} to watch", self._name, "valid: a variable or flag, or a name with VA")
-        return read
-
-    def _line_of(self, point: BreakPoint) -> int:
-        """The line of the file before which the run ends."""
+    def line_of(self, point: BreakPoint) -> int:
         labels, number = self._program.labels, whole(point.place, 0, LAST_LINE)
         if number is None:
             address = labels.get(point.place.upper())
@@ -191,61 +170,55 @@ class ProgramRun:
         found = self._executed.get(index.get(address, -1)) if address is not None else None
         if found is None:
             hint = f"valid: a line of the program, or a label ({', '.join(sorted(labels)) or 'none'})"
-            raise Diagnostic(f"no line to break at {point.place}", self._name, hint)
+            raise Diagnostic(f"no line to break at {point.place}", self.file, hint)
         return found.number
 
     def _before(self, line: int) -> bool:
-        found, recorder = self._executed.get(line), self._recorder
+        found, recorder = self._executed.get(line), self.recorder
         return found is not None and recorder is not None and recorder.reaches(self._device.now, found.number)
 
     def _after(self, line: int) -> None:
-        found, recorder = self._executed.get(line), self._recorder
+        found, recorder = self._executed.get(line), self.recorder
         if found is not None and recorder is not None:
             recorder.after(self._device.now, found.number)
 
-    def _outputs(self, line: int) -> None:
+    def unwatch(self) -> None:
+        self._interpreter.watch(None, None)
+
+    def _switched(self, line: int) -> None:
         device = self._device
         active = tuple(n for n, on in device.output_lines.driven.items() if on)
         if active != self._active:
             self._active = active
             text = f"active outputs: {', '.join(map(str, active)) or 'none'}"
-            self._switched.append(Event(device.now, {"outputs": list(active)}, text))
+            self.events.append(Event(device.now, {"outputs": list(active)}, text))
 
     # Running.
 
-    def _execute(self, until: float | None) -> Iterator[Event]:
-        device = self._device
-        for look, self._stuck in looks(device.thread, lambda: device.deadline, until):
-            device.advance(look, program=True)
-            yield from self._news()
-            if self._recorder is not None and self._recorder.done:
-                self._interpreter.watch(None, None)
-        if self._held:
-            yield printed(device.now, self._held)
-        if device.running:
-            yield self._summary("until", given_up=until is None)
-        elif self._recorder is not None and self._recorder.broken:
-            yield self._summary("break")
-        else:
-            last = self._last
-            failed = last is not None and last.t == device.now and not last.handled
-            yield self._summary("error" if failed else "E")
+    def deadline(self) -> float | None:
+        return self._device.deadline
 
-    def _news(self) -> Iterator[Event]:
-        """Yield what was executed, printed and what failed since the last look, in order."""
-        news: list[Event] = [*self._switched] if self._recorder is None else [*self._recorder.take()]
-        self._switched.clear()
+    def advance(self) -> None:
+        self._device.advance(self.now, program=True)
+
+    def happened(self) -> Iterator[Event]:
         for t, text in self._device.prints():
             *whole, self._held = (self._held + text).split(CRLF)
-            news += [printed(t, each) for each in whole]
+            yield from (printed(t, each) for each in whole)
         for failure in self._failures:
-            news.append(self._failed(failure, self._at(failure.line), f"at {failure.t:.4f} s"))
+            yield self._failed(failure, self._at(failure.line), f"at {failure.t:.4f} s")
             if not failure.handled:
-                self._errors.append(failure.code)
+                self.errors.append(failure.code)
         self._last = self._failures[-1] if self._failures else self._last
         self._failures.clear()
-        news.sort(key=lambda each: each.t)
-        yield from news
+
+    def rest(self) -> Iterator[Event]:
+        if self._held:
+            yield printed(self._device.now, self._held)
+
+    def ended(self) -> str:
+        last = self._last
+        return "error" if last is not None and last.t == self._device.now and not last.handled else self.complete
 
     def _failed(self, failure: Failure, line: ProgramLine, when: str) -> Event:
         """An error of the drive; `handled` is one that a subroutine of OE took."""
@@ -260,38 +233,29 @@ class ProgramRun:
             index -= 1
         return self._executed.get(index, self._lines[0])
 
-    def _summary(self, ended: str, given_up: bool = False) -> Summary:
-        device, errors = self._device, tuple(self._errors)
+    def failed(self) -> str:
+        return f"errors {', '.join(str(each) for each in self.errors)}"
+
+    def summary(self, ended: str, until: float | None) -> Summary:
+        device = self._device
         end = device.motion(device.now)
-        position, moving = end.position, end.velocity
-        moves, instructions = device.language.motions.begun, device.thread.executed
         line = self._at(self._interpreter.line()).number if self._executed else 0
-        failed = f"errors {', '.join(str(each) for each in errors)}" if errors else "no errors"
-        turning = f"the motor still turns, {moving} steps/s; H before E waits for it"
-        return Summary(
-            ended=ended,
+        return self.summed(
+            ended,
+            until,
             t=device.now,
-            position=position,
-            moves=moves,
-            instructions=instructions,
-            errors=errors,
+            position=end.position,
+            place=f"position {end.position}",
+            moves=device.language.motions.begun,
+            moving=end.velocity,
             lines_at=(line,),
-            moving=moving,
-            given_up=given_up,
-            stuck=self._stuck and ended == "until",
+            turning=f"the motor still turns, {end.velocity} steps/s; H before E waits for it",
             ran=line > 0,
-            counts=f"position {position}, {counted(moves, 'motion')}, {counted(instructions, 'line')}, {failed}",
-            turning=turning if moving and ended == "E" else "",
         )
 
 
 def meaning(code: int, personality: str) -> str:
     return f"error {code}, {text_of_error(code, personality)}"
-
-
-def read(text: str, file: str) -> Load:
-    lines, source = program_file.read(text, file), split_lines(text)
-    return lambda spec: ProgramRun(spec, lines, file, source)
 
 
 def refusals(text: str, file: str, personality: str, found: Sequence[Problem]) -> list[Problem]:
@@ -304,8 +268,8 @@ def refusals(text: str, file: str, personality: str, found: Sequence[Problem]) -
         tried = [line for line in tried if line.number < begins]
     missing = {line.declares for line in lines if line.number in wrong}
     problems, numbered = [], {line.number: line for line in lines}
-    run = ProgramRun(DriveSpec(personality=personality), tried, file)
-    for failed in run.refusals():
+    run = MCodeRun(DriveSpec(personality=personality), tried, file)
+    for failed in run.refused():
         line, code = numbered[failed.facts["line"]], failed.facts["error"]
         if code == ErrorNumber.PROGRAM_MEMORY_FULL:  # the drive takes none of the others either
             problems.append(_too_big(line, lines, personality))
@@ -319,7 +283,7 @@ def refusals(text: str, file: str, personality: str, found: Sequence[Problem]) -
 
 
 def _refused_later(
-    run: ProgramRun, lines: Sequence[ProgramLine], personality: str, told: Container[int]
+    run: MCodeRun, lines: Sequence[ProgramLine], personality: str, told: Container[int]
 ) -> Iterator[Problem]:
     """Warn of the set-ups of a program that a drive stores and refuses when it executes them."""
     for line, code, alone in refused_later(lines, run.program, personality, told):
@@ -333,6 +297,3 @@ def _too_big(line: ProgramLine, lines: Sequence[ProgramLine], personality: str) 
     size = sum(size_of(statement, personality) for each in inside if (statement := parsed(each.text)) is not None)
     what = f"program too big: {len(inside)} lines take {size} bytes, the drive holds {SPACE}"
     return Problem(line.number, line.column, what, "shorten the program; this line is the first without room")
-
-
-RUNS = Programs(drive=DriveSpec(), read=read, refusals=refusals)

@@ -16,7 +16,7 @@ from multidrop.base.text import whole
 from multidrop.dialects.codec import End, Procedure
 from multidrop.dialects.debugging import Debugging, Look, Neighbours
 from multidrop.dialects.family import Printed, Programs, Progress
-from multidrop.dialects.program_files import Difference, Held, Stored, first_difference
+from multidrop.dialects.program_files import Difference, Held, Stored
 from multidrop.dialects.state import who
 from multidrop.families.pmx.host.codec import PmxState
 from multidrop.families.pmx.host.operations import OK, PROGRAMS, answered, moving, number, perform
@@ -144,25 +144,6 @@ def read(state: PmxState, lines: Sequence[SourceLine], progress: Progress) -> Pr
     return Held(tuple(found), tuple(names))
 
 
-def end(state: PmxState) -> Procedure[bool]:
-    """End both programs, and slow the motors down that they have started; return whether a program ran.
-
-    Raises Refused where a motor moves without a program.
-    """
-    lines = []
-    for program in PROGRAMS:
-        if (yield from number(state, f"SASTAT{program}")) in RUNS:
-            lines.append(f"SR{program}=0")
-    moves = yield from moving(state)
-    if not lines and moves:
-        raise Refused(f"{who(state)} moves: stop it first (nothing was written)")
-    for text in lines:
-        yield from _command(state, text)
-    if lines and (yield from moving(state)):
-        yield from _command(state, "STOP")
-    return bool(lines)
-
-
 def _command(state: PmxState, text: str) -> Procedure[None]:
     reply = yield from answered(state, state.codec.request(state.address, text))
     if reply.text != OK:
@@ -185,22 +166,12 @@ def differences(
     return tuple(found)
 
 
-def to_send(state: PmxState, lines: Sequence[SourceLine], held: Held) -> Procedure[str]:
-    yield from ()
-    return first_difference(differences(state, lines, held), "controller")
-
-
 def start(lines: Sequence[SourceLine], label: str) -> str:
     marks = {token for _, _, token in program_file.compiled(lines) if token.startswith("PS")} or {"PS0"}
     if f"PS{label}" not in marks:
         hint = f"programs: {', '.join(sorted(mark[2:] for mark in marks))}"
         raise Diagnostic(f"no program {label} in the file", "", hint)
     return f"SR{label}=1"
-
-
-def annotated(text: str, held: Held) -> tuple[str, ...]:
-    """Return the lines of a script: it shows no numbers of lines. Compiled lines are better read as a script."""
-    return () if program_file.is_raw(program_file.read(text, "program")) else lines_of_text(text)
 
 
 def readable(held: Held) -> tuple[str, ...]:
@@ -221,6 +192,8 @@ class PmxPrograms(Programs):
 
     state: PmxState
 
+    keeper = "controller"
+
     def listing(self, place: str) -> Printed:
         return listing(self.state, place)
 
@@ -237,7 +210,22 @@ class PmxPrograms(Programs):
         return len(program_file.compiled(lines))
 
     def end(self) -> Procedure[bool]:
-        return end(self.state)
+        """End both programs, and slow the motors down that they have started; return whether a program ran.
+
+        Raises Refused where a motor moves without a program.
+        """
+        lines = []
+        for program in PROGRAMS:
+            if (yield from number(self.state, f"SASTAT{program}")) in RUNS:
+                lines.append(f"SR{program}=0")
+        moves = yield from moving(self.state)
+        if not lines and moves:
+            raise Refused(f"{who(self.state)} moves: stop it first (nothing was written)")
+        for text in lines:
+            yield from _command(self.state, text)
+        if lines and (yield from moving(self.state)):
+            yield from _command(self.state, "STOP")
+        return bool(lines)
 
     def download(
         self, lines: Sequence[SourceLine], held: Held | None, progress: Progress
@@ -247,14 +235,12 @@ class PmxPrograms(Programs):
     def differences(self, lines: Sequence[SourceLine], held: Held, before: Held | None) -> Sequence[Difference]:
         return differences(self.state, lines, held, before)
 
-    def to_send(self, lines: Sequence[SourceLine], held: Held) -> Procedure[str]:
-        return to_send(self.state, lines, held)
-
     def start(self, lines: Sequence[SourceLine], label: str) -> str:
         return start(lines, label)
 
     def annotated(self, text: str, held: Held) -> Sequence[str]:
-        return annotated(text, held)
+        """Return the lines of a script: it shows no numbers of lines. Compiled lines are better read as a script."""
+        return () if program_file.is_raw(program_file.read(text, "program")) else lines_of_text(text)
 
 
 RUNNING, PAUSED = 1, 2
@@ -263,12 +249,6 @@ START, PAUSE, CONTINUE = 1, 2, 3
 """Values of SR."""
 NO_STEP = "a PMX has no single step: /break now pauses a program, /continue goes on"
 NO_BREAK = "a PMX has no break points: /break now pauses a program; program test --break has them"
-
-
-def stored_rows(state: PmxState) -> Procedure[tuple[Stored, ...]]:
-    """Read the compiled lines in the controller; where they can be decompiled, the statements at their first lines."""
-    lines = yield from listing(state)
-    return _rows(tuple(Stored(int(found[1]), found[2]) for line in lines if (found := RAW.fullmatch(line))))
 
 
 def _rows(held: tuple[Stored, ...]) -> tuple[Stored, ...]:
@@ -334,14 +314,6 @@ def check_names(state: PmxState, names: Sequence[str]) -> None:
             raise Diagnostic(f"{name} cannot be watched: it reads no value", "", "valid: V0 to V63, PX, DI and others")
 
 
-def watched(state: PmxState, names: Sequence[str]) -> Procedure[Mapping[str, str]]:
-    found = {}
-    for name in names:
-        reply = yield from answered(state, state.codec.request(state.address, name))
-        found[name] = reply.text
-    return found
-
-
 class PmxDebugging(Debugging):
     """Observes the programs of a PMX."""
 
@@ -351,7 +323,9 @@ class PmxDebugging(Debugging):
     no_step = NO_STEP
 
     def listing(self) -> Procedure[tuple[Stored, ...]]:
-        return stored_rows(self.state)
+        """Read the compiled lines; where they can be decompiled, the statements at their first lines."""
+        lines = yield from listing(self.state)
+        return _rows(tuple(Stored(int(found[1]), found[2]) for line in lines if (found := RAW.fullmatch(line))))
 
     def rows(self, held: Held) -> Sequence[Stored]:
         return _rows(held.lines)
@@ -384,4 +358,8 @@ class PmxDebugging(Debugging):
         check_names(self.state, names)
 
     def values(self, names: Sequence[str]) -> Procedure[Mapping[str, str]]:
-        return watched(self.state, names)
+        found = {}
+        for name in names:
+            reply = yield from answered(self.state, self.state.codec.request(self.state.address, name))
+            found[name] = reply.text
+        return found

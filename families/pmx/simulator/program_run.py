@@ -1,21 +1,21 @@
-"""An A-SCRIPT file run on one simulated PMX-2ED-SA, in virtual time: no clock, no wire, no event loop.
+"""An A-SCRIPT file run on one simulated PMX-2ED-SA: every program of it is started at time 0, or one that is chosen.
 
-Every program of the file is started at time 0, or one that is chosen. The run ends when no program runs any more, when
-nothing can ever happen any more, or when its time is over.
+The run ends when no program runs any more.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import partial
 from math import inf
+from typing import Any
 
 from multidrop.base.errors import Diagnostic
-from multidrop.base.files import SourceLine, split_lines
-from multidrop.base.text import counted, whole
+from multidrop.base.files import SourceLine
+from multidrop.base.text import whole
 from multidrop.families.pmx.manual import program_file, script_compiler
 from multidrop.families.pmx.manual.script_parser import PROGRAMS, VARIABLES
 from multidrop.families.pmx.manual.table import lookup
@@ -23,25 +23,20 @@ from multidrop.families.pmx.simulator.device import PmxDevice
 from multidrop.families.pmx.simulator.programs import Failure
 from multidrop.simulator.cell.spec import DriveSpec
 from multidrop.simulator.program_run import (
-    NO_DEBUGGING,
     BreakPoint,
     Debugging,
     Event,
-    Load,
-    Programs,
+    ProgramRun,
+    Reader,
     Recorder,
     Summary,
     Value,
     Values,
-    break_point,
-    looks,
 )
-
-# What a person follows in the run of A-SCRIPT: which statement comes next, what variables and registers hold.
-
 
 LAST_LINE = 999_999
 _NAMES = {f"V{n}": n for n in range(VARIABLES)}
+_MOTION = re.compile(r"X-?\d+(?:Y-?\d+)?|Y-?\d+|(?:J|HL?|L|ZH?)[XY][+-]", re.ASCII)
 
 
 @dataclass
@@ -53,213 +48,180 @@ class Statement:
     changed: dict[str, Value] = field(default_factory=dict)
 
 
-class Watcher(Recorder):
-    """Looks at each compiled line that a program executes. Raises Diagnostic for a line or a name that is not there.
+class Statements(Recorder):
+    """A statement of the file has several compiled lines, so it is reported when the next one begins."""
 
-    A statement of the file has several compiled lines, so it is reported when the next one begins. `source` gives the
-    line of the file for a compiled line.
-    """
+    def __init__(self, *given: Any) -> None:
+        super().__init__(*given)
+        self.under_way: dict[int, Statement] = {}  # by program
 
-    def __init__(
-        self, device: PmxDevice, debugging: Debugging, source: Mapping[int, int], text: Sequence[str], file: str
-    ) -> None:
-        self._device, self._lines, self._file = device, source, file
-        self._now = 0.0
-        self._open: dict[int, Statement] = {}
-        names = [name.upper() for name in debugging.watch]
-        for name in names:
-            self._check(name)
-        valid = "LINE, or LINE,PASSES"
-        points = {self._line_of(point := break_point(each, file, valid)): point for each in debugging.breaks}
-        watched = names or ([*_NAMES] if debugging.trace else [])
-        super().__init__(debugging, text, points, partial(self._read, watched))
-
-    def before(self, t: float, program: int, line: int) -> bool:
-        self._now = t
-        number = self._lines.get(line, 0)
-        if line and self._lines.get(line - 1) == number and program in self._open:
-            return False  # within a statement
-        self._close(program)
-        self._open[program] = Statement(t, number)
-        if not self.reaches(t, number):
+    def begin(self, t: float, program: int, line: int) -> bool:
+        """A program begins a statement; whether a break point ends the run before it."""
+        self.close(program)
+        if not self.reaches(t, line):
+            self.under_way[program] = Statement(t, line)
             return False
-        del self._open[program]
         return True
 
     def executed(self, t: float, program: int) -> None:
         if not self.full:
-            self._open[program].changed.update(self.changed())
+            self.under_way[program].changed.update(self.changed())
 
     @property
     def open_since(self) -> float:
         """When the first statement under way began; infinite where there is none."""
-        return min((each.t for each in self._open.values()), default=inf)
+        return min((each.t for each in self.under_way.values()), default=inf)
 
     def end(self) -> None:
         """Record the statements under way: the run is over."""
-        for program in sorted(self._open):
-            self._close(program)
+        for program in sorted(self.under_way):
+            self.close(program)
 
-    def _close(self, program: int) -> None:
-        done = self._open.pop(program, None)
+    def close(self, program: int) -> None:
+        done = self.under_way.pop(program, None)
         if done is not None:
             self.after(done.t, done.line, done.changed, program)
 
-    def _read(self, names: Sequence[str]) -> Values:
-        variables = self._device.programs.variables
-        return {name: variables[_NAMES[name]] if name in _NAMES else self._register(name) for name in names}
 
-    def _register(self, name: str) -> int:
-        return int(self._device.controller.ask(name, self._now))
+class AScriptRun(ProgramRun):
+    """One file on one controller. Raises Diagnostic for a controller that refuses its settings."""
 
-    def _check(self, name: str) -> None:
-        """Refuse a name that reads no number: another command could move an axis."""
+    name = "pmx"
+    title = "A-SCRIPT"
+    drive = DriveSpec(personality="PMX", name="00")
+    breaks = "LINE, or LINE,PASSES"
+    watches = "V0 to V63, or a command that reads one number, such as PX"
+    unit = "compiled line"
+    complete = "END"
+    recorder: Statements | None
+
+    def __init__(self, spec: DriveSpec, lines: Sequence[SourceLine], file: str, source: Sequence[str] = ()) -> None:
+        super().__init__(spec, file, source)
+        self._device = PmxDevice(replace(spec, program="", program_name=""))
+        stored = program_file.compiled(lines)
+        held = {at: token for _, at, token in stored}
+        self._lines = {at: number for number, at, _ in stored}
+        last = max(held, default=-1)
+        self._programs = self.running = self._device.programs
+        self._programs.memory.load([held.get(at) or script_compiler.ERASED for at in range(last + 1)])
+        self._programs.on_command = self._hear
+        self._moves = 0
+        self._outputs = self._device.controller.outputs
+        self._at = 0.0
+
+    @classmethod
+    def parsed(cls, text: str, file: str) -> Sequence[SourceLine]:
+        return program_file.read(text, file)
+
+    def begin(self, start: str, debugging: Debugging) -> None:
+        """Start program 0 or 1, or all."""
+        if debugging.wanted:
+            self.recorder = self.recording(debugging, Statements)
+            self._programs.watch(self._before, self.recorder.executed)
+        there = [each for each in range(PROGRAMS) if self._programs.memory.start_of(each) is not None]
+        chosen = [each for each in there if start in ("", str(each))]
+        if not chosen:
+            valid = ", ".join(str(each) for each in there) or "none"
+            raise Diagnostic(f"no program {start}".rstrip(), self.file, f"valid: {valid}")
+        for each in chosen:
+            self._programs.control(each, 1, 0.0)
+
+    def deadline(self) -> float | None:
+        return self._programs.deadline
+
+    def advance(self) -> None:
+        self._device.advance(self.now)
+        if self.broken:
+            self.now = self._programs.ended_at
+
+    # Debugging
+
+    def _before(self, t: float, program: int, line: int) -> bool:
+        assert self.recorder is not None
+        self._at = t
+        number = self._lines.get(line, 0)
+        if line and self._lines.get(line - 1) == number and program in self.recorder.under_way:
+            return False  # within a statement
+        return self.recorder.begin(t, program, number)
+
+    def unwatch(self) -> None:
+        self._programs.watch(None, None)
+
+    def reader(self, name: str) -> Reader | None:
+        """A name that reads no number has none: another command could move an axis."""
+        if (variable := _NAMES.get(name)) is not None:
+            return lambda: self._programs.variables[variable]
         row = lookup(name)
-        if name in _NAMES:
-            return
         if row is not None and "R" in row.access:
             with suppress(ValueError):
                 self._register(name)
-                return
-        hint = "valid: V0 to V63, or a command that reads one number, such as PX"
-        raise Diagnostic(f"no variable {name} to watch", self._file, hint)
+                return partial(self._register, name)
+        return None
 
-    def _line_of(self, point: BreakPoint) -> int:
+    def _register(self, name: str) -> int:
+        return int(self._device.controller.ask(name, self._at))
+
+    def unnamed(self, trace: bool) -> Values:
+        return {name: self._programs.variables[n] for name, n in _NAMES.items()} if trace else {}
+
+    def line_of(self, point: BreakPoint) -> int:
         number = whole(point.place, 0, LAST_LINE)
         if number not in self._lines.values() or number is None:
-            raise Diagnostic(
-                f"no statement to break at {point.given}", self._file, "valid: the number of a line of the file"
-            )
+            hint = "valid: the number of a line of the file"
+            raise Diagnostic(f"no statement to break at {point.given}", self.file, hint)
         return number
 
-
-_MOTION = re.compile(r"X-?\d+(?:Y-?\d+)?|Y-?\d+|(?:J|HL?|L|ZH?)[XY][+-]", re.ASCII)
-
-
-class ProgramRun:
-    """One file on one controller. Raises Diagnostic for a controller that refuses its settings."""
-
-    def __init__(self, spec: DriveSpec, lines: Sequence[SourceLine], name: str, source: Sequence[str] = ()) -> None:
-        if spec.personality != "PMX":
-            raise Diagnostic(f"a {spec.personality} does not run A-SCRIPT", name, "valid: PMX")
-        self._name = name
-        bare = replace(spec, program="", program_name="")
-        self._device = PmxDevice(bare)
-        stored = program_file.compiled(lines)
-        held = {at: token for _, at, token in stored}
-        self._source = {at: number for number, at, _ in stored}
-        last = max(held, default=-1)
-        self._programs = self._device.programs
-        self._programs.memory.load([held.get(at) or script_compiler.ERASED for at in range(last + 1)])
-        self._programs.on_command = self._hear
-        self._program_lines = source
-        self._watcher: Watcher | None = None
-        self._moves = 0
-        self._last = self._device.controller.outputs
-        self._outputs: list[Event] = []
-        self._later: list[Event] = []
-        self._errors: list[str] = []
-        self.now, self._stuck = 0.0, False
-
-    def run(
-        self, program: str = "", until: float | None = None, debugging: Debugging = NO_DEBUGGING
-    ) -> Iterator[Event]:
-        """Run program 0 or 1, or all; a Summary is the last event. Raises Diagnostic if there is nothing to run."""
-        if debugging.wanted:
-            self._watcher = Watcher(self._device, debugging, self._source, self._program_lines, self._name)
-            self._programs.watch(self._watcher.before, self._watcher.executed)
-        for each in self._chosen(program):
-            self._programs.control(each, 1, 0.0)
-        programs = self._programs
-        for self.now, self._stuck in looks(programs, lambda: programs.deadline, until):
-            self._device.advance(self.now)
-            if self._broken:
-                self.now = self._programs.ended_at
-            if self._watcher is not None and self._watcher.done:
-                self._programs.watch(None, None)
-            yield from self._news()
-        yield from self._news(last=True)
-        yield self._summary(until)
-
-    def _chosen(self, program: str) -> list[int]:
-        there = [each for each in range(PROGRAMS) if self._programs.memory.start_of(each) is not None]
-        chosen = [each for each in there if program in ("", str(each))]
-        if not chosen:
-            valid = ", ".join(str(each) for each in there) or "none"
-            raise Diagnostic(f"no program {program}".rstrip(), self._name, f"valid: {valid}")
-        return chosen
+    # The run
 
     def _hear(self, t: float, program: int, text: str) -> None:
         self._moves += _MOTION.fullmatch(text) is not None
-        if self._device.controller.outputs != self._last:
-            self._last = self._device.controller.outputs
-            facts = {"program": program, "outputs": self._last}
-            self._outputs.append(Event(t, facts, f"DO={self._last} (program {program})"))
+        if self._device.controller.outputs != self._outputs:
+            self._outputs = self._device.controller.outputs
+            facts = {"program": program, "outputs": self._outputs}
+            self.events.append(Event(t, facts, f"DO={self._outputs} (program {program})"))
 
-    def _news(self, last: bool = False) -> Iterator[Event]:
-        """Yield what was executed, switched and what failed since the last look, in the order of time.
+    def news(self) -> list[Event]:
+        """What follows the start of an unfinished statement waits for its end."""
+        news, begun = super().news(), inf if self.recorder is None else self.recorder.open_since
+        self.events = [each for each in news if each.t >= begun]
+        return [each for each in news if each.t < begun]
 
-        What follows the start of an unfinished statement waits for its end. `last`: the run is over.
-        """
-        news: list[Event] = [*self._later, *self._outputs]
-        begun = inf
-        if self._watcher is not None:
-            if last:
-                self._watcher.end()
-            news += self._watcher.take()
-            begun = self._watcher.open_since
+    @staticmethod
+    def order(event: Event) -> tuple[float, bool]:
+        return event.t, event.problem or event.line is None  # an executed line first
+
+    def happened(self) -> Iterator[Event]:
         for each in self._programs.failures:
-            news.append(self._failed(each))
+            yield self._failed(each)
             if not each.handled:
-                self._errors.append(each.why)
-        self._outputs.clear()
+                self.errors.append(each.why)
         self._programs.failures.clear()
-        news.sort(key=lambda each: (each.t, each.problem or each.line is None))  # an executed line first
-        self._later = [each for each in news if each.t >= begun]
-        yield from (each for each in news if each.t < begun)
+
+    def rest(self) -> Iterator[Event]:
+        if self.recorder is not None:
+            self.recorder.end()
+        yield from self.news()
 
     def _failed(self, failure: Failure) -> Event:
         """An error in a program, its cause, and whether SUB 31 has handled it."""
-        line, more = self._source.get(failure.line, 0), {"handled": True} if failure.handled else {}
+        line, more = self._lines.get(failure.line, 0), {"handled": True} if failure.handled else {}
         facts = {"program": failure.program, "error": failure.why, "line": line, **more}
         handled = " (SUB 31 has handled it)" if failure.handled else ""
         text = f"program {failure.program} at {failure.t:.4f} s: {failure.why}{handled}"
         return Event(failure.t, facts, text, line, problem=True)
 
-    def _summary(self, until: float | None) -> Summary:
-        running = self._programs.running
-        standing = [self._programs.counter(n) for n in range(PROGRAMS) if self._programs.status(n) in (1, 2)]
+    def summary(self, ended: str, until: float | None) -> Summary:
+        programs = self._programs
+        standing = [programs.counter(n) for n in range(PROGRAMS) if programs.status(n) in (1, 2)]
         x, y = (int(self._device.execute(f"P{axis}", self.now)) for axis in "XY")
-        moving, errors, lines = (
-            any(self._device.controller.moving(axis) for axis in "XY"),
-            tuple(self._errors),
-            self._programs.executed,
-        )
-        ended = "break" if self._broken else "until" if running else "error" if errors else "END"
-        failed = counted(len(errors), "error") if errors else "no errors"
-        return Summary(
-            ended=ended,
-            t=self._programs.ended_at if not running else self.now,
+        return self.summed(
+            ended,
+            until,
+            t=self.now if programs.running else programs.ended_at,
             position=(x, y),
+            place=f"X {x}, Y {y}",
             moves=self._moves,
-            instructions=lines,
-            errors=errors,
-            lines_at=tuple(self._source.get(at, 0) for at in standing),
-            moving=moving,
-            given_up=running and until is None,
-            stuck=running and self._stuck,
-            counts=f"X {x}, Y {y}, {counted(self._moves, 'motion')}, {counted(lines, 'compiled line')}, {failed}",
-            turning="a motor still turns; WAITX or WAITY before END waits for it" if moving and ended == "END" else "",
+            moving=any(self._device.controller.moving(axis) for axis in "XY"),
+            lines_at=tuple(self._lines.get(at, 0) for at in standing),
+            turning="a motor still turns; WAITX or WAITY before END waits for it",
         )
-
-    @property
-    def _broken(self) -> bool:
-        return self._watcher is not None and self._watcher.broken
-
-
-def read(text: str, file: str) -> Load:
-    lines, source = program_file.read(text, file), split_lines(text)
-    return lambda spec: ProgramRun(spec, lines, file, source)
-
-
-RUNS = Programs(drive=DriveSpec(personality="PMX", name="00"), read=read)

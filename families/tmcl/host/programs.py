@@ -19,7 +19,7 @@ from multidrop.base.text import counted, whole
 from multidrop.dialects.codec import Procedure
 from multidrop.dialects.debugging import Debugging, Look, Neighbours, Stepped
 from multidrop.dialects.family import Printed, Programs, Progress
-from multidrop.dialects.program_files import Difference, Held, Stored, first_difference, numbered
+from multidrop.dialects.program_files import Difference, Held, Stored, numbered
 from multidrop.dialects.state import who
 from multidrop.families.tmcl.host.codec import TmclState, call_of, line_in, parse_reply
 from multidrop.families.tmcl.host.operations import LACKS, answered, busy, moving, perform, read, store
@@ -203,11 +203,6 @@ def differences(
     return tuple(found)
 
 
-def to_send(state: TmclState, lines: Sequence[SourceLine], held: Held) -> Procedure[str]:
-    yield from ()
-    return first_difference(differences(state, lines, held), "module")
-
-
 def start(lines: Sequence[SourceLine], label: str) -> str:
     made = program_file.assembled(lines)
     address = made.labels.get(label.upper(), whole(label, 0, max(len(made.lines) - 1, 0)))
@@ -218,21 +213,13 @@ def start(lines: Sequence[SourceLine], label: str) -> str:
     return program_file.run_at(address)
 
 
-def annotated(text: str, held: Held) -> tuple[str, ...]:
-    """The lines of a file, each with its address where it gives a line of the memory."""
-    lines = lines_of_text(text)
-    made = program_file.assembled(numbered(lines))
-    places = {each.source: each.at for each in made.lines}
-    width = len(str(len(made.lines)))
-    return tuple(f"{places.get(number, ''):>{width}}  {line}".rstrip() for number, line in enumerate(lines, 1))
-
-
 class TmclPrograms(Programs):
     """The program in a TMCL module."""
 
     state: TmclState
 
     remark = "//"
+    keeper = "module"
 
     def listing(self, place: str) -> Printed:
         return listing(self.state, place)
@@ -260,14 +247,16 @@ class TmclPrograms(Programs):
     def differences(self, lines: Sequence[SourceLine], held: Held, before: Held | None) -> Sequence[Difference]:
         return differences(self.state, lines, held, before)
 
-    def to_send(self, lines: Sequence[SourceLine], held: Held) -> Procedure[str]:
-        return to_send(self.state, lines, held)
-
     def start(self, lines: Sequence[SourceLine], label: str) -> str:
         return start(lines, label)
 
     def annotated(self, text: str, held: Held) -> Sequence[str]:
-        return annotated(text, held)
+        """The lines of a file, each with its address where it gives a line of the memory."""
+        lines = lines_of_text(text)
+        made = program_file.assembled(numbered(lines))
+        places = {each.source: each.at for each in made.lines}
+        width = len(str(len(made.lines)))
+        return tuple(f"{places.get(number, ''):>{width}}  {line}".rstrip() for number, line in enumerate(lines, 1))
 
 
 # Observation
@@ -277,42 +266,12 @@ NO_PLACE = "does not report the address of its next line (global parameter 130)"
 NO_BREAK = "TMCL has no break points: /break now halts a program; program test --break has them"
 
 
-def stored_rows(state: TmclState) -> Procedure[tuple[Stored, ...]]:
-    return (yield from read_held(state, (), lambda done, total: None)).lines
-
-
 def address_of(place: str) -> int:
     """The address that a place names. Raises Diagnostic."""
     found = whole(place or "0", 0, MEMORY - 1)
     if found is None:
         raise Diagnostic(f"no line {place}", "", f"valid: an address, 0 to {MEMORY - 1}; /list shows them")
     return found
-
-
-def idle(state: TmclState, place: str, neighbours: Neighbours | None) -> Procedure[None]:
-    address = address_of(place)
-    if neighbours is None and address:
-        raise Inexpressible(f"{who(state)}: single step begins with line 0: no command sets another; nothing was sent")
-    if (yield from busy(state)):
-        raise Refused(f"{who(state)}: its program runs already; not started; 128 0, 0, 0 ends it")
-
-
-def trace(state: TmclState, place: str) -> Procedure[None]:
-    state.program_halted(False)
-    yield from perform(state, program_file.run_at(address_of(place)))
-
-
-def begin(state: TmclState, place: str) -> Procedure[None]:
-    yield from perform(state, "131 0, 0, 0")
-    state.program_halted(True)
-
-
-def look(state: TmclState, place: str) -> Procedure[Look]:
-    runs = yield from busy(state)
-    state.program_halted(state.halted and not runs)
-    if not runs and not state.halted:
-        return Look(False)
-    return Look(True, state.halted, (yield from counter(state)))
 
 
 def counter(state: TmclState) -> Procedure[int | None]:
@@ -325,11 +284,6 @@ def counter(state: TmclState) -> Procedure[int | None]:
         raise
 
 
-def waits(state: TmclState, place: str, last: Stored | None) -> Procedure[None]:
-    if not state.halted or (yield from busy(state)):
-        raise Refused(f"{who(state)}: its program is not known to be halted; nothing was sent")
-
-
 def step(state: TmclState, listed: Sequence[Stored]) -> Procedure[Stepped]:
     """Execute the next line; a program that comes to STOP, or to its end, is over."""
     at = yield from counter(state)
@@ -339,18 +293,6 @@ def step(state: TmclState, listed: Sequence[Stored]) -> Procedure[Stepped]:
     yield from perform(state, "130 0, 0, 0")
     state.program_halted(bool(row.text) and row.text != Word.STOP.name)
     return Stepped(row)
-
-
-def go_on(state: TmclState, place: str) -> Procedure[None]:
-    state.program_halted(False)
-    yield from perform(state, "129 0, 0, 0")
-
-
-def break_now(state: TmclState, place: str) -> Procedure[None]:
-    if not (yield from busy(state)):
-        raise Refused(f"{who(state)}: its program does not run; nothing was sent")
-    yield from perform(state, "128 0, 0, 0")
-    state.program_halted(True)
 
 
 def check_names(state: TmclState, names: Sequence[str]) -> None:
@@ -372,17 +314,6 @@ def watched_call(name: str) -> Call:
     raise Diagnostic(f"{name} cannot be watched", "", "valid: A, X, V0 to V255, AP and a parameter, as AP1 or AP1/2")
 
 
-def watched(state: TmclState, names: Sequence[str]) -> Procedure[Mapping[str, str]]:
-    found = {}
-    for name in names:
-        try:
-            found[name] = str((yield from read(state, watched_call(name))))
-        except Refused as refused:
-            if refused.code not in LACKS:
-                raise
-    return found
-
-
 class TmclDebugging(Debugging):
     """Observes the program of a TMCL module."""
 
@@ -391,7 +322,7 @@ class TmclDebugging(Debugging):
     no_break = NO_BREAK
 
     def listing(self) -> Procedure[tuple[Stored, ...]]:
-        return stored_rows(self.state)
+        return (yield from read_held(self.state, (), lambda done, total: None)).lines
 
     def entry(self, rows: Sequence[Stored]) -> str:
         return "0"
@@ -400,16 +331,25 @@ class TmclDebugging(Debugging):
         return whole(place, 0, MEMORY - 1)
 
     def idle(self, place: str, neighbours: Neighbours | None) -> Procedure[None]:
-        return idle(self.state, place, neighbours)
+        address = address_of(place)
+        if neighbours is None and address:
+            raise Inexpressible(
+                f"{who(self.state)}: single step begins with line 0: no command sets another; nothing was sent"
+            )
+        if (yield from busy(self.state)):
+            raise Refused(f"{who(self.state)}: its program runs already; not started; 128 0, 0, 0 ends it")
 
     def trace(self, place: str) -> Procedure[None]:
-        return trace(self.state, place)
+        self.state.program_halted(False)
+        yield from perform(self.state, program_file.run_at(address_of(place)))
 
     def begin(self, place: str) -> Procedure[None]:
-        return begin(self.state, place)
+        yield from perform(self.state, "131 0, 0, 0")
+        self.state.program_halted(True)
 
     def waits(self, place: str, last: Stored | None) -> Procedure[None]:
-        return waits(self.state, place, last)
+        if not self.state.halted or (yield from busy(self.state)):
+            raise Refused(f"{who(self.state)}: its program is not known to be halted; nothing was sent")
 
     def forget(self) -> None:
         self.state.program_halted(False)
@@ -418,16 +358,31 @@ class TmclDebugging(Debugging):
         return step(self.state, rows)
 
     def go_on(self, place: str) -> Procedure[None]:
-        return go_on(self.state, place)
+        self.state.program_halted(False)
+        yield from perform(self.state, "129 0, 0, 0")
 
     def look(self, place: str) -> Procedure[Look]:
-        return look(self.state, place)
+        runs = yield from busy(self.state)
+        self.state.program_halted(self.state.halted and not runs)
+        if not runs and not self.state.halted:
+            return Look(False)
+        return Look(True, self.state.halted, (yield from counter(self.state)))
 
     def break_now(self, place: str) -> Procedure[None]:
-        return break_now(self.state, place)
+        if not (yield from busy(self.state)):
+            raise Refused(f"{who(self.state)}: its program does not run; nothing was sent")
+        yield from perform(self.state, "128 0, 0, 0")
+        self.state.program_halted(True)
 
     def names(self, names: Sequence[str]) -> None:
         check_names(self.state, names)
 
     def values(self, names: Sequence[str]) -> Procedure[Mapping[str, str]]:
-        return watched(self.state, names)
+        found = {}
+        for name in names:
+            try:
+                found[name] = str((yield from read(self.state, watched_call(name))))
+            except Refused as refused:
+                if refused.code not in LACKS:
+                    raise
+        return found

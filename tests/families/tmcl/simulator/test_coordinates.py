@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from multidrop.families.tmcl.manual import program_file
 from multidrop.families.tmcl.manual.commands import Call
-from multidrop.families.tmcl.simulator.program_run import RUNS, read
+from multidrop.families.tmcl.simulator.program_run import TmclRun
 from tests.support.tmcl_module import Module
 
 SCO, GCO, CCO = 30, 31, 32
@@ -16,7 +16,7 @@ SCO, GCO, CCO = 30, 31, 32
 
 def run(text: str) -> tuple[int, tuple[str, ...]]:
     """The position at the end of a program file, and its errors."""
-    *_, summary = read(text, "x.tmc")(RUNS.drive).run()
+    *_, summary = TmclRun.read(text, "x.tmc")(TmclRun.drive).run()
     return summary.position, summary.errors
 
 
