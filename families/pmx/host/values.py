@@ -19,6 +19,7 @@ from functools import partial
 
 from multidrop.base.errors import Diagnostic, Inexpressible
 from multidrop.dialects.codec import Priority, Procedure, Request
+from multidrop.dialects.listed_settings import ListedParameters
 from multidrop.dialects.state import DriveState
 from multidrop.dialects.values import (
     COMMUNICATION,
@@ -37,15 +38,11 @@ from multidrop.dialects.values import (
     Plan,
     Progress,
     Reading,
-    Readings,
     Snapshot,
     Value,
     Values,
     controls_of,
     printed_number,
-    read_each,
-    reference_lost,
-    same,
 )
 from multidrop.dialects.values import number as number_of
 from multidrop.families.pmx.host.codec import PmxState
@@ -118,19 +115,7 @@ NAMES = tuple(
 """The settings in the order in which they are written."""
 
 
-def plan(state: PmxState, present: Readings, wanted: Mapping[str, Value], allowed: Permission) -> Plan:
-    now = present.values
-    changed = {name.upper(): value for name, value in wanted.items() if not same(value, now.get(name.upper()))}
-    withheld = {name: reason for name in changed if (reason := _risk(name, changed[name], now, allowed))}
-    goal = {name: value for name, value in changed.items() if name not in withheld}
-    for name, value in goal.items():
-        _check(name, value)
-    order = sorted(goal, key=NAMES.index)
-    for low in [name for name in order if base(name) == "LSPD"]:
-        order = _speeds_in_order(order, low, now, goal)
-    steps = [Change(name, now.get(name), goal[name], f"{name}={_written(name, goal[name])}") for name in order]
-    scale = [name for name in goal if base(name) in ("POL", "SLR", "SL")]
-    return Plan(tuple(steps), tuple(withheld.items()), remarks=reference_lost(steps, scale))
+NAME_FORM, RATIO_FORM, WHOLE_FORM = r"[0-9A-Za-z]{1,8}", r"\d{1,6}(?:\.\d+)?", r"-?\d{1,19}"
 
 
 def _speeds_in_order(order: list[str], low: str, now: Mapping[str, Value], goal: Mapping[str, Value]) -> list[str]:
@@ -142,77 +127,13 @@ def _speeds_in_order(order: list[str], low: str, now: Mapping[str, Value], goal:
     return [*pair, *rest]
 
 
-def _risk(name: str, value: Value, now: Mapping[str, Value], allowed: Permission) -> str:
-    """The reason for which a setting waits for a person's word; empty: there is none."""
-    word, on = base(name), now.get(f"SL{axis(name)}")
-    if name in allowed.named or (name in WIRE and allowed.communication):
-        return ""
-    if name in WIRE:
-        return COMMUNICATION
-    if word == "SL" and value:
-        return "StepNLoop corrects the position by moves"
-    if word in JOYSTICK:
-        return "the joystick may be on, and then it can turn the motor"
-    if word in LOOP and on:
-        return "StepNLoop is on and may correct the position by a move"
-    return "programs run after power-up" if name == "SLOAD" and value else ""
-
-
-def _check(name: str, value: Value) -> None:
-    """Raise Diagnostic for an unknown setting, or a value out of range."""
-    if name not in NAMES:
-        raise Diagnostic(f"{name}: is not a setting of the controller")
-    if name == "DN":
-        if not re.fullmatch(r"2ED\d\d", str(value)):
-            raise Diagnostic(f"DN = {value}: valid: 2ED00 to 2ED99")
-        return
-    if isinstance(value, (str, tuple)):
-        raise Diagnostic(f"{name} = {value}: takes a number")
-    if base(name) == RATIO:
-        low, high = 0.001, 999.999
-    else:
-        low, high = RANGES.get(base(name), (-LARGEST - 1 if base(name) in SIGNED else 0, LARGEST))
-        if not float(value).is_integer():
-            raise Diagnostic(f"{name} = {value}: takes a whole number")
-    if not low <= value <= high:
-        raise Diagnostic(f"{name} = {value}: valid: {low} to {high}")
-
-
 def _written(name: str, value: Value) -> str:
     if base(name) == RATIO:
         return f"{number_of(value):.3f}"
     return value if isinstance(value, str) else str(int(number_of(value)))
 
 
-NAME_FORM, RATIO_FORM, WHOLE_FORM = r"[0-9A-Za-z]{1,8}", r"\d{1,6}(?:\.\d+)?", r"-?\d{1,19}"
-
-
-def read_settings(state: PmxState, progress: Progress) -> Procedure[Readings]:
-    """Read every setting; a refused word is listed. Raises NoAnswer. Nothing is changed."""
-    return (yield from read_each(NAMES, partial(_read_setting, state), progress, UNREAD))
-
-
-def _read_setting(state: PmxState, name: str) -> Procedure[Reading]:
-    ratio = base(name) == RATIO
-    form = NAME_FORM if name == "DN" else RATIO_FORM if ratio else WHOLE_FORM
-    reply = yield from answered(state, replace(state.codec.request(state.address, name), expect=form))
-    return reading(name, reply.text if name == "DN" else float(reply.text) if ratio else int(reply.text))
-
-
-def conflict(plan: Plan, others: Collection[str]) -> str:
-    numbers = [str(change.after)[-2:] for change in plan if change.name == "DN"]
-    return f"another controller of the line has number {numbers[0]}" if numbers and numbers[0] in others else ""
-
-
-def ready(state: PmxState) -> Procedure[str]:
-    if (yield from moving(state)):
-        return f"{who(state)} moves: stop it first"
-    if (yield from busy(state)):
-        return f"{who(state)} runs a program: SR0=0 and SR1=0 end them"
-    return ""
-
-
-class PmxParameters(Parameters):
+class PmxParameters(ListedParameters):
     """The settings of a PMX."""
 
     state: PmxState
@@ -220,15 +141,70 @@ class PmxParameters(Parameters):
     language = "PMX"
     saving = "STORE"
     later = frozenset(LATER)
+    unread = UNREAD
 
-    def read(self, progress: Progress) -> Procedure[Readings]:
-        return read_settings(self.state, progress)
+    def names(self) -> Sequence[str]:
+        return NAMES
 
-    def plan(self, present: Readings, wanted: Mapping[str, Value], permission: Permission) -> Plan:
-        return plan(self.state, present, wanted, permission)
+    def read_one(self, name: str) -> Procedure[Reading]:
+        ratio = base(name) == RATIO
+        form = NAME_FORM if name == "DN" else RATIO_FORM if ratio else WHOLE_FORM
+        reply = yield from answered(
+            self.state, replace(self.state.codec.request(self.state.address, name), expect=form)
+        )
+        return reading(name, reply.text if name == "DN" else float(reply.text) if ratio else int(reply.text))
+
+    def risk(self, name: str, value: Value, now: Mapping[str, Value], allowed: Permission) -> str:
+        """The reason for which a setting waits for a person's word; empty: there is none."""
+        word, on = base(name), now.get(f"SL{axis(name)}")
+        if name in allowed.named or (name in WIRE and allowed.communication):
+            return ""
+        if name in WIRE:
+            return COMMUNICATION
+        if word == "SL" and value:
+            return "StepNLoop corrects the position by moves"
+        if word in JOYSTICK:
+            return "the joystick may be on, and then it can turn the motor"
+        if word in LOOP and on:
+            return "StepNLoop is on and may correct the position by a move"
+        return "programs run after power-up" if name == "SLOAD" and value else ""
+
+    def checked(self, name: str, value: Value) -> Value:
+        if name not in NAMES:
+            raise Diagnostic(f"{name}: is not a setting of the controller")
+        if name == "DN":
+            if not re.fullmatch(r"2ED\d\d", str(value)):
+                raise Diagnostic(f"DN = {value}: valid: 2ED00 to 2ED99")
+            return value
+        if isinstance(value, (str, tuple)):
+            raise Diagnostic(f"{name} = {value}: takes a number")
+        if base(name) == RATIO:
+            low, high = 0.001, 999.999
+        else:
+            low, high = RANGES.get(base(name), (-LARGEST - 1 if base(name) in SIGNED else 0, LARGEST))
+            if not float(value).is_integer():
+                raise Diagnostic(f"{name} = {value}: takes a whole number")
+        if not low <= value <= high:
+            raise Diagnostic(f"{name} = {value}: valid: {low} to {high}")
+        return value
+
+    def ordered(self, names: list[str], now: Mapping[str, Value], goal: Mapping[str, Value]) -> list[str]:
+        for low in [name for name in names if base(name) == "LSPD"]:
+            names = _speeds_in_order(names, low, now, goal)
+        return names
+
+    def line(self, name: str, value: Value) -> str:
+        return f"{name}={_written(name, value)}"
+
+    def rescales(self, name: str) -> bool:
+        return base(name) in ("POL", "SLR", "SL")
 
     def ready(self) -> Procedure[str]:
-        return ready(self.state)
+        if (yield from moving(self.state)):
+            return f"{who(self.state)} moves: stop it first"
+        if (yield from busy(self.state)):
+            return f"{who(self.state)} runs a program: SR0=0 and SR1=0 end them"
+        return ""
 
     def write(self, change: Change) -> Procedure[object]:
         return perform(self.state, change.text)
@@ -237,7 +213,8 @@ class PmxParameters(Parameters):
         return perform(self.state, "STORE")
 
     def conflict(self, plan: Plan, others: Collection[str]) -> str:
-        return conflict(plan, others)
+        numbers = [str(change.after)[-2:] for change in plan if change.name == "DN"]
+        return f"another controller of the line has number {numbers[0]}" if numbers and numbers[0] in others else ""
 
 
 RUNNING, PAUSED = 1, 2
@@ -361,7 +338,7 @@ def again(state: PmxState, word: str, priority: Priority) -> Procedure[float]:
 
 
 def take(state: PmxState, progress: Progress) -> Procedure[Snapshot]:
-    readings = yield from read_settings(state, progress)
+    readings = yield from PmxParameters(state).read(progress)
     identity = yield from answered(state, state.codec.request(state.address, "ID"))
     remarks = []
     for axis in table.AXES:
@@ -457,9 +434,6 @@ class PmxValues(Values):
 
     def check(self, word: str) -> str:
         return check(self.state, word)
-
-    def first(self, word: str) -> Procedure[float]:
-        return again(self.state, word, Priority.OPERATOR)
 
     def again(self, word: str, priority: Priority) -> Procedure[float]:
         return again(self.state, word, priority)

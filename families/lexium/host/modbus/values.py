@@ -262,9 +262,6 @@ class ModbusValues(Values):
     def check(self, word: str) -> str:
         return check(self.state, word)
 
-    def first(self, word: str) -> Procedure[float]:
-        return again(self.state, word, Priority.OPERATOR)
-
     def again(self, word: str, priority: Priority) -> Procedure[float]:
         return again(self.state, word, priority)
 
