@@ -20,7 +20,6 @@ from functools import partial
 from multidrop.base.errors import Diagnostic, Inexpressible
 from multidrop.dialects.codec import Priority, Procedure, Request
 from multidrop.dialects.listed_settings import ListedParameters
-from multidrop.dialects.state import DriveState
 from multidrop.dialects.values import (
     COMMUNICATION,
     VARIABLES,
@@ -232,20 +231,6 @@ POLARITY = 1 << 10
 """The bit of POLX that inverts the inputs."""
 
 
-def parts(state: PmxState, facts: Facts) -> Sequence[Part]:
-    found = []
-    for axis in table.AXES:
-        loop = (f"SLS{axis}", f"DX{axis}") if facts.get(f"SL{axis}") else ()
-        found.append(Part(axis, partial(_facts, state, names=(f"MST{axis}", *loop))))
-    found += [
-        Part("points", partial(_facts, state, names=("DI", "DO", "EO"))),
-        Part("programs", partial(_programs, state)),
-    ]
-    found += [Part(f"settings {axis}", partial(_facts, state, names=(f"SL{axis}",)), slow=True) for axis in table.AXES]
-    named = [each + axis for axis in ("", *table.AXES) for each in SPEEDS]
-    return [*found, *(Part(name, partial(_facts, state, names=(name,)), slow=True) for name in (*named, "EDEC"))]
-
-
 def _facts(state: PmxState, names: Sequence[str]) -> Procedure[dict[str, Value]]:
     doubts: list[Request] = []
     found: dict[str, Value] = {}
@@ -260,29 +245,6 @@ def _programs(state: PmxState) -> Procedure[Facts]:
     found = yield from _facts(state, [f"SASTAT{program}" for program in PROGRAMS])
     active = [f"SPC{program}" for program in PROGRAMS if found[f"SASTAT{program}"] in (RUNNING, PAUSED)]
     return found | (yield from _facts(state, active))
-
-
-def fold(state: PmxState, facts: Facts) -> tuple[Conditions, ...]:
-    """The conditions of both axes; points and programs are with the first."""
-    whole = {name: value for name, value in facts.items() if isinstance(value, int)}
-    one, other = (_of_axis(axis, whole) for axis in table.AXES)
-    lamps = list(one.lamps)
-    for word, output in (("DI", False), ("DO", True)):
-        bits = whole.get(word)
-        on = [None if bits is None else bool(bits >> n & 1) for n in range(POINTS)]
-        lamps += [Lamp(str(n + 1), "", each, output) for n, each in enumerate(on)]
-    states = [whole.get(f"SASTAT{n}") for n in PROGRAMS]
-    active = [n for n in PROGRAMS if states[n] in (RUNNING, PAUSED)]
-    failed = ", ".join(str(n) for n in PROGRAMS if states[n] == 4)
-    one = replace(
-        one,
-        lamps=tuple(lamps),
-        program=", ".join(f"{n} {table.program_words(states[n] or 0)}" for n in active),
-        runs=None if None in states else RUNNING in states,  # a paused one moves nothing
-        line=", ".join(str(facts.get(f"SPC{n}", "")) for n in active),
-        more=(*one.more, *([("program", f"{failed} stopped by an error")] if failed else ())),
-    )
-    return one, other
 
 
 def clearing(axis: str) -> str:
@@ -325,73 +287,8 @@ def _pace(axis: str, facts: Mapping[str, int]) -> Pace | None:
     return Pace(low, high, (high - low) / up * 1000, (high - low) / down * 1000)
 
 
-def check(state: PmxState, word: str) -> str:
-    row = table.lookup(word)
-    if row is None or "R" not in row.access:
-        raise Diagnostic(f"{word} cannot be polled: it reads no value", hint="valid: V0 to V63, DI, SSPD and others")
-    return word.upper()
-
-
-def again(state: PmxState, word: str, priority: Priority) -> Procedure[float]:
-    reply = yield from answered(state, replace(state.codec.request(state.address, word), priority=priority))
-    return printed_number(who(state), word, reply.text)
-
-
-def take(state: PmxState, progress: Progress) -> Procedure[Snapshot]:
-    readings = yield from PmxParameters(state).read(progress)
-    identity = yield from answered(state, state.codec.request(state.address, "ID"))
-    remarks = []
-    for axis in table.AXES:
-        if (yield from number(state, f"MST{axis}")) & table.MOVING:
-            remarks.append(f"{axis} moved while it was read: its position is one of that moment")
-    for program in PROGRAMS:
-        if (yield from number(state, f"SASTAT{program}")) == RUNNING:
-            remarks.append(f"program {program} ran while it was read")
-    counters = {}
-    for key, word in (("position", "P"), ("encoder", "E")):
-        counters[key] = (yield from number(state, f"{word}X")), (yield from number(state, f"{word}Y"))
-    analog = (yield from number(state, "AI1")), (yield from number(state, "AI2"))
-    values = readings.values
-    # A bit of DI is 1 if the input is at ground, or with the other polarity if it is not.
-    inverted = not int(number_of(values.get("POLX"))) & POLARITY
-    levels = Levels("DI", tuple((n + 1, n) for n in range(POINTS)), inverted=inverted)
-    listed = yield from listing(state)
-    return Snapshot(
-        kind="pmx",
-        product="PMX",
-        part=identity.text,
-        version=state.version,
-        name=str(values.get("DN", state.name))[-2:] or state.address,
-        baud=BAUDS.get(int(number_of(values.get("DB"))), 0),
-        readings=readings,
-        program=tuple((int(row[1]), row[2]) for line in listed if (row := RAW.fullmatch(line))),
-        counters=counters,
-        inputs=levels.of((yield from number(state, levels.word))),
-        levels=levels,
-        active=bool(remarks),
-        analog=analog,
-        remarks=tuple(remarks),
-    )
-
-
-def controls(state: DriveState, axis: str) -> Controls:
-    return controls_of(__file__, axis.upper(), table.AXES.index(axis.upper()) + 1)
-
-
 SEARCHES: Mapping[str, str] = {"home": "H", "home slow": "HL", "limit": "L", "index": "Z", "home index": "ZH"}
 """The commands of homing by what they use. (7.10.)"""
-
-
-def homings(axis: str) -> Mapping[str, Mapping[str, str]]:
-    return {mode: {sign: f"{word}{axis.upper()}{sign}" for sign in "-+"} for mode, word in SEARCHES.items()}
-
-
-def run(axis: str, velocity: int | str) -> tuple[str, ...]:
-    """Set the axis's high speed, and jog; a velocity of 0 stops it."""
-    name = axis.upper()
-    if isinstance(velocity, str):
-        raise Inexpressible(f"{velocity}: a PMX has speeds without a sign, which a scale may turn; give steps a second")
-    return (f"HSPD{name}={abs(velocity)}", f"J{name}{'-' if velocity < 0 else '+'}") if velocity else (f"STOP{name}",)
 
 
 class PmxActions(Actions):
@@ -402,10 +299,18 @@ class PmxActions(Actions):
     no_error = ""
 
     def homings(self, axis: str) -> Mapping[str, Mapping[str, str]]:
-        return homings(axis)
+        return {mode: {sign: f"{word}{axis.upper()}{sign}" for sign in "-+"} for mode, word in SEARCHES.items()}
 
     def run(self, axis: str, velocity: int | str) -> tuple[str, ...]:
-        return run(axis, velocity)
+        """Set the axis's high speed, and jog; a velocity of 0 stops it."""
+        name = axis.upper()
+        if isinstance(velocity, str):
+            raise Inexpressible(
+                f"{velocity}: a PMX has speeds without a sign, which a scale may turn; give steps a second"
+            )
+        return (
+            (f"HSPD{name}={abs(velocity)}", f"J{name}{'-' if velocity < 0 else '+'}") if velocity else (f"STOP{name}",)
+        )
 
     def output(self, number: int, on: bool) -> str:
         return f"DO{number}={on:d}"
@@ -424,22 +329,98 @@ class PmxValues(Values):
         return PmxParameters(self.state)
 
     def snapshot(self, progress: Progress) -> Procedure[Snapshot]:
-        return take(self.state, progress)
+        readings = yield from PmxParameters(self.state).read(progress)
+        identity = yield from answered(self.state, self.state.codec.request(self.state.address, "ID"))
+        remarks = []
+        for axis in table.AXES:
+            if (yield from number(self.state, f"MST{axis}")) & table.MOVING:
+                remarks.append(f"{axis} moved while it was read: its position is one of that moment")
+        for program in PROGRAMS:
+            if (yield from number(self.state, f"SASTAT{program}")) == RUNNING:
+                remarks.append(f"program {program} ran while it was read")
+        counters = {}
+        for key, word in (("position", "P"), ("encoder", "E")):
+            counters[key] = (yield from number(self.state, f"{word}X")), (yield from number(self.state, f"{word}Y"))
+        analog = (yield from number(self.state, "AI1")), (yield from number(self.state, "AI2"))
+        values = readings.values
+        # A bit of DI is 1 if the input is at ground, or with the other polarity if it is not.
+        inverted = not int(number_of(values.get("POLX"))) & POLARITY
+        levels = Levels("DI", tuple((n + 1, n) for n in range(POINTS)), inverted=inverted)
+        listed = yield from listing(self.state)
+        return Snapshot(
+            kind="pmx",
+            product="PMX",
+            part=identity.text,
+            version=self.state.version,
+            name=str(values.get("DN", self.state.name))[-2:] or self.state.address,
+            baud=BAUDS.get(int(number_of(values.get("DB"))), 0),
+            readings=readings,
+            program=tuple((int(row[1]), row[2]) for line in listed if (row := RAW.fullmatch(line))),
+            counters=counters,
+            inputs=levels.of((yield from number(self.state, levels.word))),
+            levels=levels,
+            active=bool(remarks),
+            analog=analog,
+            remarks=tuple(remarks),
+        )
 
     def parts(self, facts: Facts) -> Sequence[Part]:
-        return parts(self.state, facts)
+        found = []
+        for axis in table.AXES:
+            loop = (f"SLS{axis}", f"DX{axis}") if facts.get(f"SL{axis}") else ()
+            found.append(Part(axis, partial(_facts, self.state, names=(f"MST{axis}", *loop))))
+        found += [
+            Part("points", partial(_facts, self.state, names=("DI", "DO", "EO"))),
+            Part("programs", partial(_programs, self.state)),
+        ]
+        found += [
+            Part(f"settings {axis}", partial(_facts, self.state, names=(f"SL{axis}",)), slow=True)
+            for axis in table.AXES
+        ]
+        named = [each + axis for axis in ("", *table.AXES) for each in SPEEDS]
+        return [
+            *found,
+            *(Part(name, partial(_facts, self.state, names=(name,)), slow=True) for name in (*named, "EDEC")),
+        ]
 
     def fold(self, facts: Facts) -> tuple[Conditions, ...]:
-        return fold(self.state, facts)
+        """The conditions of both axes; points and programs are with the first."""
+        whole = {name: value for name, value in facts.items() if isinstance(value, int)}
+        one, other = (_of_axis(axis, whole) for axis in table.AXES)
+        lamps = list(one.lamps)
+        for word, output in (("DI", False), ("DO", True)):
+            bits = whole.get(word)
+            on = [None if bits is None else bool(bits >> n & 1) for n in range(POINTS)]
+            lamps += [Lamp(str(n + 1), "", each, output) for n, each in enumerate(on)]
+        states = [whole.get(f"SASTAT{n}") for n in PROGRAMS]
+        active = [n for n in PROGRAMS if states[n] in (RUNNING, PAUSED)]
+        failed = ", ".join(str(n) for n in PROGRAMS if states[n] == 4)
+        one = replace(
+            one,
+            lamps=tuple(lamps),
+            program=", ".join(f"{n} {table.program_words(states[n] or 0)}" for n in active),
+            runs=None if None in states else RUNNING in states,  # a paused one moves nothing
+            line=", ".join(str(facts.get(f"SPC{n}", "")) for n in active),
+            more=(*one.more, *([("program", f"{failed} stopped by an error")] if failed else ())),
+        )
+        return one, other
 
     def check(self, word: str) -> str:
-        return check(self.state, word)
+        row = table.lookup(word)
+        if row is None or "R" not in row.access:
+            raise Diagnostic(
+                f"{word} cannot be polled: it reads no value", hint="valid: V0 to V63, DI, SSPD and others"
+            )
+        return word.upper()
 
     def again(self, word: str, priority: Priority) -> Procedure[float]:
-        return again(self.state, word, priority)
+        reply = yield from answered(
+            self.state, replace(self.state.codec.request(self.state.address, word), priority=priority)
+        )
+        return printed_number(who(self.state), word, reply.text)
 
     def controls(self, axis: str) -> Controls:
-        return controls(self.state, axis)
+        return controls_of(__file__, axis.upper(), table.AXES.index(axis.upper()) + 1)
 
     @property
     def actions(self) -> Actions:

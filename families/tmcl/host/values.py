@@ -186,20 +186,6 @@ ABSENT = "absent"
 FULL_CURRENT = 255
 
 
-def parts(state: TmclState, facts: Facts) -> Sequence[Part]:
-    """The parts of a module, for each motor that was counted; at first they are counted."""
-    if not state.motors:
-        return (Part("motors", partial(_count, state)),)
-    found: list[Part] = [Part("program", partial(_program, state))]
-    for motor in range(state.motors):
-        some = (FLAGS, *(axis for axis, _ in SWITCHES))
-        asked = [*STATE, *(axis for axis in some if facts.get(_key(axis, motor)) != ABSENT)]
-        found.append(Part(f"motor {motor}", partial(_parameters, state, motor=motor, wanted=asked)))
-        for axis in SETTINGS:
-            found.append(Part(_key(axis, motor), partial(_parameters, state, motor=motor, wanted=(axis,)), slow=True))
-    return found
-
-
 def _key(axis: Axis, motor: int) -> str:
     return f"{axis.name} {motor}"
 
@@ -221,10 +207,6 @@ def _parameters(state: TmclState, motor: int, wanted: Sequence[Axis]) -> Procedu
         except Refused:
             found[_key(axis, motor)] = ABSENT
     return found
-
-
-def fold(state: TmclState, facts: Facts) -> tuple[Conditions, ...]:
-    return tuple(_conditions(state, facts, motor) for motor in range(state.motors))
 
 
 def _conditions(state: TmclState, facts: Facts, motor: int) -> Conditions:
@@ -253,72 +235,6 @@ def _conditions(state: TmclState, facts: Facts, motor: int) -> Conditions:
     )
 
 
-def check(state: TmclState, word: str) -> str:
-    found = parameter(word)
-    if found is None:
-        raise Diagnostic(f"{word} cannot be polled", hint="valid: AP and a parameter, /MOTOR after it; as AP206, AP1/1")
-    if found.changed_by_reading:
-        raise Diagnostic(f"{word} cannot be polled: reading it clears it", hint=f"{found} reads it once")
-    return f"AP{word}" if word[0].isdigit() else word.upper()
-
-
-def again(state: TmclState, word: str, priority: Priority) -> Procedure[float]:
-    """Read a parameter, none whose reading changes the module: `check` refuses that."""
-    found = parameter(word)
-    assert found is not None
-    return float((yield from read(state, found, priority)))
-
-
-def take(state: TmclState, progress: Progress) -> Procedure[Snapshot]:
-    readings = yield from TmclParameters(state).read(progress)
-    remarks = []
-    if active := (yield from moving(state)):
-        remarks.append("moving while it was read: its position is one of that moment")
-    if runs := (yield from busy(state)):
-        remarks.append("its program ran while it was read")
-    try:
-        held = yield from read_held(state, (), lambda done, total: None)
-    except Refused as refused:
-        held = Held()
-        remarks.append(f"its program was not read: {refused}")
-    count = yield from motors(state)
-    module, (major, _, minor) = state.product.rpartition("-")[2], state.version.partition(".")
-    if count > (simulated := MODULES[module].motors if module in MODULES else 1):
-        remarks.append(f"it has {count} motors; the simulated module has {simulated}")
-    positions, targets = [], []
-    for motor in range(count):
-        positions.append((yield from read(state, Call(Command.GAP, Axis.ACTUAL_POSITION, motor))))
-        targets.append((yield from read(state, Call(Command.GAP, Axis.TARGET_POSITION, motor))))
-    code = readings.values.get(f"G{int(Global.BAUD)}")
-    return Snapshot(
-        kind="tmcl",
-        product=state.product,
-        version=f"{module}V{major}{minor}" if module.isdecimal() and major else "",  # as in its text form, `1241V115`
-        name=state.address,
-        baud=BAUDS.get(code, 0) if isinstance(code, int) else 0,
-        readings=readings,
-        counters={"position": tuple(positions), **({"target": tuple(targets)} if targets != positions else {})},
-        program=tuple((line.at, line.text) for line in held.lines),
-        active=active or runs,
-        remarks=tuple(remarks),
-    )
-
-
-def controls(state: TmclState, axis: str) -> Controls:
-    found = controls_of(__file__, axis or "0")
-    counted = RELATIVE_FROM.get(state.relative.get(int(axis or 0), -1), "from where it counts is not known")
-    return {**found, BY: replace(found[BY], about=counted)}
-
-
-def _word(word: str, axis: str) -> str:
-    """A parameter by its number, of the motor that it names or that is meant; any other word as it is."""
-    found = parameter(word)
-    if found is None:
-        return word
-    named = re.search(r"[_/]\d$", word) is not None
-    return f"G{found.type}" if found.command == Command.GGP else f"AP{found.type}_{found.motor if named else axis or 0}"
-
-
 class TmclActions(Actions):
     """What a program asks of a TMCL module."""
 
@@ -336,7 +252,16 @@ class TmclActions(Actions):
         return f"SIO {number}, 2, {on:d}"
 
     def word(self, word: str, axis: str) -> str:
-        return _word(word, axis)
+        """A parameter by its number, of the motor that it names or that is meant; any other word as it is."""
+        found = parameter(word)
+        if found is None:
+            return word
+        named = re.search(r"[_/]\d$", word) is not None
+        return (
+            f"G{found.type}"
+            if found.command == Command.GGP
+            else f"AP{found.type}_{found.motor if named else axis or 0}"
+        )
 
     def ports(self) -> Mapping[int, str]:
         return {port: f"GIO {port}, 0" for port in module_of(self.state.product).inputs}
@@ -352,22 +277,79 @@ class TmclValues(Values):
         return TmclParameters(self.state)
 
     def snapshot(self, progress: Progress) -> Procedure[Snapshot]:
-        return take(self.state, progress)
+        readings = yield from TmclParameters(self.state).read(progress)
+        remarks = []
+        if active := (yield from moving(self.state)):
+            remarks.append("moving while it was read: its position is one of that moment")
+        if runs := (yield from busy(self.state)):
+            remarks.append("its program ran while it was read")
+        try:
+            held = yield from read_held(self.state, (), lambda done, total: None)
+        except Refused as refused:
+            held = Held()
+            remarks.append(f"its program was not read: {refused}")
+        count = yield from motors(self.state)
+        module, (major, _, minor) = self.state.product.rpartition("-")[2], self.state.version.partition(".")
+        if count > (simulated := MODULES[module].motors if module in MODULES else 1):
+            remarks.append(f"it has {count} motors; the simulated module has {simulated}")
+        positions, targets = [], []
+        for motor in range(count):
+            positions.append((yield from read(self.state, Call(Command.GAP, Axis.ACTUAL_POSITION, motor))))
+            targets.append((yield from read(self.state, Call(Command.GAP, Axis.TARGET_POSITION, motor))))
+        code = readings.values.get(f"G{int(Global.BAUD)}")
+        return Snapshot(
+            kind="tmcl",
+            product=self.state.product,
+            version=f"{module}V{major}{minor}"
+            if module.isdecimal() and major
+            else "",  # as in its text form, `1241V115`
+            name=self.state.address,
+            baud=BAUDS.get(code, 0) if isinstance(code, int) else 0,
+            readings=readings,
+            counters={"position": tuple(positions), **({"target": tuple(targets)} if targets != positions else {})},
+            program=tuple((line.at, line.text) for line in held.lines),
+            active=active or runs,
+            remarks=tuple(remarks),
+        )
 
     def parts(self, facts: Facts) -> Sequence[Part]:
-        return parts(self.state, facts)
+        """The parts of a module, for each motor that was counted; at first they are counted."""
+        if not self.state.motors:
+            return (Part("motors", partial(_count, self.state)),)
+        found: list[Part] = [Part("program", partial(_program, self.state))]
+        for motor in range(self.state.motors):
+            some = (FLAGS, *(axis for axis, _ in SWITCHES))
+            asked = [*STATE, *(axis for axis in some if facts.get(_key(axis, motor)) != ABSENT)]
+            found.append(Part(f"motor {motor}", partial(_parameters, self.state, motor=motor, wanted=asked)))
+            for axis in SETTINGS:
+                found.append(
+                    Part(_key(axis, motor), partial(_parameters, self.state, motor=motor, wanted=(axis,)), slow=True)
+                )
+        return found
 
     def fold(self, facts: Facts) -> tuple[Conditions, ...]:
-        return fold(self.state, facts)
+        return tuple(_conditions(self.state, facts, motor) for motor in range(self.state.motors))
 
     def check(self, word: str) -> str:
-        return check(self.state, word)
+        found = parameter(word)
+        if found is None:
+            raise Diagnostic(
+                f"{word} cannot be polled", hint="valid: AP and a parameter, /MOTOR after it; as AP206, AP1/1"
+            )
+        if found.changed_by_reading:
+            raise Diagnostic(f"{word} cannot be polled: reading it clears it", hint=f"{found} reads it once")
+        return f"AP{word}" if word[0].isdigit() else word.upper()
 
     def again(self, word: str, priority: Priority) -> Procedure[float]:
-        return again(self.state, word, priority)
+        """Read a parameter, none whose reading changes the module: `check` refuses that."""
+        found = parameter(word)
+        assert found is not None
+        return float((yield from read(self.state, found, priority)))
 
     def controls(self, axis: str) -> Controls:
-        return controls(self.state, axis)
+        found = controls_of(__file__, axis or "0")
+        counted = RELATIVE_FROM.get(self.state.relative.get(int(axis or 0), -1), "from where it counts is not known")
+        return {**found, BY: replace(found[BY], about=counted)}
 
     @property
     def actions(self) -> Actions:
