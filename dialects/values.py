@@ -458,12 +458,12 @@ class Values(OfDrive):
 
     def first(self, word: str) -> Procedure[float]:
         """Read the value of a word for a person; verify that the drive has it. Raises Refused, NoAnswer or Stopped."""
-        raise Inexpressible(f"{who(self.state)}: no value {word}; nothing was sent")
-        yield
+        return (yield from self.again(word, Priority.OPERATOR))
 
     def again(self, word: str, priority: Priority) -> Procedure[float]:
         """Read a value that was read before. Raises NoAnswer or Stopped, and Refused where the drive lost the value."""
-        return (yield from self.first(word))
+        raise Inexpressible(f"{who(self.state)}: no value {word}; nothing was sent")
+        yield
 
     def controls(self, axis: str) -> Controls:
         """The controls of an axis."""

@@ -42,10 +42,16 @@ def test_values_are_compared_as_numbers(one, other, alike):
 
 def test_a_plan_of_a_controller_keeps_the_low_speed_below_the_high_one():
     now = held(LSPD=2000, HSPD=5000)
-    assert steps(pmx.plan(UNIT, now, {"LSPD": 100, "HSPD": 1000}, Permission())) == ["LSPD=100", "HSPD=1000"]
-    assert steps(pmx.plan(UNIT, now, {"LSPD": 9000, "HSPD": 9900}, Permission())) == ["HSPD=9900", "LSPD=9000"]
+    assert steps(pmx.PmxParameters(UNIT).plan(now, {"LSPD": 100, "HSPD": 1000}, Permission())) == [
+        "LSPD=100",
+        "HSPD=1000",
+    ]
+    assert steps(pmx.PmxParameters(UNIT).plan(now, {"LSPD": 9000, "HSPD": 9900}, Permission())) == [
+        "HSPD=9900",
+        "LSPD=9000",
+    ]
     mixed = {"ACC": 300, "DN": "2ED07", "SLRX": 2.5, "HSPDX": 40}
-    made = pmx.plan(UNIT, held(ACC=1, DN="2ED00", SLRX=1.0, HSPDX=0), mixed, Permission())
+    made = pmx.PmxParameters(UNIT).plan(held(ACC=1, DN="2ED00", SLRX=1.0, HSPDX=0), mixed, Permission())
     assert steps(made) == ["HSPDX=40", "ACC=300", "SLRX=2.500"] and made.withheld == (("DN", COMMUNICATION),)
 
 
@@ -54,8 +60,10 @@ def test_a_plan_of_a_controller_keeps_the_low_speed_below_the_high_one():
 )
 def test_what_a_controller_only_gets_by_name(name, value, now):
     present = held(**{name: 0, **now})
-    assert [each[0] for each in pmx.plan(UNIT, present, {name: value}, Permission()).withheld] == [name]
-    assert steps(pmx.plan(UNIT, present, {name: value}, Permission(frozenset({name})))) == [f"{name}={value}"]
+    assert [each[0] for each in pmx.PmxParameters(UNIT).plan(present, {name: value}, Permission()).withheld] == [name]
+    assert steps(pmx.PmxParameters(UNIT).plan(present, {name: value}, Permission(frozenset({name})))) == [
+        f"{name}={value}"
+    ]
 
 
 @pytest.mark.parametrize(
@@ -63,7 +71,7 @@ def test_what_a_controller_only_gets_by_name(name, value, now):
 )
 def test_a_wrong_value_for_a_controller(wanted):
     with pytest.raises(Diagnostic):
-        pmx.plan(UNIT, held(), wanted, Permission())
+        pmx.PmxParameters(UNIT).plan(held(), wanted, Permission())
 
 
 def test_every_register_of_a_controller_is_a_setting_with_its_range():
@@ -73,7 +81,7 @@ def test_every_register_of_a_controller_is_a_setting_with_its_range():
         scale = 1000 if name.startswith("SLR") else 1
         assert name in pmx.NAMES
         for value in (register.low, register.high):
-            pmx.plan(UNIT, held(), {name: value / scale}, Permission(frozenset({name})))
+            pmx.PmxParameters(UNIT).plan(held(), {name: value / scale}, Permission(frozenset({name})))
 
 
 def test_a_plan_of_a_module():
@@ -81,7 +89,7 @@ def test_a_plan_of_a_module():
     names = tmcl.setting_names(table, 2)
     now = Readings(tuple(tmcl.reading(name, 0 if name in ("4", "12") else 1, table) for name in names))
     wanted = {"12": 1, "13": 0, "5": 7, "5_1": 8, "4": 9, "G65": 3, "G77": 0, "140": 6}
-    made = tmcl.plan(module, now, wanted, Permission())
+    made = tmcl.TmclParameters(module).plan(now, wanted, Permission())
     assert steps(made) == ["SAP 5, 0, 7", "SAP 13, 0, 0", "SAP 140, 0, 6", "SAP 5, 1, 8", "SGP 77, 0, 0"]
     assert dict(made.withheld) == {
         "12": "a move that the limit switch holds back may go on",
@@ -90,7 +98,7 @@ def test_a_plan_of_a_module():
     }
     for wrong in ({"1": 5}, {"140": 9}, {"5_2": 5}, {"X": 1}, {"6": 1.5}):
         with pytest.raises(Diagnostic):
-            tmcl.plan(module, now, wrong, Permission(frozenset(wrong)))
+            tmcl.TmclParameters(module).plan(now, wrong, Permission(frozenset(wrong)))
 
 
 def talk(far, procedure):

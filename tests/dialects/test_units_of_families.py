@@ -4,7 +4,7 @@ import pytest
 
 from multidrop.dialects.families import FAMILIES
 from multidrop.dialects.units import Takes
-from multidrop.families.lexium.host.mcode.units import counted, disturbs, rests_on
+from multidrop.families.lexium.host.mcode.units import counted, rests_on
 from multidrop.families.lexium.manual.mnemonic import EVERY
 from multidrop.families.tmcl.host.codec import Tmcl, TmclState
 
@@ -92,8 +92,9 @@ def test_motors_of_a_module_are_axes():
 def test_lines_after_which_positions_count_from_elsewhere():
     lines = ("P=0", "P 5", "C1=5", "MS=128", "EE=1", "RD=1", "IC P", "FD", "IP", "SA=0.9")
     state = FAMILIES["mcode"].new_state(FAMILIES["mcode"].codec, "a")
-    assert [line for line in lines if not disturbs(state, line)] == []
-    assert [line for line in ("PR P", "MA 0", "VM=5000", "R1=5", "PR MS", "IC R1") if disturbs(state, line)] == []
+    disturbs = FAMILIES["mcode"](state).units.disturbs
+    assert [line for line in lines if not disturbs(line)] == []
+    assert [line for line in ("PR P", "MA 0", "VM=5000", "R1=5", "PR MS", "IC R1") if disturbs(line)] == []
 
 
 SETS = {

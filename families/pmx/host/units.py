@@ -26,41 +26,6 @@ _RECOUNTS = re.compile(rf"\s*(?:{'|'.join(RESTS)})[XY]=")
 _DISTURBS = re.compile(r"\s*(?:P|SL|SLR|POL)([XY])=")
 
 
-def fields(state: PmxState, text: str) -> Sequence[Field]:
-    if (found := _SET.fullmatch(text)) is not None:
-        takes = Takes.PLACE if found[1] == "P" else Takes.SPEED
-        return (Field(found[2].lower(), takes, *found.span(3)),)
-    found = _MOVE.fullmatch(text)
-    groups = zip((1, 2, 3, 4), "xyxy", strict=True) if found is not None else ()
-    return [Field(axis, Takes.TARGET, *found.span(n), True) for n, axis in groups if found is not None and found[n]]
-
-
-def reads(state: PmxState, text: str) -> tuple[str, Takes] | None:
-    found = _READ.fullmatch(text)
-    return (found[2].lower(), Takes.PLACE if found[1] == "P" else Takes.SPEED) if found is not None else None
-
-
-def disturbs(state: PmxState, text: str) -> Collection[str]:
-    found = _DISTURBS.match(text)
-    return (found[1].lower(),) if found is not None else ()
-
-
-def recounts(request: Request) -> bool:
-    return _RECOUNTS.match(request.text) is not None
-
-
-def target(state: PmxState) -> Procedure[Takes]:
-    return Takes.DISTANCE if (yield from number(state, "MM")) else Takes.PLACE
-
-
-def basis(state: PmxState, axis: str, full_steps: int | None) -> Procedure[Basis]:
-    names = [f"{word}{axis.upper()}" for word in RESTS]
-    settings = []
-    for name in names:
-        settings.append((name, str((yield from number(state, name)))))
-    return Basis(tuple(settings), missing="the controller does not report the steps of a turn")
-
-
 class PmxUnits(Units):
     """The quantities in lines of a PMX."""
 
@@ -72,19 +37,30 @@ class PmxUnits(Units):
         return [axis.lower() for axis in AXES]
 
     def fields(self, text: str) -> Sequence[Field]:
-        return fields(self.state, text)
+        if (found := _SET.fullmatch(text)) is not None:
+            takes = Takes.PLACE if found[1] == "P" else Takes.SPEED
+            return (Field(found[2].lower(), takes, *found.span(3)),)
+        found = _MOVE.fullmatch(text)
+        groups = zip((1, 2, 3, 4), "xyxy", strict=True) if found is not None else ()
+        return [Field(axis, Takes.TARGET, *found.span(n), True) for n, axis in groups if found is not None and found[n]]
 
     def basis(self, axis: str, full_steps: int | None) -> Procedure[Basis]:
-        return basis(self.state, axis, full_steps)
+        names = [f"{word}{axis.upper()}" for word in RESTS]
+        settings = []
+        for name in names:
+            settings.append((name, str((yield from number(self.state, name)))))
+        return Basis(tuple(settings), missing="the controller does not report the steps of a turn")
 
     def disturbs(self, text: str) -> Collection[str]:
-        return disturbs(self.state, text)
+        found = _DISTURBS.match(text)
+        return (found[1].lower(),) if found is not None else ()
 
     def recounts(self, request: Request) -> bool:
-        return recounts(request)
+        return _RECOUNTS.match(request.text) is not None
 
     def reads(self, text: str) -> tuple[str, Takes] | None:
-        return reads(self.state, text)
+        found = _READ.fullmatch(text)
+        return (found[2].lower(), Takes.PLACE if found[1] == "P" else Takes.SPEED) if found is not None else None
 
     def target(self) -> Procedure[Takes]:
-        return target(self.state)
+        return Takes.DISTANCE if (yield from number(self.state, "MM")) else Takes.PLACE

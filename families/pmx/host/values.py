@@ -19,7 +19,8 @@ from functools import partial
 
 from multidrop.base.errors import Diagnostic, Inexpressible
 from multidrop.dialects.codec import Priority, Procedure, Request
-from multidrop.dialects.state import DriveState, who
+from multidrop.dialects.listed_settings import ListedParameters
+from multidrop.dialects.state import who
 from multidrop.dialects.values import (
     COMMUNICATION,
     VARIABLES,
@@ -37,15 +38,11 @@ from multidrop.dialects.values import (
     Plan,
     Progress,
     Reading,
-    Readings,
     Snapshot,
     Value,
     Values,
     controls_of,
     printed_number,
-    read_each,
-    reference_lost,
-    same,
 )
 from multidrop.dialects.values import number as number_of
 from multidrop.families.pmx.host.codec import PmxState
@@ -117,19 +114,7 @@ NAMES = tuple(
 """The settings in the order in which they are written."""
 
 
-def plan(state: PmxState, present: Readings, wanted: Mapping[str, Value], allowed: Permission) -> Plan:
-    now = present.values
-    changed = {name.upper(): value for name, value in wanted.items() if not same(value, now.get(name.upper()))}
-    withheld = {name: reason for name in changed if (reason := _risk(name, changed[name], now, allowed))}
-    goal = {name: value for name, value in changed.items() if name not in withheld}
-    for name, value in goal.items():
-        _check(name, value)
-    order = sorted(goal, key=NAMES.index)
-    for low in [name for name in order if base(name) == "LSPD"]:
-        order = _speeds_in_order(order, low, now, goal)
-    steps = [Change(name, now.get(name), goal[name], f"{name}={_written(name, goal[name])}") for name in order]
-    scale = [name for name in goal if base(name) in ("POL", "SLR", "SL")]
-    return Plan(tuple(steps), tuple(withheld.items()), remarks=reference_lost(steps, scale))
+NAME_FORM, RATIO_FORM, WHOLE_FORM = r"[0-9A-Za-z]{1,8}", r"\d{1,6}(?:\.\d+)?", r"-?\d{1,19}"
 
 
 def _speeds_in_order(order: list[str], low: str, now: Mapping[str, Value], goal: Mapping[str, Value]) -> list[str]:
@@ -141,77 +126,13 @@ def _speeds_in_order(order: list[str], low: str, now: Mapping[str, Value], goal:
     return [*pair, *rest]
 
 
-def _risk(name: str, value: Value, now: Mapping[str, Value], allowed: Permission) -> str:
-    """The reason for which a setting waits for a person's word; empty: there is none."""
-    word, on = base(name), now.get(f"SL{axis(name)}")
-    if name in allowed.named or (name in WIRE and allowed.communication):
-        return ""
-    if name in WIRE:
-        return COMMUNICATION
-    if word == "SL" and value:
-        return "StepNLoop corrects the position by moves"
-    if word in JOYSTICK:
-        return "the joystick may be on, and then it can turn the motor"
-    if word in LOOP and on:
-        return "StepNLoop is on and may correct the position by a move"
-    return "programs run after power-up" if name == "SLOAD" and value else ""
-
-
-def _check(name: str, value: Value) -> None:
-    """Raise Diagnostic for an unknown setting, or a value out of range."""
-    if name not in NAMES:
-        raise Diagnostic(f"{name}: is not a setting of the controller")
-    if name == "DN":
-        if not re.fullmatch(r"2ED\d\d", str(value)):
-            raise Diagnostic(f"DN = {value}: valid: 2ED00 to 2ED99")
-        return
-    if isinstance(value, (str, tuple)):
-        raise Diagnostic(f"{name} = {value}: takes a number")
-    if base(name) == RATIO:
-        low, high = 0.001, 999.999
-    else:
-        low, high = RANGES.get(base(name), (-LARGEST - 1 if base(name) in SIGNED else 0, LARGEST))
-        if not float(value).is_integer():
-            raise Diagnostic(f"{name} = {value}: takes a whole number")
-    if not low <= value <= high:
-        raise Diagnostic(f"{name} = {value}: valid: {low} to {high}")
-
-
 def _written(name: str, value: Value) -> str:
     if base(name) == RATIO:
         return f"{number_of(value):.3f}"
     return value if isinstance(value, str) else str(int(number_of(value)))
 
 
-NAME_FORM, RATIO_FORM, WHOLE_FORM = r"[0-9A-Za-z]{1,8}", r"\d{1,6}(?:\.\d+)?", r"-?\d{1,19}"
-
-
-def read_settings(state: PmxState, progress: Progress) -> Procedure[Readings]:
-    """Read every setting; a refused word is listed. Raises NoAnswer. Nothing is changed."""
-    return (yield from read_each(NAMES, partial(_read_setting, state), progress, UNREAD))
-
-
-def _read_setting(state: PmxState, name: str) -> Procedure[Reading]:
-    ratio = base(name) == RATIO
-    form = NAME_FORM if name == "DN" else RATIO_FORM if ratio else WHOLE_FORM
-    reply = yield from answered(state, replace(state.codec.request(state.address, name), expect=form))
-    return reading(name, reply.text if name == "DN" else float(reply.text) if ratio else int(reply.text))
-
-
-def conflict(plan: Plan, others: Collection[str]) -> str:
-    numbers = [str(change.after)[-2:] for change in plan if change.name == "DN"]
-    return f"another controller of the line has number {numbers[0]}" if numbers and numbers[0] in others else ""
-
-
-def ready(state: PmxState) -> Procedure[str]:
-    if (yield from moving(state)):
-        return f"{who(state)} moves: stop it first"
-    if (yield from busy(state)):
-        return f"{who(state)} runs a program: SR0=0 and SR1=0 end them"
-    return ""
-
-
-class PmxParameters(Parameters):
+class PmxParameters(ListedParameters):
     """The settings of a PMX."""
 
     state: PmxState
@@ -219,15 +140,70 @@ class PmxParameters(Parameters):
     language = "PMX"
     saving = "STORE"
     later = frozenset(LATER)
+    unread = UNREAD
 
-    def read(self, progress: Progress) -> Procedure[Readings]:
-        return read_settings(self.state, progress)
+    def names(self) -> Sequence[str]:
+        return NAMES
 
-    def plan(self, present: Readings, wanted: Mapping[str, Value], permission: Permission) -> Plan:
-        return plan(self.state, present, wanted, permission)
+    def read_one(self, name: str) -> Procedure[Reading]:
+        ratio = base(name) == RATIO
+        form = NAME_FORM if name == "DN" else RATIO_FORM if ratio else WHOLE_FORM
+        reply = yield from answered(
+            self.state, replace(self.state.codec.request(self.state.address, name), expect=form)
+        )
+        return reading(name, reply.text if name == "DN" else float(reply.text) if ratio else int(reply.text))
+
+    def risk(self, name: str, value: Value, now: Mapping[str, Value], allowed: Permission) -> str:
+        """The reason for which a setting waits for a person's word; empty: there is none."""
+        word, on = base(name), now.get(f"SL{axis(name)}")
+        if name in allowed.named or (name in WIRE and allowed.communication):
+            return ""
+        if name in WIRE:
+            return COMMUNICATION
+        if word == "SL" and value:
+            return "StepNLoop corrects the position by moves"
+        if word in JOYSTICK:
+            return "the joystick may be on, and then it can turn the motor"
+        if word in LOOP and on:
+            return "StepNLoop is on and may correct the position by a move"
+        return "programs run after power-up" if name == "SLOAD" and value else ""
+
+    def checked(self, name: str, value: Value) -> Value:
+        if name not in NAMES:
+            raise Diagnostic(f"{name}: is not a setting of the controller")
+        if name == "DN":
+            if not re.fullmatch(r"2ED\d\d", str(value)):
+                raise Diagnostic(f"DN = {value}: valid: 2ED00 to 2ED99")
+            return value
+        if isinstance(value, (str, tuple)):
+            raise Diagnostic(f"{name} = {value}: takes a number")
+        if base(name) == RATIO:
+            low, high = 0.001, 999.999
+        else:
+            low, high = RANGES.get(base(name), (-LARGEST - 1 if base(name) in SIGNED else 0, LARGEST))
+            if not float(value).is_integer():
+                raise Diagnostic(f"{name} = {value}: takes a whole number")
+        if not low <= value <= high:
+            raise Diagnostic(f"{name} = {value}: valid: {low} to {high}")
+        return value
+
+    def ordered(self, names: list[str], now: Mapping[str, Value], goal: Mapping[str, Value]) -> list[str]:
+        for low in [name for name in names if base(name) == "LSPD"]:
+            names = _speeds_in_order(names, low, now, goal)
+        return names
+
+    def line(self, name: str, value: Value) -> str:
+        return f"{name}={_written(name, value)}"
+
+    def rescales(self, name: str) -> bool:
+        return base(name) in ("POL", "SLR", "SL")
 
     def ready(self) -> Procedure[str]:
-        return ready(self.state)
+        if (yield from moving(self.state)):
+            return f"{who(self.state)} moves: stop it first"
+        if (yield from busy(self.state)):
+            return f"{who(self.state)} runs a program: SR0=0 and SR1=0 end them"
+        return ""
 
     def write(self, change: Change) -> Procedure[object]:
         return perform(self.state, change.text)
@@ -236,7 +212,8 @@ class PmxParameters(Parameters):
         return perform(self.state, "STORE")
 
     def conflict(self, plan: Plan, others: Collection[str]) -> str:
-        return conflict(plan, others)
+        numbers = [str(change.after)[-2:] for change in plan if change.name == "DN"]
+        return f"another controller of the line has number {numbers[0]}" if numbers and numbers[0] in others else ""
 
 
 RUNNING, PAUSED = 1, 2
@@ -254,20 +231,6 @@ POLARITY = 1 << 10
 """The bit of POLX that inverts the inputs."""
 
 
-def parts(state: PmxState, facts: Facts) -> Sequence[Part]:
-    found = []
-    for axis in table.AXES:
-        loop = (f"SLS{axis}", f"DX{axis}") if facts.get(f"SL{axis}") else ()
-        found.append(Part(axis, partial(_facts, state, names=(f"MST{axis}", *loop))))
-    found += [
-        Part("points", partial(_facts, state, names=("DI", "DO", "EO"))),
-        Part("programs", partial(_programs, state)),
-    ]
-    found += [Part(f"settings {axis}", partial(_facts, state, names=(f"SL{axis}",)), slow=True) for axis in table.AXES]
-    named = [each + axis for axis in ("", *table.AXES) for each in SPEEDS]
-    return [*found, *(Part(name, partial(_facts, state, names=(name,)), slow=True) for name in (*named, "EDEC"))]
-
-
 def _facts(state: PmxState, names: Sequence[str]) -> Procedure[dict[str, Value]]:
     doubts: list[Request] = []
     found: dict[str, Value] = {}
@@ -282,29 +245,6 @@ def _programs(state: PmxState) -> Procedure[Facts]:
     found = yield from _facts(state, [f"SASTAT{program}" for program in PROGRAMS])
     active = [f"SPC{program}" for program in PROGRAMS if found[f"SASTAT{program}"] in (RUNNING, PAUSED)]
     return found | (yield from _facts(state, active))
-
-
-def fold(state: PmxState, facts: Facts) -> tuple[Conditions, ...]:
-    """The conditions of both axes; points and programs are with the first."""
-    whole = {name: value for name, value in facts.items() if isinstance(value, int)}
-    one, other = (_of_axis(axis, whole) for axis in table.AXES)
-    lamps = list(one.lamps)
-    for word, output in (("DI", False), ("DO", True)):
-        bits = whole.get(word)
-        on = [None if bits is None else bool(bits >> n & 1) for n in range(POINTS)]
-        lamps += [Lamp(str(n + 1), "", each, output) for n, each in enumerate(on)]
-    states = [whole.get(f"SASTAT{n}") for n in PROGRAMS]
-    active = [n for n in PROGRAMS if states[n] in (RUNNING, PAUSED)]
-    failed = ", ".join(str(n) for n in PROGRAMS if states[n] == 4)
-    one = replace(
-        one,
-        lamps=tuple(lamps),
-        program=", ".join(f"{n} {table.program_words(states[n] or 0)}" for n in active),
-        runs=None if None in states else RUNNING in states,  # a paused one moves nothing
-        line=", ".join(str(facts.get(f"SPC{n}", "")) for n in active),
-        more=(*one.more, *([("program", f"{failed} stopped by an error")] if failed else ())),
-    )
-    return one, other
 
 
 def clearing(axis: str) -> str:
@@ -347,73 +287,8 @@ def _pace(axis: str, facts: Mapping[str, int]) -> Pace | None:
     return Pace(low, high, (high - low) / up * 1000, (high - low) / down * 1000)
 
 
-def check(state: PmxState, word: str) -> str:
-    row = table.lookup(word)
-    if row is None or "R" not in row.access:
-        raise Diagnostic(f"{word} cannot be polled: it reads no value", hint="valid: V0 to V63, DI, SSPD and others")
-    return word.upper()
-
-
-def again(state: PmxState, word: str, priority: Priority) -> Procedure[float]:
-    reply = yield from answered(state, replace(state.codec.request(state.address, word), priority=priority))
-    return printed_number(who(state), word, reply.text)
-
-
-def take(state: PmxState, progress: Progress) -> Procedure[Snapshot]:
-    readings = yield from read_settings(state, progress)
-    identity = yield from answered(state, state.codec.request(state.address, "ID"))
-    remarks = []
-    for axis in table.AXES:
-        if (yield from number(state, f"MST{axis}")) & table.MOVING:
-            remarks.append(f"{axis} moved while it was read: its position is one of that moment")
-    for program in PROGRAMS:
-        if (yield from number(state, f"SASTAT{program}")) == RUNNING:
-            remarks.append(f"program {program} ran while it was read")
-    counters = {}
-    for key, word in (("position", "P"), ("encoder", "E")):
-        counters[key] = (yield from number(state, f"{word}X")), (yield from number(state, f"{word}Y"))
-    analog = (yield from number(state, "AI1")), (yield from number(state, "AI2"))
-    values = readings.values
-    # A bit of DI is 1 if the input is at ground, or with the other polarity if it is not.
-    inverted = not int(number_of(values.get("POLX"))) & POLARITY
-    levels = Levels("DI", tuple((n + 1, n) for n in range(POINTS)), inverted=inverted)
-    listed = yield from listing(state)
-    return Snapshot(
-        kind="pmx",
-        product="PMX",
-        part=identity.text,
-        version=state.version,
-        name=str(values.get("DN", state.name))[-2:] or state.address,
-        baud=BAUDS.get(int(number_of(values.get("DB"))), 0),
-        readings=readings,
-        program=tuple((int(row[1]), row[2]) for line in listed if (row := RAW.fullmatch(line))),
-        counters=counters,
-        inputs=levels.of((yield from number(state, levels.word))),
-        levels=levels,
-        active=bool(remarks),
-        analog=analog,
-        remarks=tuple(remarks),
-    )
-
-
-def controls(state: DriveState, axis: str) -> Controls:
-    return controls_of(__file__, axis.upper(), table.AXES.index(axis.upper()) + 1)
-
-
 SEARCHES: Mapping[str, str] = {"home": "H", "home slow": "HL", "limit": "L", "index": "Z", "home index": "ZH"}
 """The commands of homing by what they use. (7.10.)"""
-
-
-def homings(axis: str) -> Mapping[str, Mapping[str, str]]:
-    return {mode: {sign: f"{word}{axis.upper()}{sign}" for sign in "-+"} for mode, word in SEARCHES.items()}
-
-
-def run(axis: str, velocity: int | str) -> tuple[str, ...]:
-    """Set the axis's high speed, and jog; a velocity of 0 stops it."""
-    name = axis.upper()
-    if isinstance(velocity, str):
-        raise Inexpressible(f"{velocity}: a PMX has speeds without a sign, which a scale may turn; give steps a second")
-    return (f"HSPD{name}={abs(velocity)}", f"J{name}{'-' if velocity < 0 else '+'}") if velocity else (f"STOP{name}",)
 
 
 class PmxActions(Actions):
@@ -424,10 +299,18 @@ class PmxActions(Actions):
     no_error = ""
 
     def homings(self, axis: str) -> Mapping[str, Mapping[str, str]]:
-        return homings(axis)
+        return {mode: {sign: f"{word}{axis.upper()}{sign}" for sign in "-+"} for mode, word in SEARCHES.items()}
 
     def run(self, axis: str, velocity: int | str) -> tuple[str, ...]:
-        return run(axis, velocity)
+        """Set the axis's high speed, and jog; a velocity of 0 stops it."""
+        name = axis.upper()
+        if isinstance(velocity, str):
+            raise Inexpressible(
+                f"{velocity}: a PMX has speeds without a sign, which a scale may turn; give steps a second"
+            )
+        return (
+            (f"HSPD{name}={abs(velocity)}", f"J{name}{'-' if velocity < 0 else '+'}") if velocity else (f"STOP{name}",)
+        )
 
     def output(self, number: int, on: bool) -> str:
         return f"DO{number}={on:d}"
@@ -446,25 +329,98 @@ class PmxValues(Values):
         return PmxParameters(self.state)
 
     def snapshot(self, progress: Progress) -> Procedure[Snapshot]:
-        return take(self.state, progress)
+        readings = yield from PmxParameters(self.state).read(progress)
+        identity = yield from answered(self.state, self.state.codec.request(self.state.address, "ID"))
+        remarks = []
+        for axis in table.AXES:
+            if (yield from number(self.state, f"MST{axis}")) & table.MOVING:
+                remarks.append(f"{axis} moved while it was read: its position is one of that moment")
+        for program in PROGRAMS:
+            if (yield from number(self.state, f"SASTAT{program}")) == RUNNING:
+                remarks.append(f"program {program} ran while it was read")
+        counters = {}
+        for key, word in (("position", "P"), ("encoder", "E")):
+            counters[key] = (yield from number(self.state, f"{word}X")), (yield from number(self.state, f"{word}Y"))
+        analog = (yield from number(self.state, "AI1")), (yield from number(self.state, "AI2"))
+        values = readings.values
+        # A bit of DI is 1 if the input is at ground, or with the other polarity if it is not.
+        inverted = not int(number_of(values.get("POLX"))) & POLARITY
+        levels = Levels("DI", tuple((n + 1, n) for n in range(POINTS)), inverted=inverted)
+        listed = yield from listing(self.state)
+        return Snapshot(
+            kind="pmx",
+            product="PMX",
+            part=identity.text,
+            version=self.state.version,
+            name=str(values.get("DN", self.state.name))[-2:] or self.state.address,
+            baud=BAUDS.get(int(number_of(values.get("DB"))), 0),
+            readings=readings,
+            program=tuple((int(row[1]), row[2]) for line in listed if (row := RAW.fullmatch(line))),
+            counters=counters,
+            inputs=levels.of((yield from number(self.state, levels.word))),
+            levels=levels,
+            active=bool(remarks),
+            analog=analog,
+            remarks=tuple(remarks),
+        )
 
     def parts(self, facts: Facts) -> Sequence[Part]:
-        return parts(self.state, facts)
+        found = []
+        for axis in table.AXES:
+            loop = (f"SLS{axis}", f"DX{axis}") if facts.get(f"SL{axis}") else ()
+            found.append(Part(axis, partial(_facts, self.state, names=(f"MST{axis}", *loop))))
+        found += [
+            Part("points", partial(_facts, self.state, names=("DI", "DO", "EO"))),
+            Part("programs", partial(_programs, self.state)),
+        ]
+        found += [
+            Part(f"settings {axis}", partial(_facts, self.state, names=(f"SL{axis}",)), slow=True)
+            for axis in table.AXES
+        ]
+        named = [each + axis for axis in ("", *table.AXES) for each in SPEEDS]
+        return [
+            *found,
+            *(Part(name, partial(_facts, self.state, names=(name,)), slow=True) for name in (*named, "EDEC")),
+        ]
 
     def fold(self, facts: Facts) -> tuple[Conditions, ...]:
-        return fold(self.state, facts)
+        """The conditions of both axes; points and programs are with the first."""
+        whole = {name: value for name, value in facts.items() if isinstance(value, int)}
+        one, other = (_of_axis(axis, whole) for axis in table.AXES)
+        lamps = list(one.lamps)
+        for word, output in (("DI", False), ("DO", True)):
+            bits = whole.get(word)
+            on = [None if bits is None else bool(bits >> n & 1) for n in range(POINTS)]
+            lamps += [Lamp(str(n + 1), "", each, output) for n, each in enumerate(on)]
+        states = [whole.get(f"SASTAT{n}") for n in PROGRAMS]
+        active = [n for n in PROGRAMS if states[n] in (RUNNING, PAUSED)]
+        failed = ", ".join(str(n) for n in PROGRAMS if states[n] == 4)
+        one = replace(
+            one,
+            lamps=tuple(lamps),
+            program=", ".join(f"{n} {table.program_words(states[n] or 0)}" for n in active),
+            runs=None if None in states else RUNNING in states,  # a paused one moves nothing
+            line=", ".join(str(facts.get(f"SPC{n}", "")) for n in active),
+            more=(*one.more, *([("program", f"{failed} stopped by an error")] if failed else ())),
+        )
+        return one, other
 
     def check(self, word: str) -> str:
-        return check(self.state, word)
-
-    def first(self, word: str) -> Procedure[float]:
-        return again(self.state, word, Priority.OPERATOR)
+        row = table.lookup(word)
+        if row is None or "R" not in row.access:
+            raise Diagnostic(
+                f"{word} cannot be polled: it reads no value", hint="valid: V0 to V63, DI, SSPD and others"
+            )
+        return word.upper()
 
     def again(self, word: str, priority: Priority) -> Procedure[float]:
-        return again(self.state, word, priority)
+        reply = yield from answered(
+            self.state, replace(self.state.codec.request(self.state.address, word), priority=priority)
+        )
+        return printed_number(who(self.state), word, reply.text)
 
     def controls(self, axis: str) -> Controls:
-        return controls(self.state, axis)
+        return controls_of(__file__, axis.upper(), table.AXES.index(axis.upper()) + 1)
 
     @property
     def actions(self) -> Actions:

@@ -43,73 +43,6 @@ def _axis(state: TmclState, motor: int) -> str:
     return str(motor) if state.motors > 1 else ""
 
 
-def fields(state: TmclState, text: str) -> Sequence[Field]:
-    found = _LINE.fullmatch(text)
-    if found is None:
-        return ()
-    if found[1]:
-        takes: Takes | None = Takes.VELOCITY
-    elif found[2]:
-        takes = Takes.PLACE if found[3].upper() == "ABS" else Takes.DISTANCE
-    else:
-        takes = PARAMETERS.get(Axis(int(found[5]))) if int(found[5]) in PARAMETERS else None
-    moves = bool(found[2]) or (found[5] is not None and int(found[5]) == Axis.TARGET_POSITION)
-    return (Field(_axis(state, int(found[6])), takes, *found.span(7), moves),) if takes is not None else ()
-
-
-def reads(state: TmclState, text: str) -> tuple[str, Takes] | None:
-    call = commands.parsed(text)
-    known = call is not None and call.command == Command.GAP and call.type in PARAMETERS
-    return (_axis(state, call.motor), PARAMETERS[Axis(call.type)]) if call is not None and known else None
-
-
-def disturbs(state: TmclState, text: str) -> Collection[str]:
-    call = commands.parsed(text)
-    if call is None:
-        return ()
-    if call.command == Command.FACTORY:
-        return TmclUnits(state).axes()
-    sets = call.command in (Command.SAP, Command.RSAP) and call.type in (Axis.ACTUAL_POSITION, *RESTS)
-    return (_axis(state, call.motor),) if sets else ()
-
-
-def recounts(request: Request) -> bool:
-    _, call = call_of(request.body)
-    if call.command == Command.FACTORY:
-        return True
-    return call.command in (Command.SAP, Command.RSAP) and call.type in RESTS
-
-
-def basis(state: TmclState, axis: str, full_steps: int | None) -> Procedure[Basis]:
-    motor, settings = int(axis or 0), {}
-    for parameter in RESTS:
-        if parameter == Axis.MICROSTEPS or parameter in module_of(state.product).axis:
-            try:
-                settings[int(parameter)] = yield from read(state, Call(Command.GAP, parameter, motor))
-            except Refused:  # a module without it has no such divisor
-                continue
-    named = tuple((f"{number}", str(value)) for number, value in settings.items())
-    if Axis.MICROSTEPS not in settings:
-        return Basis(named, missing="the module does not report its microsteps (140)")
-    turn = Fraction((full_steps or FULL_STEPS) * 2 ** settings[Axis.MICROSTEPS])
-    assumed = "" if full_steps else f"{FULL_STEPS} full steps a turn are assumed"
-    if not settings.get(Axis.UNIT_MODE, 1):
-        return Basis(named, turn, None, None, assumed)
-    if not module_of(state.product).chip_units:
-        return Basis(named, turn, assumed=assumed)
-    pulse, ramp = settings.get(Axis.PULSE_DIVISOR), settings.get(Axis.RAMP_DIVISOR)
-    if pulse is None or ramp is None:
-        return Basis(named, turn, None, None, assumed)
-    speed = Fraction(2**pulse * 2048 * 32, CLOCK)
-    return Basis(named, turn, speed, Fraction(2 ** (pulse + ramp + 29), CLOCK**2), assumed)
-
-
-def setting(state: TmclState, name: str) -> tuple[str, Takes] | None:
-    found = _SETTING.fullmatch(name)
-    takes = PARAMETERS.get(Axis(int(found[1]))) if found is not None and int(found[1]) in PARAMETERS else None
-    return (_axis(state, int(found[2] or 0)), takes) if found is not None and takes is not None else None
-
-
 class TmclUnits(Units):
     """The quantities in lines of TMCL."""
 
@@ -121,22 +54,65 @@ class TmclUnits(Units):
         return [str(motor) for motor in range(self.state.motors)] if self.state.motors > 1 else [""]
 
     def fields(self, text: str) -> Sequence[Field]:
-        return fields(self.state, text)
+        found = _LINE.fullmatch(text)
+        if found is None:
+            return ()
+        if found[1]:
+            takes: Takes | None = Takes.VELOCITY
+        elif found[2]:
+            takes = Takes.PLACE if found[3].upper() == "ABS" else Takes.DISTANCE
+        else:
+            takes = PARAMETERS.get(Axis(int(found[5]))) if int(found[5]) in PARAMETERS else None
+        moves = bool(found[2]) or (found[5] is not None and int(found[5]) == Axis.TARGET_POSITION)
+        return (Field(_axis(self.state, int(found[6])), takes, *found.span(7), moves),) if takes is not None else ()
 
     def basis(self, axis: str, full_steps: int | None) -> Procedure[Basis]:
-        return basis(self.state, axis, full_steps)
+        motor, settings = int(axis or 0), {}
+        for parameter in RESTS:
+            if parameter == Axis.MICROSTEPS or parameter in module_of(self.state.product).axis:
+                try:
+                    settings[int(parameter)] = yield from read(self.state, Call(Command.GAP, parameter, motor))
+                except Refused:  # a module without it has no such divisor
+                    continue
+        named = tuple((f"{number}", str(value)) for number, value in settings.items())
+        if Axis.MICROSTEPS not in settings:
+            return Basis(named, missing="the module does not report its microsteps (140)")
+        turn = Fraction((full_steps or FULL_STEPS) * 2 ** settings[Axis.MICROSTEPS])
+        assumed = "" if full_steps else f"{FULL_STEPS} full steps a turn are assumed"
+        if not settings.get(Axis.UNIT_MODE, 1):
+            return Basis(named, turn, None, None, assumed)
+        if not module_of(self.state.product).chip_units:
+            return Basis(named, turn, assumed=assumed)
+        pulse, ramp = settings.get(Axis.PULSE_DIVISOR), settings.get(Axis.RAMP_DIVISOR)
+        if pulse is None or ramp is None:
+            return Basis(named, turn, None, None, assumed)
+        speed = Fraction(2**pulse * 2048 * 32, CLOCK)
+        return Basis(named, turn, speed, Fraction(2 ** (pulse + ramp + 29), CLOCK**2), assumed)
 
     def disturbs(self, text: str) -> Collection[str]:
-        return disturbs(self.state, text)
+        call = commands.parsed(text)
+        if call is None:
+            return ()
+        if call.command == Command.FACTORY:
+            return self.axes()
+        sets = call.command in (Command.SAP, Command.RSAP) and call.type in (Axis.ACTUAL_POSITION, *RESTS)
+        return (_axis(self.state, call.motor),) if sets else ()
 
     def recounts(self, request: Request) -> bool:
-        return recounts(request)
+        _, call = call_of(request.body)
+        if call.command == Command.FACTORY:
+            return True
+        return call.command in (Command.SAP, Command.RSAP) and call.type in RESTS
 
     def reads(self, text: str) -> tuple[str, Takes] | None:
-        return reads(self.state, text)
+        call = commands.parsed(text)
+        known = call is not None and call.command == Command.GAP and call.type in PARAMETERS
+        return (_axis(self.state, call.motor), PARAMETERS[Axis(call.type)]) if call is not None and known else None
 
     def setting(self, name: str) -> tuple[str, Takes] | None:
-        return setting(self.state, name)
+        found = _SETTING.fullmatch(name)
+        takes = PARAMETERS.get(Axis(int(found[1]))) if found is not None and int(found[1]) in PARAMETERS else None
+        return (_axis(self.state, int(found[2] or 0)), takes) if found is not None and takes is not None else None
 
     def setting_name(self, axis: str, name: str) -> str:
         return commands.setting_name(f"{name}_{axis}" if axis else name)

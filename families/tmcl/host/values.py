@@ -12,6 +12,7 @@ from functools import partial
 
 from multidrop.base.errors import Diagnostic, Refused
 from multidrop.dialects.codec import Priority, Procedure
+from multidrop.dialects.listed_settings import ListedParameters
 from multidrop.dialects.program_files import Held
 from multidrop.dialects.state import who
 from multidrop.dialects.values import (
@@ -36,9 +37,7 @@ from multidrop.dialects.values import (
     Value,
     Values,
     controls_of,
-    read_each,
-    reference_lost,
-    same,
+    number,
 )
 from multidrop.families.tmcl.host.codec import TmclState
 from multidrop.families.tmcl.host.motions import DRIVER_FAULTS
@@ -95,85 +94,13 @@ def reading(name: str, value: int, module: Module) -> Reading:
     return Reading(name, value, unit=unit, default=default, fixed=of_module and number in WIRE)
 
 
-def plan(state: TmclState, present: Readings, wanted: Mapping[str, Value], allowed: Permission) -> Plan:
-    module = module_of(state.product)
-    now, names = present.values, setting_names(module, state.motors or 1)
-    changed = {
-        setting_name(name): value for name, value in wanted.items() if not same(value, now.get(setting_name(name)))
-    }
-    allowed = replace(allowed, named=frozenset(map(setting_name, allowed.named)))
-    withheld = {name: reason for name in changed if (reason := _risk(name, changed[name], now, allowed))}
-    goal = {name: _checked(name, value, names, module) for name, value in changed.items() if name not in withheld}
-    order = [name for name in names if name in goal]
-    steps = [Change(name, now.get(name), goal[name], str(_call(name, Command.SAP, goal[name]))) for name in order]
-    scale = [name for name in goal if _parts(name)[:2] == (False, Axis.MICROSTEPS)]
-    return Plan(tuple(steps), tuple(withheld.items()), remarks=reference_lost(steps, scale))
-
-
 def _parts(name: str) -> tuple[bool, int, int]:
     """Divide a name: whether it is a global parameter, the number, the motor."""
     found = parameter(name)
     return (found.command == Command.GGP, found.type, found.motor) if found is not None else (False, -1, 0)
 
 
-def _checked(name: str, value: Value, names: Collection[str], module: Module) -> int:
-    """Return the value as a whole number. Raises Diagnostic."""
-    if name not in names:
-        raise Diagnostic(f"{name}: is not a setting of the module")
-    row = _row(module, name)
-    if isinstance(value, (str, tuple)) or not float(value).is_integer() or int(value) not in row.limits:
-        raise Diagnostic(f"{name} = {value}: valid: {row.valid}")
-    return int(value)
-
-
-def _risk(name: str, value: Value, now: Mapping[str, Value], allowed: Permission) -> str:
-    """The reason for which a setting waits for a person's word; empty: there is none."""
-    of_module, number, _ = _parts(name)
-    communicates = of_module and number in WIRE
-    if name in allowed.named or (communicates and allowed.communication):
-        return ""
-    if communicates:
-        return COMMUNICATION
-    if of_module and number == Global.AUTOSTART and value:
-        return "the stored program starts at power-up"
-    if not of_module and number in (Axis.RIGHT_LIMIT_OFF, Axis.LEFT_LIMIT_OFF) and value:
-        return "a move that the limit switch holds back may go on"
-    waits = not of_module and number in STARTING_PARAMETERS and now.get(name) == 0
-    return "a move may wait for it" if waits else ""
-
-
-def read_settings(state: TmclState, progress: Progress) -> Procedure[Readings]:
-    """Read every setting; modules differ, so a refused one is listed. Raises NoAnswer."""
-    names = setting_names(module_of(state.product), (yield from motors(state)))
-    return (yield from read_each(names, partial(_read, state), progress))
-
-
-def _read(state: TmclState, name: str) -> Procedure[Reading]:
-    return reading(name, (yield from read(state, _call(name, Command.GAP))), module_of(state.product))
-
-
-def conflict(plan: Plan, others: Collection[str]) -> str:
-    numbers = [str(change.after) for change in plan if change.name == ADDRESS]
-    return f"another module of the line has address {numbers[0]}" if numbers and numbers[0] in others else ""
-
-
-def ready(state: TmclState) -> Procedure[str]:
-    return f"{who(state)} moves: stop it first" if (yield from moving(state)) else ""
-
-
-def save(state: TmclState) -> Procedure[None]:
-    """Store the axis parameters in EEPROM, one by one; a module may lack some."""
-    for name in setting_names(module_of(state.product), (yield from motors(state))):
-        if not name.startswith(GLOBAL_PREFIX):
-            call = _call(name, Command.GAP)
-            try:
-                yield from perform(state, f"STAP {call.type}, {call.motor}")
-            except Refused as refusal:
-                if refusal.code not in NOT_STORED:
-                    raise
-
-
-class TmclParameters(Parameters):
+class TmclParameters(ListedParameters):
     """The settings of a TMCL module."""
 
     state: TmclState
@@ -181,23 +108,70 @@ class TmclParameters(Parameters):
     language = "TMCL"
     saving = "STAP"
 
-    def read(self, progress: Progress) -> Procedure[Readings]:
-        return read_settings(self.state, progress)
+    def names(self) -> Sequence[str]:
+        return setting_names(module_of(self.state.product), self.state.motors or 1)
 
-    def plan(self, present: Readings, wanted: Mapping[str, Value], permission: Permission) -> Plan:
-        return plan(self.state, present, wanted, permission)
+    def read(self, progress: Progress) -> Procedure[Readings]:
+        """Read every setting of the motors, which are counted first."""
+        yield from motors(self.state)
+        return (yield from super().read(progress))
+
+    def read_one(self, name: str) -> Procedure[Reading]:
+        return reading(name, (yield from read(self.state, _call(name, Command.GAP))), module_of(self.state.product))
+
+    def spelled(self, name: str) -> str:
+        return setting_name(name)
+
+    def risk(self, name: str, value: Value, now: Mapping[str, Value], allowed: Permission) -> str:
+        """The reason for which a setting waits for a person's word; empty: there is none."""
+        of_module, number, _ = _parts(name)
+        communicates = of_module and number in WIRE
+        if name in map(setting_name, allowed.named) or (communicates and allowed.communication):
+            return ""
+        if communicates:
+            return COMMUNICATION
+        if of_module and number == Global.AUTOSTART and value:
+            return "the stored program starts at power-up"
+        if not of_module and number in (Axis.RIGHT_LIMIT_OFF, Axis.LEFT_LIMIT_OFF) and value:
+            return "a move that the limit switch holds back may go on"
+        waits = not of_module and number in STARTING_PARAMETERS and now.get(name) == 0
+        return "a move may wait for it" if waits else ""
+
+    def checked(self, name: str, value: Value) -> int:
+        if name not in self.names():
+            raise Diagnostic(f"{name}: is not a setting of the module")
+        row = _row(module_of(self.state.product), name)
+        if isinstance(value, (str, tuple)) or not float(value).is_integer() or int(value) not in row.limits:
+            raise Diagnostic(f"{name} = {value}: valid: {row.valid}")
+        return int(value)
+
+    def line(self, name: str, value: Value) -> str:
+        return str(_call(name, Command.SAP, int(number(value))))
+
+    def rescales(self, name: str) -> bool:
+        return _parts(name)[:2] == (False, Axis.MICROSTEPS)
 
     def ready(self) -> Procedure[str]:
-        return ready(self.state)
+        return f"{who(self.state)} moves: stop it first" if (yield from moving(self.state)) else ""
 
     def write(self, change: Change) -> Procedure[object]:
         return perform(self.state, change.text)
 
-    def save(self) -> Procedure[object]:
-        return save(self.state)
+    def save(self) -> Procedure[None]:
+        """Store the axis parameters in EEPROM, one by one; a module may lack some."""
+        yield from motors(self.state)
+        for name in self.names():
+            if not name.startswith(GLOBAL_PREFIX):
+                call = _call(name, Command.GAP)
+                try:
+                    yield from perform(self.state, f"STAP {call.type}, {call.motor}")
+                except Refused as refusal:
+                    if refusal.code not in NOT_STORED:
+                        raise
 
     def conflict(self, plan: Plan, others: Collection[str]) -> str:
-        return conflict(plan, others)
+        numbers = [str(change.after) for change in plan if change.name == ADDRESS]
+        return f"another module of the line has address {numbers[0]}" if numbers and numbers[0] in others else ""
 
 
 STATE = (Axis.TARGET_POSITION, Axis.POSITION_REACHED)
@@ -211,20 +185,6 @@ RUNS = "RUNS"
 ABSENT = "absent"
 """A parameter that the module refuses: it lacks it."""
 FULL_CURRENT = 255
-
-
-def parts(state: TmclState, facts: Facts) -> Sequence[Part]:
-    """The parts of a module, for each motor that was counted; at first they are counted."""
-    if not state.motors:
-        return (Part("motors", partial(_count, state)),)
-    found: list[Part] = [Part("program", partial(_program, state))]
-    for motor in range(state.motors):
-        some = (FLAGS, *(axis for axis, _ in SWITCHES))
-        asked = [*STATE, *(axis for axis in some if facts.get(_key(axis, motor)) != ABSENT)]
-        found.append(Part(f"motor {motor}", partial(_parameters, state, motor=motor, wanted=asked)))
-        for axis in SETTINGS:
-            found.append(Part(_key(axis, motor), partial(_parameters, state, motor=motor, wanted=(axis,)), slow=True))
-    return found
 
 
 def _key(axis: Axis, motor: int) -> str:
@@ -248,10 +208,6 @@ def _parameters(state: TmclState, motor: int, wanted: Sequence[Axis]) -> Procedu
         except Refused:
             found[_key(axis, motor)] = ABSENT
     return found
-
-
-def fold(state: TmclState, facts: Facts) -> tuple[Conditions, ...]:
-    return tuple(_conditions(state, facts, motor) for motor in range(state.motors))
 
 
 def _conditions(state: TmclState, facts: Facts, motor: int) -> Conditions:
@@ -280,72 +236,6 @@ def _conditions(state: TmclState, facts: Facts, motor: int) -> Conditions:
     )
 
 
-def check(state: TmclState, word: str) -> str:
-    found = parameter(word)
-    if found is None:
-        raise Diagnostic(f"{word} cannot be polled", hint="valid: AP and a parameter, /MOTOR after it; as AP206, AP1/1")
-    if found.changed_by_reading:
-        raise Diagnostic(f"{word} cannot be polled: reading it clears it", hint=f"{found} reads it once")
-    return f"AP{word}" if word[0].isdigit() else word.upper()
-
-
-def again(state: TmclState, word: str, priority: Priority) -> Procedure[float]:
-    """Read a parameter, none whose reading changes the module: `check` refuses that."""
-    found = parameter(word)
-    assert found is not None
-    return float((yield from read(state, found, priority)))
-
-
-def take(state: TmclState, progress: Progress) -> Procedure[Snapshot]:
-    readings = yield from read_settings(state, progress)
-    remarks = []
-    if active := (yield from moving(state)):
-        remarks.append("moving while it was read: its position is one of that moment")
-    if runs := (yield from busy(state)):
-        remarks.append("its program ran while it was read")
-    try:
-        held = yield from read_held(state, (), lambda done, total: None)
-    except Refused as refused:
-        held = Held()
-        remarks.append(f"its program was not read: {refused}")
-    count = yield from motors(state)
-    module, (major, _, minor) = state.product.rpartition("-")[2], state.version.partition(".")
-    if count > (simulated := MODULES[module].motors if module in MODULES else 1):
-        remarks.append(f"it has {count} motors; the simulated module has {simulated}")
-    positions, targets = [], []
-    for motor in range(count):
-        positions.append((yield from read(state, Call(Command.GAP, Axis.ACTUAL_POSITION, motor))))
-        targets.append((yield from read(state, Call(Command.GAP, Axis.TARGET_POSITION, motor))))
-    code = readings.values.get(f"G{int(Global.BAUD)}")
-    return Snapshot(
-        kind="tmcl",
-        product=state.product,
-        version=f"{module}V{major}{minor}" if module.isdecimal() and major else "",  # as in its text form, `1241V115`
-        name=state.address,
-        baud=BAUDS.get(code, 0) if isinstance(code, int) else 0,
-        readings=readings,
-        counters={"position": tuple(positions), **({"target": tuple(targets)} if targets != positions else {})},
-        program=tuple((line.at, line.text) for line in held.lines),
-        active=active or runs,
-        remarks=tuple(remarks),
-    )
-
-
-def controls(state: TmclState, axis: str) -> Controls:
-    found = controls_of(__file__, axis or "0")
-    counted = RELATIVE_FROM.get(state.relative.get(int(axis or 0), -1), "from where it counts is not known")
-    return {**found, BY: replace(found[BY], about=counted)}
-
-
-def _word(word: str, axis: str) -> str:
-    """A parameter by its number, of the motor that it names or that is meant; any other word as it is."""
-    found = parameter(word)
-    if found is None:
-        return word
-    named = re.search(r"[_/]\d$", word) is not None
-    return f"G{found.type}" if found.command == Command.GGP else f"AP{found.type}_{found.motor if named else axis or 0}"
-
-
 class TmclActions(Actions):
     """What a program asks of a TMCL module."""
 
@@ -363,7 +253,16 @@ class TmclActions(Actions):
         return f"SIO {number}, 2, {on:d}"
 
     def word(self, word: str, axis: str) -> str:
-        return _word(word, axis)
+        """A parameter by its number, of the motor that it names or that is meant; any other word as it is."""
+        found = parameter(word)
+        if found is None:
+            return word
+        named = re.search(r"[_/]\d$", word) is not None
+        return (
+            f"G{found.type}"
+            if found.command == Command.GGP
+            else f"AP{found.type}_{found.motor if named else axis or 0}"
+        )
 
     def ports(self) -> Mapping[int, str]:
         return {port: f"GIO {port}, 0" for port in module_of(self.state.product).inputs}
@@ -379,25 +278,79 @@ class TmclValues(Values):
         return TmclParameters(self.state)
 
     def snapshot(self, progress: Progress) -> Procedure[Snapshot]:
-        return take(self.state, progress)
+        readings = yield from TmclParameters(self.state).read(progress)
+        remarks = []
+        if active := (yield from moving(self.state)):
+            remarks.append("moving while it was read: its position is one of that moment")
+        if runs := (yield from busy(self.state)):
+            remarks.append("its program ran while it was read")
+        try:
+            held = yield from read_held(self.state, (), lambda done, total: None)
+        except Refused as refused:
+            held = Held()
+            remarks.append(f"its program was not read: {refused}")
+        count = yield from motors(self.state)
+        module, (major, _, minor) = self.state.product.rpartition("-")[2], self.state.version.partition(".")
+        if count > (simulated := MODULES[module].motors if module in MODULES else 1):
+            remarks.append(f"it has {count} motors; the simulated module has {simulated}")
+        positions, targets = [], []
+        for motor in range(count):
+            positions.append((yield from read(self.state, Call(Command.GAP, Axis.ACTUAL_POSITION, motor))))
+            targets.append((yield from read(self.state, Call(Command.GAP, Axis.TARGET_POSITION, motor))))
+        code = readings.values.get(f"G{int(Global.BAUD)}")
+        return Snapshot(
+            kind="tmcl",
+            product=self.state.product,
+            version=f"{module}V{major}{minor}"
+            if module.isdecimal() and major
+            else "",  # as in its text form, `1241V115`
+            name=self.state.address,
+            baud=BAUDS.get(code, 0) if isinstance(code, int) else 0,
+            readings=readings,
+            counters={"position": tuple(positions), **({"target": tuple(targets)} if targets != positions else {})},
+            program=tuple((line.at, line.text) for line in held.lines),
+            active=active or runs,
+            remarks=tuple(remarks),
+        )
 
     def parts(self, facts: Facts) -> Sequence[Part]:
-        return parts(self.state, facts)
+        """The parts of a module, for each motor that was counted; at first they are counted."""
+        if not self.state.motors:
+            return (Part("motors", partial(_count, self.state)),)
+        found: list[Part] = [Part("program", partial(_program, self.state))]
+        for motor in range(self.state.motors):
+            some = (FLAGS, *(axis for axis, _ in SWITCHES))
+            asked = [*STATE, *(axis for axis in some if facts.get(_key(axis, motor)) != ABSENT)]
+            found.append(Part(f"motor {motor}", partial(_parameters, self.state, motor=motor, wanted=asked)))
+            for axis in SETTINGS:
+                found.append(
+                    Part(_key(axis, motor), partial(_parameters, self.state, motor=motor, wanted=(axis,)), slow=True)
+                )
+        return found
 
     def fold(self, facts: Facts) -> tuple[Conditions, ...]:
-        return fold(self.state, facts)
+        return tuple(_conditions(self.state, facts, motor) for motor in range(self.state.motors))
 
     def check(self, word: str) -> str:
-        return check(self.state, word)
-
-    def first(self, word: str) -> Procedure[float]:
-        return again(self.state, word, Priority.OPERATOR)
+        found = parameter(word)
+        if found is None:
+            raise Diagnostic(
+                f"{word} cannot be polled", hint="valid: AP and a parameter, /MOTOR after it; as AP206, AP1/1"
+            )
+        if found.changed_by_reading:
+            raise Diagnostic(f"{word} cannot be polled: reading it clears it", hint=f"{found} reads it once")
+        return f"AP{word}" if word[0].isdigit() else word.upper()
 
     def again(self, word: str, priority: Priority) -> Procedure[float]:
-        return again(self.state, word, priority)
+        """Read a parameter, none whose reading changes the module: `check` refuses that."""
+        found = parameter(word)
+        assert found is not None
+        return float((yield from read(self.state, found, priority)))
 
     def controls(self, axis: str) -> Controls:
-        return controls(self.state, axis)
+        found = controls_of(__file__, axis or "0")
+        counted = RELATIVE_FROM.get(self.state.relative.get(int(axis or 0), -1), "from where it counts is not known")
+        return {**found, BY: replace(found[BY], about=counted)}
 
     @property
     def actions(self) -> Actions:

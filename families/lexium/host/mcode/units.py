@@ -13,7 +13,6 @@ from collections.abc import Collection, Mapping, Sequence
 from fractions import Fraction
 
 from multidrop.dialects.codec import Procedure, Request
-from multidrop.dialects.state import DriveState
 from multidrop.dialects.units import VALUE, Basis, Field, Takes, Units
 from multidrop.families.lexium.host.mcode import classify
 from multidrop.families.lexium.host.mcode.before_request import value_of
@@ -41,45 +40,9 @@ _LINE = re.compile(rf"\s*({'|'.join(TAKES)})\s*=?\s*{VALUE}\s*(?:,[^'`]*)?(?:['`
 _READ = re.compile(r"\s*PR\s*([A-Z]+)\s*", re.I)
 
 
-def fields(state: DriveState, text: str) -> Sequence[Field]:
-    found = _LINE.fullmatch(text)
-    if found is None:
-        return ()
-    word = found[1].upper()
-    return (Field("", TAKES[word], *found.span(2), word in MOVES),)
-
-
-def reads(state: DriveState, text: str) -> tuple[str, Takes] | None:
-    found = _READ.fullmatch(text)
-    takes = READS.get(found[1].upper()) if found is not None else None
-    return ("", takes) if takes is not None else None
-
-
-def disturbs(state: DriveState, text: str) -> Collection[str]:
-    counts = classify.written_word(text) in {*classify.SCALE, *RESTS}
-    return ("",) if counts or classify.word_of(text)[0] in classify.WHOLE else ()
-
-
-def recounts(request: Request) -> bool:
-    return classify.written_word(request.text) in RESTS or classify.word_of(request.text)[0] in classify.WHOLE
-
-
 def rests_on(product: str) -> list[str]:
     """The settings that a product has of those; of an unknown one the one that every product has."""
     return [word for word in RESTS if (row := lookup(word, product)) is not None and product in row.products] or ["MS"]
-
-
-def basis(state: MCodeState, axis: str, full_steps: int | None) -> Procedure[Basis]:
-    """Read the settings in one print, with the error flag and whether a program runs."""
-    refuse_in_program(state, "type the line again")
-    values: dict[str, str] = {}
-    while missing := [word for word in rests_on(state.product) if word not in values]:  # a print may find the product
-        asked = [*missing, "EF", "BY"]
-        printed = yield from value_of(state, '," ",'.join(asked), " ".join([r"\d+(?:\.\d+)?"] * len(asked)))
-        *found, error, runs = printed.split()
-        state.program_read(error=error == "1", running=runs == "1")
-        values |= dict(zip(missing, found, strict=True))
-    return counted(state.product, values, full_steps)
 
 
 def counted(product: str, values: Mapping[str, str], full_steps: int | None) -> Basis:
@@ -99,27 +62,45 @@ def counted(product: str, values: Mapping[str, str], full_steps: int | None) -> 
     return Basis(settings, int(values["MS"]) * steps)
 
 
-class MCodeUnits(Units):
-    """The quantities in lines of MCode."""
-
-    state: MCodeState
+class LexiumUnits(Units):
+    """The quantities in lines of MCode, over any protocol."""
 
     words = ", ".join(TAKES)
 
-    def axes(self) -> Sequence[str]:
-        return ("",)
-
     def fields(self, text: str) -> Sequence[Field]:
-        return fields(self.state, text)
-
-    def basis(self, axis: str, full_steps: int | None) -> Procedure[Basis]:
-        return basis(self.state, axis, full_steps)
+        found = _LINE.fullmatch(text)
+        if found is None:
+            return ()
+        word = found[1].upper()
+        return (Field("", TAKES[word], *found.span(2), word in MOVES),)
 
     def disturbs(self, text: str) -> Collection[str]:
-        return disturbs(self.state, text)
+        counts = classify.written_word(text) in {*classify.SCALE, *RESTS}
+        return ("",) if counts or classify.word_of(text)[0] in classify.WHOLE else ()
 
     def recounts(self, request: Request) -> bool:
-        return recounts(request)
+        return classify.written_word(request.text) in RESTS or classify.word_of(request.text)[0] in classify.WHOLE
 
     def reads(self, text: str) -> tuple[str, Takes] | None:
-        return reads(self.state, text)
+        found = _READ.fullmatch(text)
+        takes = READS.get(found[1].upper()) if found is not None else None
+        return ("", takes) if takes is not None else None
+
+
+class MCodeUnits(LexiumUnits):
+    """The quantities in lines of MCode, and what they count over MCode."""
+
+    state: MCodeState
+
+    def basis(self, axis: str, full_steps: int | None) -> Procedure[Basis]:
+        """Read the settings in one print, with the error flag and whether a program runs."""
+        refuse_in_program(self.state, "type the line again")
+        values: dict[str, str] = {}
+        # A print may find the product.
+        while missing := [word for word in rests_on(self.state.product) if word not in values]:
+            asked = [*missing, "EF", "BY"]
+            printed = yield from value_of(self.state, '," ",'.join(asked), " ".join([r"\d+(?:\.\d+)?"] * len(asked)))
+            *found, error, runs = printed.split()
+            self.state.program_read(error=error == "1", running=runs == "1")
+            values |= dict(zip(missing, found, strict=True))
+        return counted(self.state.product, values, full_steps)

@@ -7,14 +7,14 @@ it, is left to MCode/TCP. Nothing moves, and nothing is cleared. What a step is 
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 
 from multidrop.base.errors import Diagnostic, Inexpressible, NoAnswer, Refused
 from multidrop.dialects.codec import Priority, Procedure, Request
 from multidrop.dialects.state import who
-from multidrop.dialects.units import Basis, Field, Takes, Units
+from multidrop.dialects.units import Basis
 from multidrop.dialects.values import (
     Actions,
     Change,
@@ -262,9 +262,6 @@ class ModbusValues(Values):
     def check(self, word: str) -> str:
         return check(self.state, word)
 
-    def first(self, word: str) -> Procedure[float]:
-        return again(self.state, word, Priority.OPERATOR)
-
     def again(self, word: str, priority: Priority) -> Procedure[float]:
         return again(self.state, word, priority)
 
@@ -276,46 +273,24 @@ class ModbusValues(Values):
         return points.LexiumActions(self.state)
 
 
-def basis(state: ModbusState, axis: str, full_steps: int | None) -> Procedure[Basis]:
-    values = {}
-    for word in units.rests_on(state.product):
-        if word in REGISTERS:
-            values[word] = str((yield from value(state, word)))
-    return units.counted(state.product, values, full_steps)
-
-
-def recounts(request: Request) -> bool:
-    """Whether it writes such a register, or one that restores all of them, by a word or by its number."""
-    if units.recounts(request):
-        return True
-    if request.body[:1] != bytes([framing.WRITE_REGISTERS]):
-        return False
-    first, count = int.from_bytes(request.body[1:3]), int.from_bytes(request.body[3:5])
-    written = (AT.get(address) for address in range(first, first + count))
-    return any(row.name in (*units.RESTS, *WHOLE) for row in written if row is not None)
-
-
-class ModbusUnits(Units):
+class ModbusUnits(units.LexiumUnits):
     """The quantities in its lines."""
 
     state: ModbusState
 
-    words = units.MCodeUnits.words
-
-    def axes(self) -> Sequence[str]:
-        return ("",)
-
-    def fields(self, text: str) -> Sequence[Field]:
-        return units.fields(self.state, text)
-
     def basis(self, axis: str, full_steps: int | None) -> Procedure[Basis]:
-        return basis(self.state, axis, full_steps)
-
-    def disturbs(self, text: str) -> Collection[str]:
-        return units.disturbs(self.state, text)
+        values = {}
+        for word in units.rests_on(self.state.product):
+            if word in REGISTERS:
+                values[word] = str((yield from value(self.state, word)))
+        return units.counted(self.state.product, values, full_steps)
 
     def recounts(self, request: Request) -> bool:
-        return recounts(request)
-
-    def reads(self, text: str) -> tuple[str, Takes] | None:
-        return units.reads(self.state, text)
+        """Whether it writes such a register, or one that restores all of them, by a word or by its number."""
+        if super().recounts(request):
+            return True
+        if request.body[:1] != bytes([framing.WRITE_REGISTERS]):
+            return False
+        first, count = int.from_bytes(request.body[1:3]), int.from_bytes(request.body[3:5])
+        written = (AT.get(address) for address in range(first, first + count))
+        return any(row.name in (*units.RESTS, *WHOLE) for row in written if row is not None)
