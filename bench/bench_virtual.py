@@ -18,7 +18,7 @@ from report import Row, alone, main
 from multidrop.families.lexium.manual import program_file
 from multidrop.families.lexium.simulator.program_run import MCodeRun
 from multidrop.simulator.cell.spec import DriveSpec, WorldSpec
-from multidrop.simulator.program_run import Summary
+from multidrop.simulator.program_events import Summary
 
 AIM = 1.0
 MINUTES = 10

@@ -87,7 +87,7 @@ class _Done:
 
 def _done(load: Load, personality: str, world: Mapping[str, Any], until: float) -> _Done:
     from multidrop.simulator.cells import read_drive
-    from multidrop.simulator.program_run import Debugging, Summary
+    from multidrop.simulator.program_events import Debugging, Summary
 
     lists: dict[str, list[str]] = {"print": [], "outputs": [], "error": []}
     table = {"personality": personality, "world": world}

@@ -40,7 +40,8 @@ from multidrop.shell.scripts.expression import (
 from multidrop.shell.scripts.expression import Value as Scalar
 from multidrop.simulator.cells import read_drive
 from multidrop.simulator.families import PROGRAMS
-from multidrop.simulator.program_run import Event, Load, ProgramRun
+from multidrop.simulator.program_events import Event
+from multidrop.simulator.program_run import Load, ProgramRun
 
 BY_ITSELF = ("E", "END")
 """The ends of a program that has ended by itself."""

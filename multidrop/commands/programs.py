@@ -98,7 +98,7 @@ def drive(cell: str | None, personality: str | None) -> DriveSpec:
 
 def _test(file: str, chosen: argparse.Namespace, given: DriveSpec | None, several: bool) -> int:
     from multidrop.simulator.families import PROGRAMS
-    from multidrop.simulator.program_run import Debugging
+    from multidrop.simulator.program_events import Debugging
 
     began = time.perf_counter()
     head = {"file": file} if several else {}

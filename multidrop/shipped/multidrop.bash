@@ -166,7 +166,7 @@ _shtab_multidrop_report__o_COMPGEN=_shtab_compgen_files
 _shtab_multidrop_report___output_COMPGEN=_shtab_compgen_files
 
 _shtab_multidrop_program_check___language_choices=(mcode pmx tmcl)
-_shtab_multidrop_program_check___personality_choices=(LMDOM LMDCM LMDOE LMDCE LMM MDI MDIE MDIX PMX TMCM TMCM-1140 TMCM-1141 TMCM-1161 TMCM-1240 TMCM-1241 TMCM-1260 TMCM-1276 TMCM-3110 TMCM-6110 TMCM-6214)
+_shtab_multidrop_program_check___personality_choices=(LMDOM LMDCM LMDOE LMDCE LMM MDI MDIE MDIX)
 _shtab_multidrop_program_test___language_choices=(mcode pmx tmcl)
 _shtab_multidrop_program_test___personality_choices=(LMDOM LMDCM LMDOE LMDCE LMM MDI MDIE MDIX PMX TMCM TMCM-1140 TMCM-1141 TMCM-1161 TMCM-1240 TMCM-1241 TMCM-1260 TMCM-1276 TMCM-3110 TMCM-6110 TMCM-6214)
 _shtab_multidrop_program_sweep___language_choices=(mcode pmx tmcl)
@@ -180,7 +180,7 @@ _shtab_multidrop_rescue___dialect_choices=(mcode pmx)
 _shtab_multidrop_log_pos_0_choices=(show follow grep at bisect judge replay)
 _shtab_multidrop_config_pos_0_choices=(path show check)
 _shtab_multidrop_help___dialect_choices=(mcode modbus pmx tmcl)
-_shtab_multidrop_lsp___personality_choices=(LMDOM LMDCM LMDOE LMDCE LMM MDI MDIE MDIX PMX TMCM TMCM-1140 TMCM-1141 TMCM-1161 TMCM-1240 TMCM-1241 TMCM-1260 TMCM-1276 TMCM-3110 TMCM-6110 TMCM-6214)
+_shtab_multidrop_lsp___personality_choices=(LMDOM LMDCM LMDOE LMDCE LMM MDI MDIE MDIX)
 _shtab_multidrop_completion_pos_0_choices=(bash zsh fish powershell)
 _shtab_multidrop_pos_0_choices=(demo tui shell send run sim program params macro plot poll publish plant share snapshot twin certify ports relay scan rescue log config features help lsp report completion)
 

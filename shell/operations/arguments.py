@@ -164,7 +164,7 @@ class _Checked:
         return (
             personality
             for name, programs in PROGRAMS.items()
-            if programs.refusals is not None
+            if programs.by_product
             for personality in simulated()[name].personalities
         )
 

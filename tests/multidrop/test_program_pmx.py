@@ -14,7 +14,7 @@ from multidrop.families.pmx.manual import program_file
 from multidrop.families.pmx.simulator.program_run import AScriptRun
 from multidrop.simulator.cell.spec import DriveSpec
 from multidrop.simulator.cells import read
-from multidrop.simulator.program_run import Event, Summary
+from multidrop.simulator.program_events import Event, Summary
 from tests.support import pmx_programs as shapes
 from tests.support.cell_session import bus, drive, pmx
 from tests.support.front_door import Command, Done

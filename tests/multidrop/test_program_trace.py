@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from multidrop.simulator import program_run
+from multidrop.simulator import program_events
 from tests.support.front_door import Home
 
 LOOP = """VM=200000
@@ -120,7 +120,7 @@ def test_json_has_one_object_for_each_line(test: Test) -> None:
 
 
 def test_a_trace_is_bounded_and_says_so(test: Test, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(program_run, "MOST_TRACED", 3)
+    monkeypatch.setattr(program_events, "MOST_TRACED", 3)
     code, out, err = test("loop.mxt", "--trace")
     assert code == 0 and sum("loop.mxt:" in line for line in out) == 3 and out[-1].startswith("ended at E")
     assert len(err) == 1 and "the trace ends after 3 lines" in err[0]

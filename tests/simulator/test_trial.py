@@ -8,7 +8,8 @@ from multidrop.base.errors import Diagnostic
 from multidrop.families.lexium.manual import program_file
 from multidrop.families.lexium.simulator.program_run import MCodeRun
 from multidrop.simulator.cell.spec import DriveSpec, WorldSpec
-from multidrop.simulator.program_run import LONGEST, Event, Summary
+from multidrop.simulator.program_events import Event, Summary
+from multidrop.simulator.program_run import LONGEST
 
 
 def tried(text: str, label: str = "", until: float | None = None, **spec: object) -> list[Event]:

@@ -26,17 +26,8 @@ from multidrop.families.lexium.simulator.state.errors import CRLF, Failure, Faul
 from multidrop.families.lexium.simulator.state.program_memory import SPACE, Program
 from multidrop.families.lexium.simulator.stored_setups import refused_later
 from multidrop.simulator.cell.spec import DriveSpec
-from multidrop.simulator.program_run import (
-    BreakPoint,
-    Debugging,
-    Event,
-    ProgramRun,
-    Reader,
-    Recorder,
-    Summary,
-    Value,
-    Values,
-)
+from multidrop.simulator.program_events import BreakPoint, Debugging, Event, Recorder, Summary, Value, Values
+from multidrop.simulator.program_run import ProgramRun, Reader
 from multidrop.simulator.world import World
 
 FIRST_ADDRESS = 1
@@ -61,6 +52,7 @@ class MCodeRun(ProgramRun):
     breaks = "LINE or LABEL, or with ,PASSES"
     watches = "a variable or flag, or a name with VA"
     complete = "E"
+    by_product = True
 
     def __init__(self, spec: DriveSpec, lines: Sequence[ProgramLine], file: str, source: Sequence[str] = ()) -> None:
         super().__init__(spec, file, source)

@@ -22,17 +22,8 @@ from multidrop.families.pmx.manual.table import lookup
 from multidrop.families.pmx.simulator.device import PmxDevice
 from multidrop.families.pmx.simulator.programs import Failure
 from multidrop.simulator.cell.spec import DriveSpec
-from multidrop.simulator.program_run import (
-    BreakPoint,
-    Debugging,
-    Event,
-    ProgramRun,
-    Reader,
-    Recorder,
-    Summary,
-    Value,
-    Values,
-)
+from multidrop.simulator.program_events import BreakPoint, Debugging, Event, Recorder, Summary, Value, Values
+from multidrop.simulator.program_run import ProgramRun, Reader
 
 LAST_LINE = 999_999
 _NAMES = {f"V{n}": n for n in range(VARIABLES)}

@@ -14,7 +14,8 @@ from multidrop.families.tmcl.manual.program_file import Assembled
 from multidrop.families.tmcl.simulator.module import TmclModule, worlds_of
 from multidrop.families.tmcl.simulator.program import ALL_PORTS, USERS
 from multidrop.simulator.cell.spec import DriveSpec
-from multidrop.simulator.program_run import BreakPoint, Debugging, Event, ProgramRun, Reader, Recorder, Summary, Values
+from multidrop.simulator.program_events import BreakPoint, Debugging, Event, Recorder, Summary, Values
+from multidrop.simulator.program_run import ProgramRun, Reader
 
 _MOTIONS = frozenset({Command.ROR, Command.ROL, Command.MVP, Word.MVPA, Word.ROLA, Word.RORA})
 _SETS = frozenset({Command.SAP, Word.AAP})
