@@ -291,7 +291,7 @@ def _named(sent: str, received: str, printed: str) -> set[str] | None:
     for family in FAMILIES.values():
         if (replied := family.codec.replied(*raw)) is not None:
             return set() if replied else None
-    if printed not in received:
+    if printed not in received and printed not in received.replace("\n", ""):  # some drives ignore LF within a line
         return None
     if '"~"' in sent:  # the mark of a drive alone: a value may follow it
         return set()

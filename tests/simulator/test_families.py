@@ -180,6 +180,11 @@ def test_every_default_drive_of_a_program_test_is_of_its_family() -> None:
         assert programs.drive.personality in simulated()[name].personalities
 
 
+def test_a_check_knows_the_products_of_just_the_families_in_which_a_drive_refuses_more() -> None:
+    for name, programs in PROGRAMS.items():
+        assert programs.by_product == ("refusals" in vars(programs)), name
+
+
 def test_each_row_has_the_name_and_the_products_of_its_family() -> None:
     assert {name: family.name for name, family in FAMILIES.items()} == {name: name for name in simulated()}
     assert [name for name in BY_PERSONALITY if family_of(name) is FAMILIES["mcode"]] == list(MODELS)

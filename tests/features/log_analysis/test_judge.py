@@ -200,6 +200,15 @@ def test_a_reply_to_what_was_typed_before_the_log_began_is_not_judged(tmp_path: 
     assert found([*HEAD, typed("PR P"), *asked("V", "0"), printed], tmp_path) == [("credited", 6)]
 
 
+def test_a_line_feed_within_a_received_line_is_no_part_of_it(tmp_path: Path) -> None:
+    sent = {"kind": "sent", "bus": "l", "drive": "03", "text": "@03V1\r"}
+    received = {"kind": "received", "bus": "l", "drive": "03", "text": "97:2\n3082\r"}
+    printed = {"kind": "printed", "bus": "l", "drive": "03", "text": "97:23082"}
+    assert found([*HEAD, typed("V1", "03"), sent, received, printed], tmp_path) == []
+    other = {**printed, "text": "97:23083"}
+    assert found([*HEAD, typed("V1", "03"), sent, received, other], tmp_path) == [("credited", 6)]
+
+
 @pytest.mark.parametrize(("of", "breaches"), [("session", ["credited"]), ("part", [])])
 def test_a_reply_to_what_was_sent_before_the_log_began_is_not_judged(
     of: str, breaches: list[str], tmp_path: Path
