@@ -107,6 +107,7 @@ async def test_a_line_goes_on_with_what_the_search_found_of_its_adapter(tmp_path
         assert [*line.drives] == ["a"]
         assert desk.session.of(line).connection.local_echo is repeats
         assert (line.line.inbox.echo is not None) is repeats
+        assert "removes its own bytes" not in desk.told(), "the search has found that already"
 
 
 async def test_a_line_in_another_language_is_searched_too(tmp_path, monkeypatch):

@@ -380,3 +380,11 @@ def test_with_an_ack_to_come_no_number_of_prints_before_it_is_the_reply(em):
     found = codec.decode(request, prints + repeated + A + S[b"0"] + b"\r\n")
     assert found is not None
     assert (found.reply.lines, found.reply.end) == (("0",), End.DONE)
+
+
+@pytest.mark.parametrize("em", [1, 3])
+def test_with_an_ack_to_come_blank_lines_before_it_are_no_empty_reply_whatever_is_printed_after_them(em):
+    codec, request = asked(em, 0, 1, 'PR ""')
+    prints = 4 * (S[b"12"] + b"\r\n")
+    for count in range(3):
+        assert codec.decode(request, count * b"\r\n" + prints) is None, count
