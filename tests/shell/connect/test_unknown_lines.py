@@ -100,13 +100,20 @@ async def test_a_line_at_another_baud_rate_says_what_came_and_is_searched_with_n
 @pytest.mark.parametrize("repeats", [True, False])
 async def test_a_line_goes_on_with_what_the_search_found_of_its_adapter(tmp_path, monkeypatch, repeats):
     async with Desk(tmp_path, monkeypatch, ttyUSB9=bus("b", party("a"), baud=19200)) as desk:
-        desk.repeats = repeats
         (line,) = await desk.session.open(PORT)
+        desk.repeats = repeats  # another adapter is plugged in meanwhile
+        known = []
+
+        def told(event):
+            if isinstance(event, Notified) and "it is opened as" in event.text:
+                known.append(line.line.inbox.echo is not None)
+
+        desk.session.subscribe(told)
         await desk.session.run("/scan")
         await asyncio.sleep(3)
         assert [*line.drives] == ["a"]
         assert desk.session.of(line).connection.local_echo is repeats
-        assert (line.line.inbox.echo is not None) is repeats
+        assert known == [repeats], "before anything is written to it again"
         assert "removes its own bytes" not in desk.told(), "the search has found that already"
 
 
