@@ -150,6 +150,17 @@ def test_a_stop_fails_what_is_queued_and_in_flight_and_is_repeated_once_it_is_qu
     assert run.written == [(0.15, b"\x1b"), (0.25, b"PR V\r")]
 
 
+def test_a_print_long_after_a_stop_is_not_taken_for_the_reply_that_the_stop_cut_off():
+    line = Line(QUIETLY)
+    line.ask(request("PR P"))
+    line.events(0.0)
+    line.stop(0.01, StopPiece(b"\x1b"))
+    line.wrote(b"\x1b", 0.01)
+    line.ask(request("MR 1"))
+    run = LineRun(line, 5.0, {3.0: b"77\r\n"}, start=0.01)
+    assert [each for _, each in run.seen if isinstance(each, Unsolicited)] == [Unsolicited(3.0, ("77",))]
+
+
 def test_a_stop_knows_whether_a_line_was_half_sent():
     line = Line(QUIETLY, baud=9600)
     line.ask(request("MR 51200"))

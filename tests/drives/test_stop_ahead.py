@@ -156,3 +156,21 @@ def test_a_stop_that_follows_no_key_takes_nothing_over(desk: Desk) -> None:
     assert taken is not None and taken.pieces == taken.written == [] and desk.ahead._begun is begun
     desk.ahead.forget()
     assert desk.ahead.take(False) is None
+
+
+def test_a_key_that_goes_on_with_a_stop_keeps_all_of_its_own_pieces_and_none_that_are_no_longer_meant(
+    desk: Desk,
+) -> None:
+    made: list[Any] = []
+
+    def follow(make: Any, key: bool = False) -> bool:
+        made.append(make(0))
+        return True
+
+    desk.ahead._link.transport.follow = follow  # type: ignore[method-assign]
+    desk.line.only_stop, desk.line.transmitted = True, 4.0
+    desk.owed = [StopPiece(b"gone", 0.2)]
+    desk.ahead.press()
+    first, *others = FORMS.pieces
+    assert made == [first.data]
+    assert desk.ahead._begun is not None and desk.ahead._begun.pieces == others

@@ -281,6 +281,31 @@ async def test_what_a_port_cannot_do_is_one_clear_line(shop):
             await shop.session.run(line)
 
 
+@pytest.mark.parametrize(
+    ("typed", "what"), [("baud 19200", "the baud rate 19200"), ("dtr on", "DTR"), ("rts off", "RTS")]
+)
+async def test_a_setting_that_the_port_refuses_is_named_with_the_line_and_the_reason(shop, typed, what):
+    def refuses(value):
+        raise OSError(5, "Input/output error")
+
+    names = ("set_baud", "set_dtr", "set_rts", "set_break")
+    shop.session.buses["line"].link.transport.control = SimpleNamespace(**dict.fromkeys(names, refuses))
+    with pytest.raises(Diagnostic) as caught:
+        await shop.session.run(f"/raw {typed}")
+    assert str(caught.value) == f"line: the port does not take {what} (Input/output error); nothing was changed"
+
+
+@pytest.mark.parametrize("refused", [True, False])
+async def test_a_break_that_cannot_be_begun_or_ended_is_said_so(shop, refused):
+    def set_break(on):
+        if on is refused:
+            raise OSError(5, "Input/output error")
+
+    shop.session.buses["line"].link.transport.control = SimpleNamespace(set_break=set_break)
+    with pytest.raises(Diagnostic, match=r"the port does not take break \(Input/output error\)"):
+        await shop.session.run("/raw break")
+
+
 async def test_a_stop_drops_text_that_was_typed_before_it(shop):
     since = shop.session.stops
     shop.session.stop()

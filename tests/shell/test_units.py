@@ -189,6 +189,20 @@ async def test_lines_of_all_drives_need_one_scale_and_check_each_drive(tmp_path)
         assert not shop.written("line").count(b"MR")
 
 
+async def test_a_line_of_all_drives_is_not_sent_once_another_line_went_to_one_of_them(tmp_path):
+    async with opened(tmp_path, units={"a": "5 mm/turn", "b": "5 mm/turn"}) as shop:
+        shop.session.questions.agreed = True
+        everyone = shop.session.drive("line", "*")
+        line = await shop.session.units.line(everyone, "MR {1 mm}")
+        await run(shop, "@b VM=20000")
+        with pytest.raises(Differs, match="another line was sent meanwhile; 'MR 10240' was not sent"):
+            await everyone.send(line.text, line.check)
+        assert b"MR" not in shop.written("line")
+        line = await shop.session.units.line(everyone, "MR {1 mm}")
+        await everyone.send(line.text, line.check)
+        assert moves(shop)[-1] == "MR 10240"
+
+
 # What the scale rests on
 
 

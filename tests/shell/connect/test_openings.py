@@ -188,6 +188,14 @@ async def test_equal_names_are_given_in_the_order_of_the_urls_and_again_after_a_
     await floor.session.close()
 
 
+async def test_a_name_that_another_opening_took_meanwhile_is_not_given_twice(tmp_path):
+    floor = Floor(tmp_path, **{"a/x": 2.0, "b/x": 1.0, "c/x": 3.0})
+    await asyncio.gather(*(floor.session.open(url) for url in ("/a/x", "/b/x", "/c/x")))
+    assert sorted(floor.session.buses) == ["x", "x-2", "x-3"]
+    assert len({bus.name for bus in floor.buses.values()}) == 3
+    await floor.session.close()
+
+
 async def test_drives_that_do_not_reply_close_their_bus_only(tmp_path):
     floor, failures = Floor(tmp_path, mute=0.5, fast=0.5), []
 

@@ -37,6 +37,7 @@ class Desk:
         )
         self.asked: list[str] = []
         self.agrees = True
+        self.repeats = False
         self.session.front = Front(self.ask, screen=self.screen)
         self.events: list[Any] = []
         self.session.subscribe(self.events.append)
@@ -54,7 +55,7 @@ class Desk:
             raise Unreachable(f"{name}: no such port")
         rate = baud or connection.baud or FAMILIES[connection.hints.family or "mcode"].baud
         floor = self.floors[name]
-        pipe: Any = TunedPipe(floor, next(iter(floor.floor.wires)), rate, False)
+        pipe: Any = TunedPipe(floor, next(iter(floor.floor.wires)), rate, self.repeats)
         pipe.baud, pipe.port = rate, name
         self.pipes.append(pipe)
         return pipe
@@ -94,6 +95,26 @@ async def test_a_line_at_another_baud_rate_says_what_came_and_is_searched_with_n
         assert session.of(line).connection.baud == 19200 and line.line.baud == 19200
         assert "/keep ttyUSB9 saves that" in desk.told() and session.enter_alone() == ""
         assert session.selected.address == "a"
+
+
+@pytest.mark.parametrize("repeats", [True, False])
+async def test_a_line_goes_on_with_what_the_search_found_of_its_adapter(tmp_path, monkeypatch, repeats):
+    async with Desk(tmp_path, monkeypatch, ttyUSB9=bus("b", party("a"), baud=19200)) as desk:
+        (line,) = await desk.session.open(PORT)
+        desk.repeats = repeats  # another adapter is plugged in meanwhile
+        known = []
+
+        def told(event):
+            if isinstance(event, Notified) and "it is opened as" in event.text:
+                known.append(line.line.inbox.echo is not None)
+
+        desk.session.subscribe(told)
+        await desk.session.run("/scan")
+        await asyncio.sleep(3)
+        assert [*line.drives] == ["a"]
+        assert desk.session.of(line).connection.local_echo is repeats
+        assert known == [repeats], "before anything is written to it again"
+        assert "removes its own bytes" not in desk.told(), "the search has found that already"
 
 
 async def test_a_line_in_another_language_is_searched_too(tmp_path, monkeypatch):

@@ -52,3 +52,20 @@ async def test_a_machine_that_never_rests_is_collected_all_the_same_in_the_end()
         lost = await frozen_cycle()
         await asyncio.sleep(collector.LONGEST)
         assert lost() is None
+
+
+async def test_what_runs_each_second_visits_the_youngest_generations_only():
+    visited = []
+
+    def collects(phase, info):
+        if phase == "start":
+            visited.append(info["generation"])
+
+    gc.collect()  # no collection of the oldest is due by itself
+    with collected_at_rest(lambda: False):
+        gc.callbacks.append(collects)
+        try:
+            await asyncio.sleep(3.5 * collector.FREEZE)
+        finally:
+            gc.callbacks.remove(collects)
+    assert len(visited) >= 3 and max(visited) == 1

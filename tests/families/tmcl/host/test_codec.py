@@ -167,3 +167,18 @@ def test_a_reply_is_recognised_wherever_it_begins(before, after):
 @given(st.lists(st.sampled_from([b"PR VR", b"LMDCM 6.002, Hw: 3.2", b"\r\n", b"?", b">", b"100", b"dd"]), max_size=30))
 def test_text_is_taken_for_no_reply(words):
     assert not replies_in(b"".join(words))
+
+
+@pytest.mark.parametrize(
+    ("received", "replied"),
+    [
+        ("02 01 64 06 FF FF FC 18 7F", True),
+        ("00 02 01 64 06 FF FF FC 18 7F", True),
+        ("02 02 64 06 00 00 00 00 6E", None),
+        ("02 01 64 0A 00 00 00 05 76", None),
+        ("02 01 64 06 FF FF FC 18", None),
+        ("", None),
+    ],
+)
+def test_only_a_frame_with_the_address_and_the_command_of_a_request_shows_that_it_was_replied_to(received, replied):
+    assert CODEC.replied(CODEC.encode(asked("GAP 1, 0")), bytes.fromhex(received)) is replied

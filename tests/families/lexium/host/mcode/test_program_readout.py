@@ -226,3 +226,15 @@ def test_without_a_checksum_a_line_with_what_no_drive_lists_is_damaged(em, words
         return
     found = desk.run(MCodeFamily(state).programs.read((), lambda done, total: None), state)
     assert damaged and [line.text for line in found.lines] == ["LB G1", "MR 100", "E"]
+
+
+def test_two_lines_that_differ_in_a_long_program_of_lines_that_recur_are_two_differences():
+    state = MCodeState(MCode(), "", "!", "LMDCM")
+    body = [f"H {10 + number.bit_count() % 3}" for number in range(300)]
+    sent = program_file.read("\n".join(["PG 100", *body, "E", "PG"]), "x")
+    held, at = [], 100
+    for number, text in enumerate([*body, "E"]):
+        held.append(Stored(at, "H 99" if number in (2, 297) else text))
+        at += listings.size(text, "LMDCM")
+    found = MCodeFamily(state).programs.differences(sent, Held(tuple(held)), None)
+    assert [(each.here, each.there) for each in found] == [(body[2], "H 99"), (body[297], "H 99")]

@@ -369,3 +369,22 @@ def test_a_plain_print_is_read_at_once(buffer):
 @pytest.mark.parametrize("buffer", [b"", b"\r\n", b"51200", b"51200\r", b"\r\n\r\n5\r\n", b"5\r\n6\r\n", b"ten\r\n"])
 def test_anything_else_is_left_to_the_parser(buffer):
     assert short_reply(MCode(em=1).request("", "PR P"), buffer) is None
+
+
+@pytest.mark.parametrize("em", [1, 3])
+def test_with_an_ack_to_come_no_number_of_prints_before_it_is_the_reply(em):
+    codec, request = asked(em, 1, 1, "PR P")
+    prints = 4 * (S[b"12"] + b"\r\n")
+    assert codec.decode(request, prints) is None
+    repeated = S[b"aPR P"] if em == 3 else b""
+    found = codec.decode(request, prints + repeated + A + S[b"0"] + b"\r\n")
+    assert found is not None
+    assert (found.reply.lines, found.reply.end) == (("0",), End.DONE)
+
+
+@pytest.mark.parametrize("em", [1, 3])
+def test_with_an_ack_to_come_blank_lines_before_it_are_no_empty_reply_whatever_is_printed_after_them(em):
+    codec, request = asked(em, 0, 1, 'PR ""')
+    prints = 4 * (S[b"12"] + b"\r\n")
+    for count in range(3):
+        assert codec.decode(request, count * b"\r\n" + prints) is None, count
