@@ -169,7 +169,7 @@ def _of_an_opening(life: Lived, line: str, stop: Stop, left: bytes) -> bool:
     """Whether what left is the stop of a key that came as the line was being opened, with no drives known yet."""
     keys = [each for each in life.history.stops if stop.at - STILL <= each.at < stop.at and each.who == stop.who]
     opening = any(line not in each.forms and line not in each.lost for each in keys)
-    return opening and re.match(LANGUAGES[life.place(line[:2]).language].stop, left) is not None
+    return opening and re.search(LANGUAGES[life.place(line[:2]).language].stop, left) is not None
 
 
 def _is_stop(stop: Stop, line: str, left: bytes) -> bool:
