@@ -7,18 +7,19 @@ from typing import ClassVar
 from multidrop.dialects.certifying import Certifying
 from multidrop.dialects.codec import Codec, Priority, Procedure
 from multidrop.dialects.debugging import Debugging
-from multidrop.dialects.family import Family, Guard, Hints, Language, Motion, Printed, Programs, Referencing
+from multidrop.dialects.family import Guard, Hints, Language, Motion, Printed, Programs, Referencing
 from multidrop.dialects.motions import Motions
 from multidrop.dialects.scanning import Scan
 from multidrop.dialects.state import DriveState, Remembered
 from multidrop.dialects.units import Units
 from multidrop.dialects.values import Values
+from multidrop.families.lexium.host.family import LexiumFamily
 from multidrop.families.lexium.host.mcode import classify, operations
 from multidrop.families.lexium.host.mcode.codec import STOP_BYTES, MCode
 from multidrop.families.lexium.host.mcode.identify import identify, remember
 from multidrop.families.lexium.host.mcode.state import MCodeState
-from multidrop.families.lexium.manual import guards, help, points
-from multidrop.families.lexium.manual.guards import CYBER_SECURITY, NAMES
+from multidrop.families.lexium.manual import guards, help
+from multidrop.families.lexium.manual.guards import NAMES
 
 
 def guarded(state: MCodeState, text: str) -> Guard | None:
@@ -30,7 +31,7 @@ def homed(state: MCodeState) -> Procedure[bool]:
     return not (yield from operations.flag(state, "EF"))
 
 
-class MCodeFamily(Family):
+class MCodeFamily(LexiumFamily):
     """A Lexium MDrive or MDrivePlus on a serial line, or over MCode/TCP."""
 
     state: MCodeState
@@ -40,7 +41,6 @@ class MCodeFamily(Family):
     name = MCode.family
     codec = MCode()
     language: ClassVar[Language] = help
-    protection = CYBER_SECURITY
     repairs = True
     stop_bytes = STOP_BYTES
 
@@ -55,18 +55,6 @@ class MCodeFamily(Family):
 
     def guard(self, text: str) -> Guard | None:
         return guarded(self.state, text)
-
-    @classmethod
-    def word_of(cls, text: str) -> str:
-        return guards.word_of(text)
-
-    @classmethod
-    def only_ends(cls, text: str) -> bool:
-        return guards.only_ends(text)
-
-    @classmethod
-    def only_reads(cls, text: str) -> bool:
-        return guards.only_reads(text)
 
     def perform(self, text: str) -> Printed:
         return operations.perform(self.state, text)
@@ -91,22 +79,6 @@ class MCodeFamily(Family):
 
     def homed(self) -> Procedure[bool]:
         return homed(self.state)
-
-    @classmethod
-    def question(cls, word: str) -> str | None:
-        return f"PR {word}"
-
-    @classmethod
-    def move(cls, axis: str, distance: int | str) -> tuple[str, ...]:
-        return points.move(axis, distance)
-
-    @classmethod
-    def move_to(cls, axis: str, position: int | str) -> tuple[str, ...]:
-        return points.move_to(axis, position)
-
-    @classmethod
-    def assign(cls, word: str, value: str) -> str | None:
-        return points.assign(word, value)
 
     @property
     def programs(self) -> Programs:

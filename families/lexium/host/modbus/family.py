@@ -7,18 +7,19 @@ from typing import ClassVar
 
 from multidrop.dialects.certifying import Certifying
 from multidrop.dialects.codec import Codec, Priority, Procedure
-from multidrop.dialects.family import Family, Guard, Hints, Language, Motion, Printed, Referencing, Registers
+from multidrop.dialects.family import Guard, Hints, Language, Motion, Printed, Referencing, Registers
 from multidrop.dialects.motions import Motions
 from multidrop.dialects.state import DriveState
 from multidrop.dialects.units import Units
 from multidrop.dialects.values import Values
+from multidrop.families.lexium.host.family import LexiumFamily
 from multidrop.families.lexium.host.mcode import classify
 from multidrop.families.lexium.host.modbus import operations
 from multidrop.families.lexium.host.modbus.codec import USER, Modbus, ModbusState, pdu_codec
 from multidrop.families.lexium.host.modbus.mapping import lines_of
 from multidrop.families.lexium.host.modbus.operations import identify
-from multidrop.families.lexium.manual import grammar, guards, points
-from multidrop.families.lexium.manual.guards import CYBER_SECURITY, NAMES
+from multidrop.families.lexium.manual import grammar, guards
+from multidrop.families.lexium.manual.guards import NAMES
 from multidrop.families.lexium.manual.modbus import help
 from multidrop.families.lexium.manual.modbus.registers import ALTERNATIVE, REGISTERS
 
@@ -69,7 +70,7 @@ class ModbusRegisters(Registers):
         return operations.device(self.state)
 
 
-class ModbusFamily(Family):
+class ModbusFamily(LexiumFamily):
     """A Lexium Ethernet drive over Modbus/TCP, with the words of MCode."""
 
     state: ModbusState
@@ -80,7 +81,6 @@ class ModbusFamily(Family):
     codec = Modbus()
     language: ClassVar[Language] = help
     no_programs = f"programs are neither listed nor written over Modbus; {ALTERNATIVE} does both with the same drive"
-    protection = CYBER_SECURITY
 
     @classmethod
     def new_state(cls, codec: Codec, address: str) -> DriveState:
@@ -93,18 +93,6 @@ class ModbusFamily(Family):
 
     def guard(self, text: str) -> Guard | None:
         return guarded(self.state, text)
-
-    @classmethod
-    def word_of(cls, text: str) -> str:
-        return guards.word_of(text)
-
-    @classmethod
-    def only_ends(cls, text: str) -> bool:
-        return guards.only_ends(text)
-
-    @classmethod
-    def only_reads(cls, text: str) -> bool:
-        return guards.only_reads(text)
 
     def perform(self, text: str) -> Printed:
         return operations.perform(self.state, text)
@@ -129,22 +117,6 @@ class ModbusFamily(Family):
 
     def homed(self) -> Procedure[bool]:
         return homed(self.state)
-
-    @classmethod
-    def question(cls, word: str) -> str | None:
-        return f"PR {word}"
-
-    @classmethod
-    def move(cls, axis: str, distance: int | str) -> tuple[str, ...]:
-        return points.move(axis, distance)
-
-    @classmethod
-    def move_to(cls, axis: str, position: int | str) -> tuple[str, ...]:
-        return points.move_to(axis, position)
-
-    @classmethod
-    def assign(cls, word: str, value: str) -> str | None:
-        return points.assign(word, value)
 
     @property
     def registers(self) -> Registers | None:
