@@ -10,6 +10,7 @@ has are asked: an error could start a resident OE subroutine. (MCode reference 5
 from __future__ import annotations
 
 import re
+from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
@@ -132,25 +133,25 @@ def _whole(statement: Statement) -> int | None:
 # Before a motion, and at its end
 
 
-class LexiumMotions(Motions):
+class LexiumMotions(Motions, ABC):
     """How the motions of a Lexium drive begin and end. A protocol reads the words of MCode in its own way."""
 
+    @abstractmethod
     def read(self, words: Sequence[str]) -> Procedure[Mapping[str, int]]:
         """Read those of these words that the product has; nothing is cleared."""
-        raise NotImplementedError
 
+    @abstractmethod
     def error(self) -> Procedure[int | None]:
         """Read ER, which clears it; None: it could not be read."""
-        raise NotImplementedError
 
     def handles_errors(self) -> Procedure[bool]:
         """Whether the program in the drive has an OE routine."""
         return False
         yield  # a conversation
 
+    @abstractmethod
     def program_input(self) -> Procedure[bool]:
         """Whether an input is set up to start a program (type 4, 5.1.64)."""
-        raise NotImplementedError
 
     def carried(self, text: str) -> None:
         """Raise Inexpressible for a line that no frame can carry, before anything is asked for it."""
