@@ -427,10 +427,11 @@ class Drive:
     def start(self, procedure: Procedure[T], on_over: OnOver[T], typed: bool = False) -> Conversation[T]:
         state = self.state
         address, *_ = before = (state.address, state.programming, state.codec)
-        commanded = self._neighbours.conversation_begins(self)
+        commanded, replied = self._neighbours.conversation_begins(self), False
 
         def watch(transaction: Transaction) -> None:
-            nonlocal commanded
+            nonlocal commanded, replied
+            replied = transaction.replied
             self.requests += transaction.sent
             if transaction.request.kind not in ASKING:
                 commanded, self.commands = True, self.commands + transaction.sent
@@ -441,7 +442,7 @@ class Drive:
         def over(outcome: Outcome[T]) -> None:
             self._neighbours.conversation_ended(self, address, commanded or isinstance(outcome.error, Stopped))
             state, link = self.state, self.link
-            if isinstance(outcome.error, NoAnswer):
+            if isinstance(outcome.error, NoAnswer) and not replied:
                 self.missing = True
             elif self.missing and outcome.error is None and not state.programming:
                 self.missing = False
