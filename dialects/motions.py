@@ -62,6 +62,8 @@ class Move:
     """The distance, where the target counts from where the axis is when the line is executed."""
     endless: bool = False
     """Only a command or a fault ends it."""
+    group: frozenset[str] = frozenset()
+    """The axes that move together: a stop of one of them stops all."""
 
 
 @dataclass(frozen=True)
@@ -75,6 +77,8 @@ class Effect:
     """Axes whose positions or targets have another meaning after it, so that a target is not known any more."""
     halts: bool = False
     """It ends programs on purpose, and no motion that a line began."""
+    resumes: bool = False
+    """What a line has paused goes on."""
     frees: bool = False
     """It lets the drive move, or end a motion, by itself: a trip, jog inputs, a clock."""
     clears: bool = False
@@ -96,6 +100,7 @@ def joined(effects: Sequence[Effect]) -> Effect:
         frozenset(axis for each in effects for axis in each.ends),
         frozenset(axis for each in effects for axis in each.unknown),
         any(each.halts for each in effects),
+        any(each.resumes for each in effects),
         any(each.frees for each in effects),
         any(each.clears for each in effects),
     )

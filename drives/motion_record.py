@@ -15,6 +15,7 @@ from multidrop.dialects.motions import Effect, Ending, Evidence, Move, MoveKind,
 KEPT = 8
 """The most motions of one axis that are kept, each of another sequence."""
 NOT_OURS = "not by this script"
+NO_AXES = frozenset[str]()
 Sequence = object
 """A sequence, compared by identity."""
 
@@ -123,6 +124,9 @@ class MotionRecord:
         """Record what else a line does, which was not refused."""
         if effect.ends:
             self.stopped(by, effect.ends)
+        if effect.resumes:
+            for course in self._all():
+                course.stopped = course.stopped_by_other = False
         if effect.halts:
             self._note_stop(by, [each for each in self._all() if each.move.kind is MoveKind.PROGRAM])
         self.runs(effect.frees)
@@ -131,7 +135,8 @@ class MotionRecord:
 
     def stopped(self, by: Sequence | None, axes: frozenset[str] | None = None) -> None:
         """Record a stop of axes (None: all). `by` None: of the whole session, which no sequence outlives unasked."""
-        self._note_stop(by, self._all() if axes is None else self._open(axes))
+        together = frozenset(axis for each in self._open(axes or NO_AXES) for axis in each.move.group)
+        self._note_stop(by, self._all() if axes is None else self._open(axes | together))
 
     def _note_stop(self, by: Sequence | None, courses: Iterable[Course]) -> None:
         for course in courses:

@@ -60,8 +60,11 @@ def effect(state: PmxState, text: str) -> Effect:
 def _effect(line: str) -> Effect:
     if (found := PLACE.fullmatch(line)) is not None:
         targets = zip("xyxy", found.groups(), strict=True)
-        moves = [Move(MoveKind.POSITION, axis, relative=int(value)) for axis, value in targets if value is not None]
-        return Effect(begins=tuple(moves))
+        moves = {axis: int(value) for axis, value in targets if value is not None}
+        group = frozenset(moves)  # an interpolated move: a stop of one axis stops both (7.7)
+        return Effect(
+            begins=tuple(Move(MoveKind.POSITION, axis, relative=by, group=group) for axis, by in moves.items())
+        )
     if (found := FLYING.fullmatch(line)) is not None:
         return Effect(begins=(Move(MoveKind.POSITION, found[1].lower(), target=int(found[2])),))
     if (found := JOG.fullmatch(line)) is not None:

@@ -88,8 +88,8 @@ WITHOUT_TARGET = {"AS": (TORQUE,), "JE": (1,), "FL": (1,), "SC": (1,)}
 """Words that with one of these values start, or let inputs start, motion without a target."""
 CLEARED = {"ER", "ST"}
 """Words whose value is a sign of a failure, which a line clears that sets it."""
-REFERS = {"RS", "IP", "FD"}
-"""Words after which a target is not known any more: they go on with another one, or set what positions count."""
+REFERS = {"IP", "FD"}
+"""Words after which a target is not known any more: they set what positions count."""
 
 
 # What a line does
@@ -105,7 +105,9 @@ def effect(state: DriveState, text: str) -> Effect:
         absolute, relative = (value, None) if word == "MA" else (None, value)
         return Effect(begins=(Move(MoveKind.POSITION, AXIS, absolute, relative),))
     if word == "SL":
-        return Effect(ends=ONLY) if value == 0 else Effect(begins=(Move(MoveKind.VELOCITY, AXIS, endless=True),))
+        # A velocity that is not a number may be 0.
+        slew = Move(MoveKind.VELOCITY, AXIS, endless=value is not None)
+        return Effect(ends=ONLY) if value == 0 else Effect(begins=(slew,))
     if word in HOMINGS and statement.arguments:
         return Effect(begins=(Move(MoveKind.HOMING, AXIS),))
     if word in PROGRAMS:
@@ -114,6 +116,8 @@ def effect(state: DriveState, text: str) -> Effect:
         return Effect(begins=(Move(MoveKind.VELOCITY, AXIS),))
     if word == "PS":
         return Effect(ends=ONLY)
+    if word == "RS":  # what PS has paused goes on, perhaps to another target
+        return Effect(unknown=ONLY, resumes=True)
     if word == "E":  # a motion that is under way goes on (5.1.35)
         return Effect(halts=True)
     if word == "CF" or classify.written_word(text) in CLEARED:
