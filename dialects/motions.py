@@ -7,7 +7,7 @@ ended a motion, and whether that is a failure, is decided once for all families 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import Enum
 from types import MappingProxyType
 
@@ -120,6 +120,8 @@ class Evidence:
     """This session has stopped it since, so that an error of a line cut off by the stop says nothing of the motion."""
     program: bool = False
     """A program may have moved the axis since: one was started, or seen to run, right before it, too."""
+    alone: bool = False
+    """This host has sent the drive nothing but questions since, so that a setting is what it was before."""
 
 
 @dataclass(frozen=True)
@@ -134,6 +136,8 @@ class Ending:
     """In a few words, as after `a stopped at 1200 of 4000: `."""
     failed: bool = False
     """Set by the one who knows the sequences, not by the family."""
+    restart: str = ""
+    """The sign that the drive was restarted; empty: none."""
 
     def described(self, name: str) -> str:
         """In words: `a stopped at 1200 of 4000: stalled`."""
@@ -148,6 +152,11 @@ class Ending:
     @property
     def _verb(self) -> str:
         return "is at rest" if self.outcome is Outcome.REACHED else "stopped"
+
+
+def restarted(ending: Ending, sign: str) -> Ending:
+    """The end of a motion by a restart of its drive, and how that shows."""
+    return replace(ending, outcome=Outcome.POWER, reason=f"it was restarted ({sign})", restart=sign)
 
 
 class Motions(OfDrive):

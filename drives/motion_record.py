@@ -15,6 +15,7 @@ from multidrop.dialects.motions import Effect, Ending, Evidence, Move, MoveKind,
 KEPT = 8
 """The most motions of one axis that are kept, each of another sequence."""
 NOT_OURS = "not by this script"
+MAYBE_RESTARTED = "it gave no reply on the way and is at 0, so it may have been restarted"
 NO_AXES = frozenset[str]()
 Sequence = object
 """A sequence, compared by identity."""
@@ -31,9 +32,13 @@ class Course:
     """`DriveState.errors.count` as it began."""
     program: bool = False
     """A program was started since, or seen to run, or a line let the drive move by itself."""
+    commands: int = 0
+    """The number of commands that this host had sent to the drive before its line."""
     stopped: bool = False
     """Its own sequence has stopped it."""
     stopped_by_other: bool = False
+    missed: bool = False
+    """The drive gave no reply to something since."""
     restarted: bool = False
     """The drive was restarted since, which ends every motion."""
     replaced: Move | None = None
@@ -45,8 +50,10 @@ class Course:
     def open(self) -> bool:
         return self.ending is None
 
-    def evidence(self, errors: tuple[int, ...]) -> Evidence:
-        return Evidence(self.move, self.before, errors, self.stopped or self.stopped_by_other, self.program)
+    def evidence(self, errors: tuple[int, ...], commands: int) -> Evidence:
+        """What is known. `errors`: those read since; `commands`: sent to the drive so far, that of its line included."""
+        stopped, alone = self.stopped or self.stopped_by_other, commands <= self.commands + 1
+        return Evidence(self.move, self.before, errors, stopped, self.program, alone)
 
     @property
     def cut_off(self) -> Ending | None:
@@ -61,6 +68,8 @@ class Course:
 
     def _decided(self, found: Ending) -> Ending:
         short = found.outcome is Outcome.STOPPED
+        if self.missed and found.position == 0 and found.outcome is Outcome.REACHED and not self.move.target:
+            return replace(found, outcome=Outcome.UNKNOWN, reason=MAYBE_RESTARTED, failed=True)
         if not short and found.outcome is not Outcome.REACHED:
             return replace(found, failed=True)
         if self.stopped:
@@ -143,6 +152,11 @@ class MotionRecord:
             if course.open:
                 course.stopped = course.stopped or by is None or course.by is by
                 course.stopped_by_other = course.stopped_by_other or not (by is None or course.by is by)
+
+    def missed(self) -> None:
+        """Record that the drive gave no reply."""
+        for course in self._all():
+            course.missed = course.missed or course.open
 
     def restarted(self) -> None:
         """Record a sign of a restart."""

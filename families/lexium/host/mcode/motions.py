@@ -16,7 +16,7 @@ from dataclasses import replace
 
 from multidrop.base.errors import DriveError
 from multidrop.dialects.codec import Procedure
-from multidrop.dialects.motions import NOTHING, Effect, Ending, Evidence, Motions, Move, MoveKind, Outcome, Signs
+from multidrop.dialects.motions import NOTHING, Effect, Ending, Evidence, Motions, Move, MoveKind, Outcome, Signs, restarted
 from multidrop.dialects.state import DriveState, who
 from multidrop.dialects.values import Value
 from multidrop.families.lexium.host.mcode import classify, exchange, operations
@@ -33,7 +33,9 @@ from multidrop.families.lexium.manual.table import lookup
 
 AXIS = ""
 ONLY = frozenset({AXIS})
-SIGNS = ("EF", "MV", "BY", "ST", "P", "AF", "TE")
+LOST = "VM"
+"""A setting that a power-up sets to what was saved last, often another value."""
+SIGNS = ("EF", "MV", "BY", "ST", "P", "AF", "TE", LOST)
 """What is read before a motion."""
 END = ("EF", "BY", "MP", "ST", "EE", "P", "DB", "AF", "AS")
 """What is read at its end."""
@@ -198,6 +200,10 @@ class LexiumMotions(Motions, ABC):
         found = yield from self.read(END)
         before, move, position = evidence.before, evidence.move, found.get("P")
         ending = Ending(Outcome.REACHED, AXIS, position)
+        if position == 0 and evidence.alone and not evidence.program and LOST in before:
+            speed = (yield from self.read((LOST,))).get(LOST, before[LOST])
+            if speed != before[LOST]:
+                return restarted(ending, f"{LOST} {before[LOST]} before, {speed} now")
         if move is None:
             seen = _seen(found, before, ending)
             return None if seen is ending and (yield from self._makes_up(found)) else seen
