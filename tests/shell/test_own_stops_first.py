@@ -4,9 +4,9 @@ import asyncio
 
 import pytest
 
-from multidrop.base.errors import DriveError
+from multidrop.base.errors import DriveError, Refused
 from tests.shell.test_refused import ROUTINE, press, sent, stops, typed
-from tests.support.cell_session import CellSession
+from tests.support.cell_session import CellSession, bus, drive, pmx
 
 pytestmark = pytest.mark.virtual
 
@@ -42,3 +42,24 @@ async def test_a_print_that_starts_a_routine_for_errors_leaves_nothing_moving(em
         await asyncio.sleep(1)
         assert shop.moving() == {"press:b"}
         assert "a: its OE routine may have started" in shop.warned() and stops(shop)
+
+
+AXES = {
+    "a controller": (bus("line", pmx("00"), pmx("01")), "00", ("JY+", "JX+", "STATUS"), "00 X"),
+    "a module": (bus("line", drive("TMCM-3110", "1")), "1", ("ROR 1, 500", "ROR 0, 500", "MVP ABS, 9, 5"), "1 motor 0"),
+}
+
+
+@pytest.mark.parametrize(("cell", "name", "lines", "said"), AXES.values(), ids=AXES)
+async def test_a_stop_of_one_axis_claims_nothing_of_another_that_moves_on(cell, name, lines, said, tmp_path):
+    by_hand, started, refused = (f"@line:{name} {line}" for line in lines)
+    async with CellSession(tmp_path, cell) as shop:
+        await shop.session.run(by_hand)
+        shop.events.clear()
+        with pytest.raises(Refused):
+            await sent(shop.session, started, "/sleep 1", refused)
+        await asyncio.sleep(1)
+        assert shop.moving() == {f"line:{name}"}
+        assert shop.warned()[-1] == f"stopped {said}: velocity 0 was read from {said}"
+        (stopped,) = [text for text in shop.told() if ": stopped, velocity 0 at " in text]
+        assert stopped.startswith(f"line: {said}: ") and "," not in stopped.partition("velocity")[2]

@@ -14,7 +14,18 @@ from dataclasses import replace
 
 from multidrop.dialects.codec import Procedure
 from multidrop.dialects.family import ADDRESSES
-from multidrop.dialects.motions import NOTHING, Effect, Ending, Evidence, Motions, Move, MoveKind, Outcome, Signs, restarted
+from multidrop.dialects.motions import (
+    NOTHING,
+    Effect,
+    Ending,
+    Evidence,
+    Motions,
+    Move,
+    MoveKind,
+    Outcome,
+    Signs,
+    restarted,
+)
 from multidrop.dialects.state import who
 from multidrop.families.pmx.host.codec import PmxState
 from multidrop.families.pmx.host.operations import PROGRAMS, number

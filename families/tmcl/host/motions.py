@@ -16,7 +16,18 @@ from dataclasses import replace
 
 from multidrop.base.errors import Refused
 from multidrop.dialects.codec import Procedure
-from multidrop.dialects.motions import NOTHING, Effect, Ending, Evidence, Motions, Move, MoveKind, Outcome, Signs, restarted
+from multidrop.dialects.motions import (
+    NOTHING,
+    Effect,
+    Ending,
+    Evidence,
+    Motions,
+    Move,
+    MoveKind,
+    Outcome,
+    Signs,
+    restarted,
+)
 from multidrop.families.tmcl.host.codec import MOST_MOTORS, TmclState
 from multidrop.families.tmcl.host.operations import busy, motors, read
 from multidrop.families.tmcl.manual import commands

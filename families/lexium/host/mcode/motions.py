@@ -16,7 +16,18 @@ from dataclasses import replace
 
 from multidrop.base.errors import DriveError
 from multidrop.dialects.codec import Procedure
-from multidrop.dialects.motions import NOTHING, Effect, Ending, Evidence, Motions, Move, MoveKind, Outcome, Signs, restarted
+from multidrop.dialects.motions import (
+    NOTHING,
+    Effect,
+    Ending,
+    Evidence,
+    Motions,
+    Move,
+    MoveKind,
+    Outcome,
+    Signs,
+    restarted,
+)
 from multidrop.dialects.state import DriveState, who
 from multidrop.dialects.values import Value
 from multidrop.families.lexium.host.mcode import classify, exchange, operations
