@@ -51,7 +51,7 @@ class Course:
         return self.ending is None
 
     def evidence(self, errors: tuple[int, ...], commands: int) -> Evidence:
-        """What is known. `errors`: those read since; `commands`: sent to the drive so far, that of its line included."""
+        """What is known. `errors`: read since; `commands`: sent to the drive so far, that of its line included."""
         stopped, alone = self.stopped or self.stopped_by_other, commands <= self.commands + 1
         return Evidence(self.move, self.before, errors, stopped, self.program, alone)
 

@@ -1,4 +1,4 @@
-"""Which stops are the script's own: of axes that move together, of a value in a register, after a pause, in raw mode."""
+"""Which stops are the script's own: of common moves, of values in registers, after a pause, in raw mode."""
 
 from __future__ import annotations
 
