@@ -36,7 +36,8 @@ GROUPED = (
     ("mcode", "MR 51'200 ' far"), ("mcode", "MR 51'200'000"), ("mcode", "MR 51'200\\ far"), ("mcode", "R1=R2+51'200"),
     ("mcode", "MR51'200"), ("mcode", "MR 51'200.5"), ("mcode", "\tMR 51`200\t"),
     ("mcode", "MA 51'200,1"), ("mcode", "R1=51'200*R2"), ("mcode", "MA 51'200 , 1"), ("mcode", "MR 51'200mm"),
-    ("pmx", "X51;200"), ("pmx", "X51;200Y5"), ("pmx", "V1=51;200;300"), ("pmx", "V1=51;200+V2"), ("tmcl", "MVP ABS, 0, 51;200"), ("tmcl", "Far = 51;200"),
+    ("pmx", "X51;200"), ("pmx", "X51;200Y5"), ("pmx", "V1=51;200;300"), ("pmx", "V1=51;200+V2"),
+    ("tmcl", "MVP ABS, 0, 51;200"), ("tmcl", "Far = 51;200"),
 )  # fmt: skip
 
 
