@@ -93,7 +93,7 @@ class Halt:
     def part_of(self, drive: Drive) -> str:
         """The axes of a drive that it stops, in words behind its name, ` X` or ` motor 1`; empty: all of them."""
         axes = self.started[drive].axes if self.spares_programs(drive) else None
-        known = drive.family.units.axes()
+        known = () if axes is None else drive.family.units.axes()
         if axes is None or axes.issuperset(known) or known == [""]:
             return ""
         return "".join(f" {'motor ' * each.isdigit()}{each.upper()}" for each in known if each in axes)

@@ -74,7 +74,7 @@ def _effect(line: str) -> Effect:
     if (found := PLACE.fullmatch(line)) is not None:
         targets = zip("xyxy", found.groups(), strict=True)
         moves = {axis: int(value) for axis, value in targets if value is not None}
-        group = frozenset(moves)  # an interpolated move: a stop of one axis stops both (7.7)
+        group = frozenset(moves if len(moves) > 1 else ())  # an interpolated move: a stop of one axis stops both (7.7)
         return Effect(
             begins=tuple(Move(MoveKind.POSITION, axis, relative=by, group=group) for axis, by in moves.items())
         )
