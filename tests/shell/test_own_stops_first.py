@@ -63,3 +63,18 @@ async def test_a_stop_of_one_axis_claims_nothing_of_another_that_moves_on(cell, 
         assert shop.warned()[-1] == f"stopped {said}: velocity 0 was read from {said}"
         (stopped,) = [text for text in shop.told() if ": stopped, velocity 0 at " in text]
         assert stopped.startswith(f"line: {said}: ") and "," not in stopped.partition("velocity")[2]
+
+
+async def test_a_drive_at_rest_with_trips_that_a_person_has_enabled_is_stopped(tmp_path):
+    """A trip can move it again, whoever enabled that."""
+    async with CellSession(tmp_path, press()) as shop:
+        await typed(shop.session, *(f"@press:c {line}" for line in (*ROUTINE[:-1], "TI 1,OO", "TE=1")))
+        lines = ("@press:c MR 100", "/wait stopped", "@press:b STATUS")
+        with pytest.raises(Refused):
+            await sent(shop.session, *lines)
+        assert stops(shop)
+        await typed(shop.session, "@press:c TE=0")
+        shop.events.clear()
+        with pytest.raises(Refused):
+            await sent(shop.session, *lines)
+        assert not stops(shop)
