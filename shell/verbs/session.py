@@ -10,7 +10,7 @@ from typing import NamedTuple
 from multidrop.base.errors import Diagnostic, Stopped
 from multidrop.base.new_file import STANDARD_OUTPUT
 from multidrop.dialects.families import DEFAULT, FAMILIES, languages, program_languages
-from multidrop.dialects.family import Language
+from multidrop.dialects.language import Language
 from multidrop.dialects.motions import Outcome
 from multidrop.shell import configuration, stop_report, waits
 from multidrop.shell.events import By
