@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from multidrop.base import registry
 from multidrop.base.errors import Diagnostic
 from multidrop.base.feature import Kinds
-from multidrop.base.isolation import at_once
 from multidrop.shell.operations.operation import TYPE_RAISES, Examples
 
 if TYPE_CHECKING:
@@ -139,6 +138,7 @@ def begin(session: Session) -> list[str]:
 
     Return a warning for each that cannot be loaded or cannot begin; the others and the session go on.
     """
+    from multidrop.base.isolation import at_once
     from multidrop.shell.operations.table import load_others
 
     warnings = load_others()
