@@ -1,10 +1,10 @@
 """Typed lines on their way to the session: in order, each sent when the line before it is answered, as in a paste.
 
 Lines wait in lanes. A line joins the lane of the line before it if no answer can have been read in between. That
-holds in two cases. Less than half a second lies between their Enters, or the second Enter had come before the first was
-taken (a burst: a paste without brackets, a script at the terminal). Or the line is text for a bus on which a typed line is not answered yet. Any other line runs at once,
-whatever else runs. So a person who asks for a position during `/wait` gets an answer, and lines of one burst never
-overtake each other.
+holds in three cases. Less than half a second lies between their Enters, or the second Enter had come before the first
+was taken (a burst: a paste without brackets, a script at the terminal). Or the line is text for a bus on which a typed
+line is not answered yet. Any other line runs at once, whatever else runs. So a person who asks for a position during
+`/wait` gets an answer, and lines of one burst never overtake each other.
 
 A line that fails holds the rest of its lane and of its burst: these lines are shown and not sent. A stop drops all
 lines that wait. A line is for the drive that was selected at its Enter.
