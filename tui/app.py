@@ -207,12 +207,13 @@ class MultidropApp(Dressed):
 
     def _receive(self, event: SessionEvent) -> None:
         self._inbox.append(event)
+        stopped, self._stops = self.session.stops != self._stops, self.session.stops
+        if stopped:  # first: a defect in what is shown must not leave it for a later event, with what was typed since
+            self._drop_typed()
         if not self.model.quiet(event):
             self.frames.wake(panels=not (isinstance(event, OnBus) and isinstance(event.event, Unsolicited)))
-        if self.session.stops != self._stops:
-            self._stops = self.session.stops
+        if stopped:
             self.model.stopped(self.session.now())
-            self._drop_typed()
         elif isinstance(event, StateChanged) and self.selection.changed:
             self.selection.expect(self.outbox.using(self.selection.shown))
             self.call_later(self.selection.catch_up)
