@@ -295,7 +295,7 @@ class Stopping:
                 return  # a later stop of the whole link confirms it, by what is read after that
             for drive, each in found.items():  # whether this reading or a poll after it has confirmed that
                 if each.places and each.none and halt.fate(drive) is Fate.STANDING:
-                    link.notify(f"{drive.shown}: stopped, velocity 0 at {each.places}")
+                    link.notify(f"{drive.shown}{halt.part_of(drive)}: stopped, velocity 0 at {each.places}")
             active = {drive: each for drive, each in found.items() if not each.none and not halt.started_since(drive)}
             slow_down = all(each.lessens(before.get(drive), halt.single) for drive, each in active.items())
             before = found
