@@ -30,7 +30,7 @@ from multidrop.dialects.state import DriveState, who
 from multidrop.dialects.units import Units
 from multidrop.dialects.values import Values
 from multidrop.families.pmx.host.codec import FACTORY, STOP_BYTES, Pmx, PmxState
-from multidrop.families.pmx.host.operations import SEARCH, PmxOperations, find
+from multidrop.families.pmx.host.operations import SEARCH, PmxCertifying, PmxOperations, find
 from multidrop.families.pmx.manual import help
 from multidrop.families.pmx.manual.table import head, lookup, reads, starts_motion
 
@@ -159,8 +159,6 @@ class PmxFamily(PmxOperations, Family):
 
     @property
     def certifying(self) -> Certifying:
-        from multidrop.families.pmx.host.operations import PmxCertifying
-
         return PmxCertifying(self.state)
 
     @property

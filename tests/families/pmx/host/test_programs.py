@@ -149,4 +149,7 @@ def test_a_line_that_was_not_kept_names_its_line_of_the_file() -> None:
 def test_a_controller_without_a_program_says_so() -> None:
     with pytest.raises(Refused, match="00 holds no program"):
         held(programs.PmxPrograms(PmxState(Pmx(), "00")).upload(False), Far())
-    assert PmxPrograms(PmxState(Pmx(), "00")).readable(held(PmxPrograms(PmxState(Pmx(), "00")).read((), nothing), Far())) == ()
+    assert (
+        PmxPrograms(PmxState(Pmx(), "00")).readable(held(PmxPrograms(PmxState(Pmx(), "00")).read((), nothing), Far()))
+        == ()
+    )
