@@ -86,9 +86,6 @@ REFERS = {"RS", "IP", "FD"}
 """Words after which a target is not known any more: they go on with another one, or set what positions count."""
 
 
-# What a line does
-
-
 def effect(state: DriveState, text: str) -> Effect:
     """What a typed line of MCode does to the motion of its drive."""
     statement = parsed(text)
@@ -122,9 +119,6 @@ def effect(state: DriveState, text: str) -> Effect:
 def _whole(statement: Statement) -> int | None:
     first = statement.arguments[0] if statement.arguments else None
     return int(first.value) if isinstance(first, Number) and first.value == int(first.value) else None
-
-
-# Before a motion, and at its end
 
 
 class LexiumMotions(Motions, ABC):
