@@ -20,7 +20,8 @@ from multidrop.base.on_demand import imported
 if TYPE_CHECKING:
     from _typeshed import SupportsWrite
 
-    from multidrop.shell.operations.operation import Operation
+    from multidrop.shell.operations import typed
+    from multidrop.shell.operations.table import AnyCommand
 
 URLS = """A URL is {}; sim: alone is the demo cell. Keys after a ?: dialect, drives=a,b,c, baud,
 party=0|1, checksum=0|1|2, em=0..3, echo=local, address=none, timeout=SECONDS, relay=multidrop|socat."""
@@ -59,7 +60,7 @@ def _columns() -> int:
 class Parser(argparse.ArgumentParser):
     """An argument parser that reports wrong usage in one line, and adds a command's arguments when it parses them."""
 
-    operation: Operation | None = None
+    operation: AnyCommand | None = None
     """None: the parser of all commands."""
     complete = True
     """False until the arguments of the command have been added."""
@@ -76,13 +77,17 @@ class Parser(argparse.ArgumentParser):
         if self.operation is None or self.complete:
             return
         from multidrop.shell.hooks import with_options
+        from multidrop.shell.operations import typed
         from multidrop.shell.operations.operation import add_arguments
         from multidrop.shell.operations.table import COMMANDS
 
         self.complete = True
         own = COMMANDS.parts(self.operation.command)
         named = given[:1] and given[0] in own
-        if self.operation.run and not named:
+        if isinstance(self.operation, typed.Operation):
+            if self.operation.run and not named:
+                self._add_own(self.operation)
+        elif self.operation.run and not named:
             _check_options(self.operation.command, given)
             arguments = with_options(self.operation.command, self.operation.arguments)
             if _unknown(given, arguments):
@@ -94,8 +99,13 @@ class Parser(argparse.ArgumentParser):
         if own and (named or not self.operation.run):
             self.add_commands(own, given, "|".join(own), required=True)
 
+    def _add_own(self, operation: typed.Operation) -> None:
+        operation.add_to(self)
+        _add_no_config(self)
+        self.set_defaults(run_by=operation, command=operation.command)
+
     def add_commands(
-        self, commands: Mapping[str, Operation], given: Sequence[str], metavar: str, *, required: bool
+        self, commands: Mapping[str, AnyCommand], given: Sequence[str], metavar: str, *, required: bool
     ) -> None:
         """Add the commands, or only the one that the first word names."""
         added = self.add_subparsers(prog=self.prog, metavar=metavar, required=required, parser_class=Parser)
@@ -171,7 +181,7 @@ def _warn(warnings: Sequence[str]) -> None:
         write(sys.stderr, *(f"warning: {each}" for each in warnings))
 
 
-def _the_one(name: str, commands: Mapping[str, Operation]) -> Mapping[str, Operation]:
+def _the_one(name: str, commands: Mapping[str, AnyCommand]) -> Mapping[str, AnyCommand]:
     """The command that a line asks for. Raises SystemExit where its feature is not there."""
     from multidrop.base.errors import Diagnostic
     from multidrop.shell.streams.stdout import fail
@@ -260,7 +270,7 @@ def urls() -> str:
     return URLS.format(sentence())
 
 
-def _epilog(operation: Operation) -> str:
+def _epilog(operation: AnyCommand) -> str:
     import textwrap
 
     from multidrop.shell.hooks import examples
@@ -275,6 +285,6 @@ def _epilog(operation: Operation) -> str:
         lines = ["also:", *(f"  {each.command:<15} {each.meaning}" for each in own.values()), "", *lines]
     if operation.own_urls:
         lines += ["", *textwrap.wrap(operation.own_urls, WIDTH, break_on_hyphens=False, break_long_words=False)]
-    elif operation.urls or "URL" in str([*operation.arguments.items()]):
+    elif operation.takes_urls:
         lines += ["", *textwrap.wrap(urls(), WIDTH, break_on_hyphens=False, break_long_words=False)]
     return "\n".join(lines)

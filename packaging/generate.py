@@ -40,10 +40,10 @@ VALUES = {
     "URL2": "url",
     "PORT-OR-URL": "url",
     "ADDR": "drive",
-    "NAME": "macro",
-    "NAME|off": "macro",
+    "MACRO": "macro",
+    "MACRO|off": "macro",
 }
-"""What is listed for a metavar; NAME in the commands on macros only."""
+"""What is listed for a metavar."""
 
 # Connections, ports and simulated buses; drives of saved connections; macros: listed without a start of Python.
 BEGINNINGS = " ".join(
@@ -256,7 +256,7 @@ def completion(shell: str) -> str:
     for action, command in actions(parser):
         kind = VALUES.get(action.metavar) if isinstance(action.metavar, str) else None
         kind = command.split()[1] if kind == "url" and command.split()[1] in PARTS else kind
-        if kind and (kind != "macro" or " macro " in command):
+        if kind:
             name = f"_multidrop_{kind}"
             action.complete = {**dict.fromkeys(FILES, name), "fish": f"({name})"}  # type: ignore[attr-defined]
         elif isinstance(action.metavar, str) and PATH.match(action.metavar):

@@ -284,7 +284,7 @@ complete -c multidrop -n '_shtab_multidrop_using macro list' -l no-config -d 're
 complete -c multidrop -n '_shtab_multidrop_using macro; and test $_shtab_multidrop_npos -eq 0' -a show -d 'Print a macro'"'"'s file.'
 complete -c multidrop -n '_shtab_multidrop_using macro show' -s h -l help -d 'show this help message and exit'
 complete -c multidrop -n '_shtab_multidrop_using macro show' -l no-config -d 'read no configuration file'
-complete -c multidrop -n '_shtab_multidrop_using macro show; and test $_shtab_multidrop_npos -eq 0' -ka "(_multidrop_macro)" -d NAME
+complete -c multidrop -n '_shtab_multidrop_using macro show; and test $_shtab_multidrop_npos -eq 0' -ka "(_multidrop_macro)" -d MACRO
 complete -c multidrop -n '_shtab_multidrop_using macro; and test $_shtab_multidrop_npos -eq 0' -a play -d 'Play a macro: once, several rounds, or until it is interrupted.'
 complete -c multidrop -n '_shtab_multidrop_using macro play' -s h -l help -d 'show this help message and exit'
 complete -c multidrop -n '_shtab_multidrop_using macro play' -l on -xka "(_multidrop_url)" -d 'what to open; may be repeated'
@@ -297,29 +297,29 @@ complete -c multidrop -n '_shtab_multidrop_using macro play' -l junit -xka "(__f
 complete -c multidrop -n '_shtab_multidrop_using macro play' -l yes -d 'answer every question with yes beforehand'
 complete -c multidrop -n '_shtab_multidrop_using macro play' -l beyond -d 'let moves leave the travel of their axis, which --yes does not'
 complete -c multidrop -n '_shtab_multidrop_using macro play' -l no-config -d 'read no configuration file'
-complete -c multidrop -n '_shtab_multidrop_using macro play; and test $_shtab_multidrop_npos -eq 0' -ka "(_multidrop_macro)" -d NAME
+complete -c multidrop -n '_shtab_multidrop_using macro play; and test $_shtab_multidrop_npos -eq 0' -ka "(_multidrop_macro)" -d MACRO
 complete -c multidrop -n '_shtab_multidrop_using macro; and test $_shtab_multidrop_npos -eq 0' -a edit -d 'Open a macro'"'"'s file in the editor of VISUAL or EDITOR; it changes only once the whole text is right.'
 complete -c multidrop -n '_shtab_multidrop_using macro edit' -s h -l help -d 'show this help message and exit'
 complete -c multidrop -n '_shtab_multidrop_using macro edit' -l no-config -d 'read no configuration file'
-complete -c multidrop -n '_shtab_multidrop_using macro edit; and test $_shtab_multidrop_npos -eq 0' -ka "(_multidrop_macro)" -d NAME
+complete -c multidrop -n '_shtab_multidrop_using macro edit; and test $_shtab_multidrop_npos -eq 0' -ka "(_multidrop_macro)" -d MACRO
 complete -c multidrop -n '_shtab_multidrop_using macro; and test $_shtab_multidrop_npos -eq 0' -a describe -d 'Change a macro'"'"'s note.'
 complete -c multidrop -n '_shtab_multidrop_using macro describe' -s h -l help -d 'show this help message and exit'
 complete -c multidrop -n '_shtab_multidrop_using macro describe' -l no-config -d 'read no configuration file'
-complete -c multidrop -n '_shtab_multidrop_using macro describe; and test $_shtab_multidrop_npos -eq 0' -ka "(_multidrop_macro)" -d NAME
+complete -c multidrop -n '_shtab_multidrop_using macro describe; and test $_shtab_multidrop_npos -eq 0' -ka "(_multidrop_macro)" -d MACRO
 complete -c multidrop -n '_shtab_multidrop_using macro; and test $_shtab_multidrop_npos -eq 0' -a rename -d 'Give a macro another name.'
 complete -c multidrop -n '_shtab_multidrop_using macro rename' -s h -l help -d 'show this help message and exit'
 complete -c multidrop -n '_shtab_multidrop_using macro rename' -l no-config -d 'read no configuration file'
-complete -c multidrop -n '_shtab_multidrop_using macro rename; and test $_shtab_multidrop_npos -eq 0' -ka "(_multidrop_macro)" -d NAME
+complete -c multidrop -n '_shtab_multidrop_using macro rename; and test $_shtab_multidrop_npos -eq 0' -ka "(_multidrop_macro)" -d MACRO
 complete -c multidrop -n '_shtab_multidrop_using macro; and test $_shtab_multidrop_npos -eq 0' -a copy -d 'Copy a macro; --project: into the folder macros of the current folder.'
 complete -c multidrop -n '_shtab_multidrop_using macro copy' -s h -l help -d 'show this help message and exit'
 complete -c multidrop -n '_shtab_multidrop_using macro copy' -l project -d 'into the folder macros of the current folder'
 complete -c multidrop -n '_shtab_multidrop_using macro copy' -l no-config -d 'read no configuration file'
-complete -c multidrop -n '_shtab_multidrop_using macro copy; and test $_shtab_multidrop_npos -eq 0' -ka "(_multidrop_macro)" -d NAME
+complete -c multidrop -n '_shtab_multidrop_using macro copy; and test $_shtab_multidrop_npos -eq 0' -ka "(_multidrop_macro)" -d MACRO
 complete -c multidrop -n '_shtab_multidrop_using macro; and test $_shtab_multidrop_npos -eq 0' -a delete -d 'Delete a macro; asks first.'
 complete -c multidrop -n '_shtab_multidrop_using macro delete' -s h -l help -d 'show this help message and exit'
 complete -c multidrop -n '_shtab_multidrop_using macro delete' -l yes -d 'answer every question with yes beforehand'
 complete -c multidrop -n '_shtab_multidrop_using macro delete' -l no-config -d 'read no configuration file'
-complete -c multidrop -n '_shtab_multidrop_using macro delete; and test $_shtab_multidrop_npos -eq 0' -ka "(_multidrop_macro)" -d NAME
+complete -c multidrop -n '_shtab_multidrop_using macro delete; and test $_shtab_multidrop_npos -eq 0' -ka "(_multidrop_macro)" -d MACRO
 complete -c multidrop -n '_shtab_multidrop_using macro; and test $_shtab_multidrop_npos -eq 0' -a key -d 'Put a macro on a function key, or free the key.'
 complete -c multidrop -n '_shtab_multidrop_using macro key' -s h -l help -d 'show this help message and exit'
 complete -c multidrop -n '_shtab_multidrop_using macro key' -l page -x -d 'a number or a word (default: 1)'

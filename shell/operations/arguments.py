@@ -6,7 +6,7 @@ A type makes a value of a text, or raises argparse's one line of error.
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from multidrop.base.text import real
@@ -35,6 +35,16 @@ class Once(argparse.Action):
         setattr(chosen, self.dest, values)
 
 
+class OnceFlag(Once):
+    """Keeps that an option without a value was given, which a line may do once."""
+
+    def __init__(self, option_strings: Sequence[str], dest: str, help: str | None = None) -> None:
+        super().__init__(option_strings, dest, nargs=0, default=False, help=help)
+
+    def __call__(self, parser: object, chosen: argparse.Namespace, values: object, option: object = None) -> None:
+        super().__call__(parser, chosen, True, option)
+
+
 class Each(argparse.Action):
     """Gathers the values of an option that is repeated; of `NAME=VALUE` each name is given once."""
 
@@ -43,6 +53,17 @@ class Each(argparse.Action):
         if isinstance(values, tuple) and any(values[0] == name for name, *_ in before):
             raise argparse.ArgumentError(self, f"{values[0]} is given twice")
         setattr(chosen, self.dest, [*before, values])
+
+
+class Named(argparse.Action):
+    """Keeps words `NAME=VALUE`, of which each name is given once."""
+
+    def __call__(self, parser: object, chosen: argparse.Namespace, values: Any, option: object = None) -> None:
+        names = [name for name, _ in values]
+        for name in names:
+            if names.count(name) > 1:
+                raise argparse.ArgumentError(self, f"{name} is given twice")
+        setattr(chosen, self.dest, values)
 
 
 # Values
@@ -86,6 +107,14 @@ def speed(text: str) -> float:
     if not 0.001 <= found <= 1000:
         raise argparse.ArgumentTypeError(f"{text} is not a number from 0.001 to 1000")
     return found
+
+
+def one_text(text: str) -> str:
+    """A text as it was typed; without its quotation marks where they go around the whole."""
+    from multidrop.shell.line_syntax import split
+
+    words = split(text, "")
+    return words[0] if len(words) == 1 else text
 
 
 def named_value(text: str) -> tuple[str, str]:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import argparse
 import re
-from collections.abc import Callable, Coroutine, Mapping, Sequence
+from collections.abc import Callable, Coroutine, Iterator, Mapping, Sequence
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -16,6 +16,7 @@ from multidrop.base.on_demand import imported
 
 if TYPE_CHECKING:
     from multidrop.base.errors import Diagnostic
+    from multidrop.shell.operations.parameter import Parameter
     from multidrop.shell.workspace import Workspace
 
 ACTIONS = "multidrop.shell.operations.arguments"
@@ -106,6 +107,18 @@ class Operation(NamedTuple):
     def name(self) -> str:
         return self.usage.partition(" ")[0]
 
+    def following(self, words: Sequence[str]) -> Iterator[tuple[str, str] | Parameter]:
+        """What may follow these words: see `Verb.following`."""
+        from multidrop.shell.operations.usage import following
+
+        yield from ((each, self.words.get(each, "")) for each in following(self.usage, words))
+
+    def narrowed(self, words: Sequence[str]) -> str:
+        """The usage with only the forms that begin with these words."""
+        from multidrop.shell.operations.usage import narrowed
+
+        return narrowed(self.usage, words)
+
     @property
     def lines(self) -> list[str]:
         """The help on the verb; the first line is its meaning."""
@@ -119,6 +132,11 @@ class Operation(NamedTuple):
         """The usage, the help, and the rows of its table."""
         rows = imported(self.rows) if isinstance(self.rows, str) and self.rows else self.rows
         return [self.usage, *self.lines, *(rows() if rows else ())]
+
+    @property
+    def takes_urls(self) -> bool:
+        """Whether the help on the command explains URLs."""
+        return self.urls or "URL" in str([*self.arguments.items()])
 
     def check(self, rest: str) -> None:
         """Raise Diagnostic for arguments that are wrong whatever is open."""

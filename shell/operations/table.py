@@ -12,17 +12,18 @@ import os
 import re
 from argparse import ArgumentParser
 from ast import literal_eval
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from functools import cache, reduce
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from functools import cache, cached_property, reduce
 from itertools import chain
-from typing import Any
+from typing import Any, TypeVar
 
 from multidrop.base import registry
 from multidrop.base.errors import Diagnostic
 from multidrop.base.feature import Feature
 from multidrop.base.on_demand import imported
-from multidrop.shell.operations import arguments, conditions
+from multidrop.shell.operations import arguments, conditions, typed
 from multidrop.shell.operations.operation import Forms, Operation, add_arguments
+from multidrop.shell.operations.verb import Verb
 
 VERB_GROUPS = {
     "Stop and end": "/stop /resume /quit /exit",
@@ -70,7 +71,7 @@ SCRIPT_VERBS: Mapping[str, tuple[str, str]] = {
 """The verbs that only scripts have, each with its usage and its meaning."""
 SCRIPT_WORDS: Mapping[str, str] = {name: usage for name, (usage, _) in SCRIPT_VERBS.items()}
 """Their usage."""
-_FILES = ("buses", "programs", "drives", "macros", "session")
+_FILES = ("buses", "programs", "drives", "session")
 _HEAD = re.compile(r"""^\["?([^".\]]+)"?\]\n(?:usage = ["'](/\w+))?""", re.M)
 _ENTRY = re.compile(
     r"""^\[\S[^\n]*?(?:\.(\w+))?\]$|^((?:"[^"\n]*"|[\w.-]+)+)\ =\ (?:\"{3}\n(.*?)\"{3}|(\[\n.*?^\]|[^\n]+))$""",
@@ -85,8 +86,32 @@ _KEY = re.compile(r'"([^"]*)"|([\w-]+)')
 _ELSEWHERE = re.compile(r"@([\w.]+:\w+)")
 
 
-class Declared(Mapping[str, Operation]):
-    """Operations by name: those of the sections, then those of features, each after the one that it names.
+AnyVerb = Operation | Verb
+AnyCommand = Operation | typed.Operation
+D = TypeVar("D", bound=Operation | Verb | typed.Operation)
+
+
+@cache
+def core() -> tuple[typed.Operation, ...]:
+    """The operations of multidrop itself that are typed Python, in the order of their modules."""
+    return tuple(each for module in registry.OPERATIONS for each in imported(f"{module}:OPERATIONS"))
+
+
+def _verbs(those: Iterable[typed.Operation]) -> dict[str, AnyVerb]:
+    """Verbs by name, each with its forms."""
+    found: dict[str, list[typed.Operation]] = {}
+    for each in those:
+        if each.verb:
+            found.setdefault(each.name, []).append(each)
+    return {name: Verb(tuple(forms)) for name, forms in found.items()}
+
+
+def _commands(those: Iterable[typed.Operation]) -> dict[str, AnyCommand]:
+    return {each.command: each for each in those if each.command}
+
+
+class Declared(Mapping[str, D]):
+    """Operations by name: the core's, then those of features, each after the one that it names.
 
     A section is parsed, and a feature imported, when its operation is asked for: a start needs one or two of them.
     """
@@ -96,15 +121,28 @@ class Declared(Mapping[str, Operation]):
         sections: Mapping[str, str],
         order: Sequence[str],
         name_of: Callable[[Operation], str],
+        by_name: Callable[[Iterable[typed.Operation]], Mapping[str, D]],
         named: re.Pattern[str],
     ) -> None:
         """`named`: matches the names; the table of features has other words, too."""
-        self._sections = {name: sections[name] for name in (*order, *(each for each in sections if each not in order))}
-        self._name_of, self._named = name_of, named
+        self._sections, self._order = sections, order
+        self._name_of, self._by_name, self._named = name_of, by_name, named
 
-    def __getitem__(self, name: str) -> Operation:
+    @cached_property
+    def _core(self) -> Mapping[str, D]:
+        return self._by_name(core())
+
+    @cached_property
+    def core_names(self) -> Sequence[str]:
+        """The names of the core's operations."""
+        every = {**self._sections, **self._core}
+        return list(dict.fromkeys((*(each for each in self._order if each in every), *every)))
+
+    def __getitem__(self, name: str) -> D:
         if name in self._sections:
-            return reduce(Operation.with_forms, _forms(name), _operation(self._sections[name]))
+            return reduce(Operation.with_forms, _forms(name), _operation(self._sections[name]))  # type: ignore[return-value]
+        if name in self._core:
+            return self._core[name]
         feature = registry.with_word(name)
         for each in (feature,) if feature is not None else registry.by_others():
             if (found := self._added(each).get(name)) is not None:
@@ -112,7 +150,7 @@ class Declared(Mapping[str, Operation]):
         raise KeyError(name)
 
     def __iter__(self) -> Iterator[str]:
-        names = [*self._sections]
+        names = [*self.core_names]
         registry.place(
             {name: each.after for feature in registry.features() for name, each in self._added(feature).items()}, names
         )
@@ -123,25 +161,26 @@ class Declared(Mapping[str, Operation]):
 
     def __contains__(self, name: object) -> bool:
         """Whether there is such an operation; a feature of the wheel is not imported for that."""
-        if name in self._sections or any(name in self._added(each) for each in registry.by_others()):
+        if name in self.core_names or any(name in self._added(each) for each in registry.by_others()):
             return True
         return name in registry.words() and self._named.fullmatch(str(name)) is not None
 
-    def _added(self, feature: Feature) -> dict[str, Operation]:
-        return {name: each for each in registry.records((feature,), Operation) if (name := self._name_of(each))}
+    def _added(self, feature: Feature) -> dict[str, D]:
+        found = {name: each for each in registry.records((feature,), Operation) if (name := self._name_of(each))}
+        return found | dict(self._by_name(registry.records((feature,), typed.Operation)))  # type: ignore[return-value]
 
-    def parts(self, group: str) -> Parts:
+    def parts(self, group: str) -> Parts[D]:
         """The commands of a group by their last word; of "" all first words."""
         return Parts(self, group)
 
 
-class Parts(Mapping[str, Operation]):
+class Parts(Mapping[str, D]):
     """The commands of a group, by their last words."""
 
-    def __init__(self, every: Declared, group: str) -> None:
+    def __init__(self, every: Declared[D], group: str) -> None:
         self._every, self._group = every, group
 
-    def __getitem__(self, word: str) -> Operation:
+    def __getitem__(self, word: str) -> D:
         return self._every[f"{self._group} {word}".strip()]
 
     def __iter__(self) -> Iterator[str]:
@@ -215,17 +254,19 @@ def _declared() -> Iterator[tuple[str, str, str]]:
 
 
 _FOUND = [*_declared()]
-VERBS = Declared(
+VERBS: Declared[AnyVerb] = Declared(
     {verb: text for verb, _, text in _FOUND if verb},
     " ".join(VERB_GROUPS.values()).split(),
     lambda each: each.name,
+    _verbs,
     _VERB,
 )
 """By name, in the order of `/help`."""
-COMMANDS = Declared(
+COMMANDS: Declared[AnyCommand] = Declared(
     {command: text for _, command, text in _FOUND if command},
     COMMAND_ORDER.split(),
     lambda each: each.command,
+    _commands,
     _COMMAND,
 )
 """By their words, in the order of `--help`; the parts of a group after it."""
@@ -292,7 +333,7 @@ def _check(feature: Feature) -> None:
     from multidrop.shell.connect.schemes import CORE
     from multidrop.shell.sections import CORE as TABLES
 
-    core = {*VERBS._sections, *COMMANDS._sections, *(f"{each}:" for each in CORE), *(f"[{each}]" for each in TABLES)}
+    core = {*VERBS.core_names, *COMMANDS.core_names, *(f"{each}:" for each in CORE), *(f"[{each}]" for each in TABLES)}
     if taken := next((each for each in registry.claims(feature) if each in core), ""):
         raise Diagnostic(f"{taken} is taken")
     for each in registry.records((feature,), Operation):
@@ -302,11 +343,11 @@ def _check(feature: Feature) -> None:
         if (added := getattr(record, "arguments", None)) is not None:  # of a command, or more of one that is there
             command = str(getattr(record, "command", ""))
             parser = ArgumentParser()
-            add_arguments(parser, COMMANDS[command].arguments if command in COMMANDS._sections else {})
+            add_arguments(parser, COMMANDS[command].arguments if command in COMMANDS._sections else {})  # type: ignore[arg-type]
             add_arguments(parser, added)
 
 
-def find(name: str) -> Operation:
+def find(name: str) -> AnyVerb:
     """Find a verb by name; one that is unknown may be of others, as a script is checked before a session opens.
 
     Raises Diagnostic with similar names.
@@ -326,4 +367,5 @@ def find(name: str) -> Operation:
 def load() -> None:
     """Import the work of all verbs; a screen does this in a thread before the first verb is typed."""
     for verb in VERBS.values():
-        verb.imported(verb.work)
+        if isinstance(verb, Operation):
+            verb.imported(verb.work)

@@ -6,13 +6,10 @@ is a placeholder, any other word is literal: `/wait stopped|idle [SECONDS]`.
 
 from __future__ import annotations
 
-import shlex
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from math import inf
-
-from multidrop.base.errors import Diagnostic
 
 
 @dataclass(frozen=True)
@@ -125,13 +122,3 @@ def limits(usage: str) -> tuple[int, float]:
     """The least and the largest number of words after the verb's name."""
     lengths = [inf if any(place.repeats for place in form) else len(form) for form in forms(usage)]
     return min(len(form) for form in forms(usage)), max(lengths)
-
-
-def split(text: str, where: str) -> list[str]:
-    """Split text into words, without their quotation marks. Raises Diagnostic for a mark that is not closed."""
-    splitter = shlex.shlex(text, posix=True)
-    splitter.whitespace_split, splitter.escape, splitter.commenters = True, "", ""
-    try:
-        return list(splitter)
-    except ValueError:
-        raise Diagnostic("a quotation mark is not closed", where) from None

@@ -19,8 +19,8 @@ from multidrop.macros import KEYS
 from multidrop.shell.connect.schemes import schemes
 from multidrop.shell.line_syntax import EVERYONE, DriveLine, VerbLine, join_target, parse
 from multidrop.shell.operations.conditions import simulated_cell
+from multidrop.shell.operations.parameter import Listed, Parameter
 from multidrop.shell.operations.table import VERBS
-from multidrop.shell.operations.usage import following, narrowed
 from multidrop.shell.workspace import Workspace
 from multidrop.simulator.declared import simulated
 from multidrop.simulator.families import PROGRAMS
@@ -88,7 +88,7 @@ def hint(workspace: Workspace, text: str) -> str:
     if isinstance(parsed, VerbLine):
         verb = VERBS.get(parsed.name)
         typed = parsed.rest.split()
-        return f"{narrowed(verb.usage, typed)}   {verb.meaning_of(typed)}" if verb else ""
+        return f"{verb.narrowed(typed)}   {verb.meaning_of(typed)}" if verb else ""
     if parsed is None:
         return ""
     language, product = spoken(workspace, parsed)
@@ -107,11 +107,14 @@ def names_of(workspace: Workspace, text: str) -> Drive | None:
 def _arguments(workspace: Workspace, typed: list[str], word: str) -> Found:
     """The completions that a verb's usage allows here."""
     verb = VERBS.get(typed[0])
-    for each in following(verb.usage, typed[1:]) if verb else ():
-        if (kind := kind_of(each)) in PLACEHOLDERS:
+    for each in verb.following(typed[1:]) if verb is not None else ():
+        if isinstance(each, Parameter):
+            for listed in each.argument.listed:
+                yield from offered(workspace, PLACES[listed], word)
+        elif (kind := kind_of(each[0])) in PLACEHOLDERS:
             yield from offered(workspace, kind, word)
-        elif each == each.lower():
-            yield each, verb.words.get(each, "") if verb else ""
+        elif each[0] == each[0].lower():
+            yield each
 
 
 def spoken(workspace: Workspace, line: DriveLine) -> tuple[Language, str]:
@@ -151,6 +154,21 @@ PLACEHOLDERS = (
     *("PERSONALITY", "URL", "WORD"),
 )
 """The words of a usage for which values are known; only a person knows the value of any other placeholder."""
+
+
+PLACES = {
+    Listed.DRIVE: "ADDR",
+    Listed.AT_DRIVE: "@ADDR",
+    Listed.BUS: "BUS",
+    Listed.SIMULATED_DRIVE: "DRIVE",
+    Listed.KEY: "F2..F12",
+    Listed.FILE: "FILE",
+    Listed.MACRO: "MACRO",
+    Listed.PAGE: "PAGE",
+    Listed.PERSONALITY: "PERSONALITY",
+    Listed.URL: "URL",
+    Listed.WORD: "WORD",
+}
 
 
 def kind_of(placeholder: str) -> str:

@@ -3,20 +3,18 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 from functools import cache
 from typing import TypeVar
 
 from multidrop.base.errors import Diagnostic
-from multidrop.base.text import whole
 from multidrop.dialects.families import FAMILIES
 from multidrop.macros import Macro
 from multidrop.shell import waits
-from multidrop.shell.line_syntax import ENDS, divided
+from multidrop.shell.line_syntax import ENDS, divided, split
 from multidrop.shell.operations.table import SCRIPT_WORDS, VERBS
-from multidrop.shell.operations.usage import split
-from multidrop.shell.playing import FOREVER
+from multidrop.shell.operations.verb import Verb
 from multidrop.shell.scripts.expression import Comparison, Expression, Name, Value, parse, parse_check, quoted, unknowns
 
 T = TypeVar("T", bound=Expression)
@@ -27,8 +25,6 @@ MOST = 10**9
 """The largest number of repetitions."""
 SECONDS = 1.0
 """The default time in which `/expect` looks for its text, s."""
-MOST_ROUNDS = 10**9
-"""The largest number of rounds."""
 
 
 def wrong(word: str, message: str = "") -> Diagnostic:
@@ -89,14 +85,15 @@ def call(text: str) -> tuple[str, dict[str, str]]:
 def macro_call(text: str) -> PlayCall:
     """Parse `/play MACRO`, or `/call MACRO`, which has values only."""
     word = text.split(maxsplit=1)[0]
-    usage = f"usage: {SCRIPT_WORDS.get(word) or VERBS['/play'].usage}"
     if word == "/call":
-        target, given = call(text)
-        return PlayCall(target, given)
-    found = split(rest_of(text), word)
-    if not found or found[0] == "stop":
-        raise Diagnostic(usage, word)
-    return play_call(found, lambda why: Diagnostic(why, word, usage))
+        return PlayCall(*call(text))
+    verb = VERBS["/play"]
+    assert isinstance(verb, Verb)
+    chosen = verb.parsed(rest_of(text))
+    if chosen.form.fixed:  # it ends macros
+        raise verb.wrong()
+    found = chosen.values
+    return PlayCall(found["macro"], dict(found["values"]), found["times"], found["fast"])
 
 
 @dataclass(frozen=True)
@@ -114,41 +111,6 @@ class PlayCall:
         """The values, and the buses of the roles."""
         roles = {name: value for name, value in self.given.items() if name in macro.roles}
         return {name: value for name, value in self.given.items() if name not in roles}, roles
-
-
-def play_call(words: Sequence[str], wrong: Callable[[str], Diagnostic]) -> PlayCall:
-    """Read the words after `/play`. Raises Diagnostic."""
-    name, *rest = words
-    given: dict[str, str] = {}
-    times: int | None = 1
-    fast = False
-    for option in ("--times", "--fast"):
-        if rest.count(option) > 1:
-            raise wrong(f"{option} is given twice")
-    while rest:
-        word = rest.pop(0)
-        if word == "--fast":
-            fast = True
-        elif word == "--times":
-            times = rounds(rest.pop(0) if rest else "", wrong)
-        else:
-            name_of, sign, value = word.partition("=")
-            if not (name_of and sign):
-                raise wrong(f"no value {word}; valid: NAME=VALUE")
-            if name_of in given:
-                raise wrong(f"{name_of} is given twice")
-            given[name_of] = value
-    return PlayCall(name, given, times, fast)
-
-
-def rounds(text: str, wrong: Callable[[str], Diagnostic]) -> int | None:
-    """Read a number of rounds; None: without an end. Raises the Diagnostic that `wrong` returns."""
-    if text == FOREVER:
-        return None
-    number = whole(text, 1, MOST_ROUNDS)
-    if number is None:
-        raise wrong(f"no number of rounds {text}".rstrip() + f"; valid: 1 to {MOST_ROUNDS}, or {FOREVER}")
-    return number
 
 
 def repetitions(value: Value) -> int:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Coroutine, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from inspect import iscoroutine
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -11,16 +12,17 @@ from typing import TYPE_CHECKING, Any
 from multidrop.base.errors import Diagnostic
 from multidrop.drives.drive import Drive
 from multidrop.shell.events import By
-from multidrop.shell.line_syntax import split_target
-from multidrop.shell.operations.operation import Operation
-from multidrop.shell.operations.usage import limits, split
+from multidrop.shell.line_syntax import split, split_target
+from multidrop.shell.operations.table import AnyVerb
+from multidrop.shell.operations.usage import limits
+from multidrop.shell.operations.verb import Chosen, Verb
 from multidrop.shell.session import Session
 
 if TYPE_CHECKING:
     from multidrop.macros import Macro
 
 
-def words(verb: Operation, rest: str) -> list[str]:
+def words(verb: AnyVerb, rest: str) -> list[str]:
     """The words after the name, without quotes. Raises Diagnostic for a number that no form of the usage has."""
     found = split(rest, verb.name)
     low, high = limits(verb.usage)
@@ -34,23 +36,48 @@ class Call:
     """One use of a verb: where it works, the text after its name, and its origin."""
 
     session: Session
-    verb: Operation
+    verb: AnyVerb
     rest: str
     by: By = By.OPERATOR
     shown: str | Macro | None = None
     """What a person was shown of the file that the line names; see `line_syntax.VerbLine`."""
 
+    @cached_property
+    def chosen(self) -> Chosen:
+        """The form of the line, and its values. Raises Diagnostic for words that are no arguments of the verb."""
+        assert isinstance(self.verb, Verb)
+        return self.verb.parsed(self.rest)
+
+    @property
+    def changes(self) -> bool:
+        """Whether the line changes a drive, or lets it run. Raises Diagnostic as `chosen` does."""
+        if isinstance(self.verb, Verb):
+            return self.chosen.form.changes
+        changes = self.verb.changes
+        return changes is not None and (not changes or [*self.rest.split(), ""][0] in changes)
+
+    @property
+    def immediate(self) -> bool:
+        """Whether it is done at once."""
+        return self.chosen.form.immediate if isinstance(self.verb, Verb) else self.verb.immediate
+
     def work(self) -> Coroutine[Any, Any, None]:
+        """What the line does."""
+        if isinstance(self.verb, Verb):
+            return self.chosen.form.work(self, self.chosen.values)
         work: Coroutine[Any, Any, None] = self.verb.imported(self.verb.work)(self)
         if not iscoroutine(work):  # by others
             raise Diagnostic(f"{self.verb.name} has no async function")
         return work
 
-    def recorded(self) -> str:
-        """The line that a macro records; empty: none."""
+    def recorded(self) -> str | None:
+        """The line that a macro records; None: none."""
+        if isinstance(self.verb, Verb):
+            recorded = self.chosen.form.recorded
+            return recorded(self) if recorded is not None else None
         if self.verb.recorded == "typed":
             return f"{self.verb.name} {self.rest}".strip()
-        return str(self.verb.imported(self.verb.recorded)(self)) if self.verb.recorded else ""
+        return str(self.verb.imported(self.verb.recorded)(self)) if self.verb.recorded else None
 
     def words(self) -> list[str]:
         """The words after the name, without quotes. Raises Diagnostic for a number that no form of the usage has."""

@@ -14,13 +14,12 @@ from multidrop.dialects.family import Language
 from multidrop.dialects.motions import Outcome
 from multidrop.shell import configuration, stop_report, waits
 from multidrop.shell.events import By
+from multidrop.shell.line_syntax import split
 from multidrop.shell.log import files
 from multidrop.shell.log.writer import SessionLog
 from multidrop.shell.motions import OUTCOME
 from multidrop.shell.operations.conditions import ON_SCREEN
-from multidrop.shell.operations.operation import Operation
-from multidrop.shell.operations.table import SCRIPT_VERBS, VERBS, groups
-from multidrop.shell.operations.usage import split
+from multidrop.shell.operations.table import SCRIPT_VERBS, VERBS, AnyVerb, groups
 from multidrop.shell.quitting import GOES_ON
 from multidrop.shell.roles import EVERYTHING, TIMES, Filter, Transcripts
 from multidrop.shell.verbs.call import Call, words
@@ -94,12 +93,12 @@ class Wait(NamedTuple):
     """However their motions ended."""
 
 
-def duration(verb: Operation, rest: str) -> float:
+def duration(verb: AnyVerb, rest: str) -> float:
     (text,) = words(verb, rest)
     return waits.seconds(text, verb.wrong)
 
 
-def wanted_wait(verb: Operation, rest: str) -> Wait:
+def wanted_wait(verb: AnyVerb, rest: str) -> Wait:
     """Parse a wait. Raises Diagnostic."""
     if match := _TEXT.fullmatch(rest):
         return Wait(_limit(verb, match["seconds"]), text=match["text"])
@@ -116,7 +115,7 @@ def wanted_wait(verb: Operation, rest: str) -> Wait:
     raise verb.wrong()
 
 
-def _limit(verb: Operation, text: str | None) -> float:
+def _limit(verb: AnyVerb, text: str | None) -> float:
     return waits.LIMIT if text is None else waits.seconds(text, verb.wrong)
 
 

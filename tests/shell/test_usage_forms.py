@@ -7,7 +7,8 @@ from math import inf
 import pytest
 
 from multidrop.base.errors import Diagnostic
-from multidrop.shell.operations.usage import Place, following, forms, is_placeholder, limits, narrowed, split
+from multidrop.shell.line_syntax import split
+from multidrop.shell.operations.usage import Place, following, forms, is_placeholder, limits, narrowed
 from tests.support.cases import for_each
 
 NAMES, STOP, PORT = "[a|b FILE] NAME ... [--all]", "stop [NOW]", "[HOST:]PORT c"

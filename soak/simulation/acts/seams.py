@@ -11,6 +11,9 @@ from typing import Any
 import multidrop.features.plot_files.plot
 import multidrop.features.publishing.feed
 import multidrop.features.twins.pair
+import multidrop.shell.macro_arguments
+import multidrop.shell.macro_changes
+import multidrop.shell.macro_recording
 import multidrop.shell.prompt.terminal_input
 import multidrop.shell.scripts.executor
 import multidrop.shell.snapshots

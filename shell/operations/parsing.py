@@ -1,0 +1,119 @@
+"""The one parser of arguments: argparse, for the words of a verb's line as for those of a command."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Sequence
+from typing import Any, NoReturn
+
+from multidrop.shell.line_syntax import divided, split
+from multidrop.shell.operations.arguments import Each, Once, OnceFlag
+from multidrop.shell.operations.parameter import OneOf, Parameter
+
+
+class WrongWords(Exception):
+    """Words that are no arguments of an operation. The text is empty where its usage says enough."""
+
+
+def add_parameters(
+    parser: argparse.ArgumentParser, parameters: Sequence[Parameter], flag: str | type[argparse.Action] = "store_true"
+) -> None:
+    """Add arguments to a parser, those that exclude each other in their groups. `flag`: what an option without a value
+    does.
+    """
+    groups: dict[OneOf, argparse._ActionsContainer] = {}
+    for each in parameters:
+        one_of = each.argument.one_of
+        if one_of is not None and one_of not in groups:
+            groups[one_of] = parser.add_mutually_exclusive_group(required=one_of.required)
+        _add(parser if one_of is None else groups[one_of], each, flag)
+
+
+def _add(parser: argparse._ActionsContainer, one: Parameter, flag: str | type[argparse.Action]) -> None:
+    options: dict[str, Any] = {"dest": one.key, "help": one.help or None}
+    if one.flag:
+        parser.add_argument(*one.names, action=flag, **options)
+        return
+    choices = one.argument.choices() if one.argument.choices is not None else None
+    if choices is not None:
+        options |= {"choices": choices, "type": one.argument.read or str}
+    else:
+        options |= {"type": str if one.argument.rest else one.read}
+        if one.words and one.argument.read is None:
+            options["choices"] = list(one.words)
+    if "choices" not in options or one.argument.metavar:
+        options["metavar"] = one.value.removesuffix(" ...")
+    if not one.required:
+        options["default"] = list(one.default) if one.several else one.default
+    if one.argument.action is not None:
+        options["action"] = one.argument.action
+    if one.option:
+        options.setdefault("action", Each if one.several else Once)
+        parser.add_argument(*one.names, required=one.required, **options)
+        return
+    if one.several or one.argument.rest:
+        options["nargs"] = "+" if one.required else "*"
+    elif not one.required:
+        options["nargs"] = "?"
+    parser.add_argument(**options)
+
+
+def values(parameters: Sequence[Parameter], found: argparse.Namespace) -> dict[str, Any]:
+    """The values of a parsed line by the keys of the arguments."""
+    every = {each.key: getattr(found, each.key) for each in parameters}
+    for each in parameters:
+        if each.argument.rest and not isinstance(every[each.key], str):
+            every[each.key] = " ".join(every[each.key])
+        elif each.several:
+            every[each.key] = tuple(every[each.key])
+    return every
+
+
+class LineParser(argparse.ArgumentParser):
+    """Parses the words of a verb's line; raises WrongWords."""
+
+    def __init__(self, parameters: Sequence[Parameter]) -> None:
+        super().__init__(add_help=False, allow_abbrev=False, exit_on_error=False)
+        self._rest = next((each for each in parameters if each.argument.rest), None)
+        self._parameters = parameters
+        add_parameters(self, [each for each in parameters if each is not self._rest], OnceFlag)
+
+    def line(self, text: str, where: str) -> dict[str, Any]:
+        """Parse a line; return the values by the keys of the arguments.
+
+        Raises WrongWords; Diagnostic for a quotation mark that is not closed.
+        """
+        rest: dict[str, Any] = {}
+        if self._rest is not None:
+            words = []
+            for _ in [each for each in self._parameters if each is not self._rest and not each.option]:
+                word, text = divided(text)
+                words += split(word, where)
+            if not text and self._rest.required:
+                raise WrongWords
+            try:
+                rest = {self._rest.key: self._rest.read(text) if text else self._rest.default}
+            except argparse.ArgumentTypeError as wrong:
+                raise WrongWords(str(wrong)) from None
+        else:
+            words = split(text, where)
+        try:
+            found = self.parse_intermixed_args(words)
+        except argparse.ArgumentError as wrong:
+            raise WrongWords(_in_words(wrong)) from None
+        return values([each for each in self._parameters if each is not self._rest], found) | rest
+
+    def error(self, message: str) -> NoReturn:
+        """Raise WrongWords for words that are missing, or too many."""
+        beyond = message.partition("unrecognized arguments: ")[2].split()
+        option = next((each for each in beyond if each.startswith("-")), "")
+        raise WrongWords(f"no option {option.partition('=')[0]}" if option else "")
+
+
+def _in_words(wrong: argparse.ArgumentError) -> str:
+    name, message = wrong.argument_name or "", wrong.message
+    if not name.startswith("-"):
+        return message
+    if message == "expected one argument":
+        return f"{name} needs a value"
+    return f"{name} is {message}" if message == "given twice" else message

@@ -1,0 +1,182 @@
+"""The declaration of an operation: a function, and what a person reads of it.
+
+The function is the declaration of its arguments: `async def rename(call: Call, macro: MacroName, new: NewName)` is
+`/macro rename MACRO NEW`. From it come the verb at the prompt and in scripts, the command with `--help`, completion and
+the man page. The declarations are imported for every `--help`, so they import nothing that costs time; the bodies of
+the functions do.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable, Mapping, Sequence
+from functools import cache
+from inspect import isawaitable, iscoroutine
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from multidrop.base.feature import Kinds
+from multidrop.shell.operations.parameter import Listed, Parameter, gathered, parameters
+from multidrop.shell.operations.parsing import LineParser, add_parameters, values
+
+if TYPE_CHECKING:
+    from multidrop.shell.workspace import Workspace
+
+Call = Any
+"""`shell.verbs.call.Call`, which knows the session and so all verbs; a function names it, and mypy checks its body."""
+
+
+def typed(call: Call) -> str:
+    """Record a line as it was typed."""
+    return f"{call.verb.name} {call.rest}".strip()
+
+
+class Operation(NamedTuple):
+    """A task of the product: a verb in a session, a command, or both.
+
+    As a verb, the function is given the `Call`, or what `at` makes of it; as a command, what `through` gives it. Both
+    add arguments of their own: `[ADDR]` behind those of a verb, and `URL` and `--drive` before those of a command.
+    """
+
+    do: Callable[..., Any] | None = None
+    """What it does; a coroutine is awaited. A command returns its exit code, or None for 0. None: a group."""
+    verb: str = ""
+    """Its name, and the fixed words behind it: `/play`, `/macro rename`. Several with one name are its forms."""
+    command: str = ""
+    """The words of the command: `program check`."""
+    help: str = ""
+    """The help on the verb; its first line is the meaning. Of a form it is the meaning of its fixed word."""
+    meaning: str = ""
+    """The meaning of the command."""
+    examples: Sequence[str] = ()
+    """Of the command, without `multidrop` in front."""
+    at: Callable[..., Any] | None = None
+    through: Callable[..., Any] | None = None
+    """Calls a function with what `do` is given first, and returns the exit code; a coroutine is awaited."""
+    group: str = ""
+    """The title of `/help` under which the verb is listed."""
+    after: str = ""
+    """The verb or command that a feature's is listed after, in `/help` and `--help`; empty: it comes last."""
+    recorded: Callable[[Call], str] | None = None
+    """The line that a macro records; None: none."""
+    rows: Callable[[], Sequence[str]] | None = None
+    """More lines of the help on the verb, from the table that it uses."""
+    fits: Callable[[Workspace], bool] | None = None
+    """The condition under which the verb is offered."""
+    changes: bool = False
+    """It changes a drive, or lets it run."""
+    checked: bool = False
+    """A script is refused as a whole for arguments that are wrong; of other verbs a value may be unknown by then."""
+    immediate: bool = False
+    """The verb is done at once, so a stop has nothing to end."""
+    concurrent: bool = False
+    """The verb runs beside the lines typed at a prompt."""
+    urls: bool = False
+    """The help on a group explains URLs, as that on a command with a URL does."""
+    own_urls: str = ""
+    """The explanation of its own URLs, where it takes other ones."""
+    connection: bool = False
+    """The standard output of the command is a connection, whose end it notices itself."""
+
+    def passes(self) -> Mapping[str, Kinds]:
+        """What its callers expect to be raised, besides what a person reads; see `base.foreign`."""
+        return {"do": (SystemExit,)} if self.command else {}
+
+    def claims(self) -> tuple[str, ...]:
+        """What only one feature can add."""
+        return tuple(filter(None, (self.verb, self.command)))
+
+    @property
+    def name(self) -> str:
+        """The name of the verb; empty: none."""
+        return self.verb.partition(" ")[0]
+
+    # As a verb
+
+    @property
+    def fixed(self) -> tuple[str, ...]:
+        """The fixed words behind the name of the verb."""
+        return tuple(self.verb.split()[1:])
+
+    @property
+    def arguments(self) -> tuple[Parameter, ...]:
+        """The arguments of the verb."""
+        return _own(self.do, 1) + _own(self.at, 1) if self.verb else ()
+
+    @property
+    def places(self) -> tuple[Parameter, ...]:
+        return tuple(each for each in self.arguments if not each.option)
+
+    @property
+    def options(self) -> tuple[Parameter, ...]:
+        return tuple(each for each in self.arguments if each.option)
+
+    @property
+    def usage(self) -> str:
+        """The fixed words and the arguments of the verb."""
+        return " ".join((*self.fixed, *(each.usage for each in (*self.places, *self.options))))
+
+    def parsed(self, text: str) -> dict[str, Any]:
+        """The values of the text behind the fixed words. Raises WrongWords."""
+        return _line_parser(self.do, self.at).line(text, self.name)
+
+    async def work(self, call: Call, found: Mapping[str, Any]) -> None:
+        """Do it for a verb's line."""
+        assert self.do is not None
+        first: Any = call
+        if self.at is not None:
+            places, named = gathered(_own(self.at, 1), found)
+            first = self.at(call, *places, **named)
+        places, named = gathered(_own(self.do, 1), found)
+        result = self.do(first, *places, **named)
+        if isawaitable(result):
+            await result
+
+    # As a command
+
+    @property
+    def command_arguments(self) -> tuple[Parameter, ...]:
+        """The arguments of the command."""
+        own = _own(self.do, int(self.through is not None)) if self.command else ()
+        return _own(self.through, 1) + own
+
+    @property
+    def run(self) -> bool:
+        """Whether the command does anything: it is no mere group."""
+        return self.do is not None
+
+    @property
+    def takes_urls(self) -> bool:
+        """Whether the help on the command explains URLs."""
+        return self.urls or any(Listed.URL in each.argument.listed for each in self.command_arguments)
+
+    def add_to(self, parser: argparse.ArgumentParser) -> None:
+        """Add the arguments of the command to its parser."""
+        add_parameters(parser, self.command_arguments)
+
+    def command_work(self, chosen: argparse.Namespace) -> int:
+        """Run the command; return the exit code."""
+        assert self.do is not None
+        do, found = self.do, values(self.command_arguments, chosen)
+        places, named = gathered(_own(do, int(self.through is not None)), found)
+        if self.through is None:
+            result = do(*places, **named)
+        else:
+            own, names = gathered(_own(self.through, 1), found)
+            result = self.through(lambda first: do(first, *places, **named), *own, **names)
+        if iscoroutine(result):
+            import asyncio
+
+            result = asyncio.run(result)
+        return result or 0
+
+
+def _own(function: Callable[..., Any] | None, given: int) -> tuple[Parameter, ...]:
+    return () if function is None else _parameters(function, given)
+
+
+_parameters = cache(parameters)
+
+
+@cache
+def _line_parser(do: Callable[..., Any] | None, at: Callable[..., Any] | None) -> LineParser:
+    return LineParser(_own(do, 1) + _own(at, 1))
