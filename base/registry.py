@@ -31,7 +31,10 @@ GROUP, FAMILY_GROUP = "multidrop.features", "multidrop.families"
 """The entry points of features and of families, and the packages of the wheel's."""
 RECORDS = {GROUP: "FEATURE", FAMILY_GROUP: "FAMILY"}
 """The name of the record in a module."""
-OPERATIONS: tuple[str, ...] = ("multidrop.shell.verbs.macros",)
+OPERATIONS: tuple[str, ...] = (
+    "multidrop.shell.verbs.programs",
+    "multidrop.shell.verbs.macros",
+)
 """The modules that declare the core's own operations: each has a tuple `OPERATIONS`."""
 WHEEL = "multidrop"
 KEPT = "features.json"

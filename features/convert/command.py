@@ -7,8 +7,8 @@ import sys
 
 from multidrop.base import new_file
 from multidrop.base.text import counted
-from multidrop.commands.programs import WRONG
 from multidrop.features.convert.conversion import convert
+from multidrop.shell.batch.program_runs import WRONG
 from multidrop.shell.streams.stdout import StatusLine, write
 
 DIFFERS = 1

@@ -3,125 +3,23 @@
 from __future__ import annotations
 
 import argparse
-import json
-from collections.abc import Awaitable, Callable
 from typing import TYPE_CHECKING
 
 from multidrop.base import new_file
 from multidrop.base.errors import Diagnostic
-from multidrop.base.files import program_text_of
-from multidrop.base.new_file import STANDARD_OUTPUT
-from multidrop.dialects.families import correct_in, program_language_of, program_languages
-from multidrop.shell import configuration, program_listing, snapshots
+from multidrop.shell import configuration, snapshots
 from multidrop.shell.batch import runner
 from multidrop.shell.line_syntax import split_target
 from multidrop.shell.params import file as files
 from multidrop.shell.params import replacement, work
-from multidrop.shell.params.work import Options, check_new, each, file_of, is_several, make_place, targets
-from multidrop.shell.programs import transfers
-from multidrop.shell.workspace import address_of
+from multidrop.shell.params.work import Options, each, is_several, targets
 from multidrop.simulator import cells
 
 if TYPE_CHECKING:
-    from multidrop.drives.drive import Drive
     from multidrop.shell.session import Session
 
 DIFFERS = 1
 """The exit code of a comparison where something differs, as where a drive did not reply or refused."""
-
-
-def list_(chosen: argparse.Namespace) -> int:
-    async def show(session: Session, drive: Drive) -> None:
-        name = session.display_name(drive)
-        if chosen.json:
-            held = await program_listing.read(session, drive, "list")
-            held.check_listed(name)
-            if not held.lines:
-                program_listing.say_none(session, drive)
-            for at, text in held.lines:
-                session.output(json.dumps({"drive": address_of(session, drive), "at": at, "text": text}))
-            return
-        own = f"{name}: " if is_several(chosen.drive) else ""
-        lines = await program_listing.readable(session, drive)
-        if not lines:
-            program_listing.say_none(session, drive)
-        for line in lines:
-            session.output(f"{own}{line}")
-
-    return _with_drive(chosen, show, unsolicited=not chosen.json)
-
-
-def program_diff(chosen: argparse.Namespace) -> int:
-    """Print the lines that differ; the exit code says whether any does."""
-    text, differ = _checked(chosen.file), False
-
-    async def compare(session: Session, drive: Drive) -> None:
-        nonlocal differ
-        name, found = session.display_name(drive), await transfers.differences(session, drive, chosen.file, text)
-        for row in found:
-            facts = {
-                "drive": address_of(session, drive),
-                "line": row.number or None,
-                "here": row.here,
-                "at": row.at,
-                "there": row.there,
-            }
-            session.output(json.dumps(facts) if chosen.json else transfers.in_words(chosen.file, row, name))
-        differ = differ or bool(found)
-        if not found:
-            session.notify(f"{name} holds {chosen.file}", outcome=True)
-
-    return _with_drive(chosen, compare, unsolicited=False) or (DIFFERS if differ else 0)
-
-
-def upload(chosen: argparse.Namespace) -> int:
-    """Save the program to a new file that can be downloaded again; several to a folder."""
-    check_new(chosen.file, chosen.drive)
-
-    async def save(session: Session, drive: Drive) -> None:
-        lines = await program_listing.upload(session, drive, chosen.raw)
-        file = file_of(session, drive, chosen.file, chosen.drive, drive.program_files.endings[0])
-        make_place(file, chosen.drive)
-        program_listing.save_new(session, drive, file, lines)
-
-    return _with_drive(chosen, save, unsolicited=chosen.file != STANDARD_OUTPUT)
-
-
-def download(chosen: argparse.Namespace) -> int:
-    """Send a file to the drive; report a wrong file before anything is opened.
-
-    It is read once: each drive gets the text that was checked here, whatever becomes of the file.
-    """
-    text = _checked(chosen.file)
-    later = is_several(chosen.drive)
-    wanted = transfers.Wanted(not chosen.no_verify, chosen.save, chosen.only_changed, chosen.run, later)
-
-    async def put(session: Session) -> None:
-        drives = targets(session, chosen.drive, "programs")
-        await each(session, drives, lambda drive: transfers.download(session, drive, chosen.file, wanted, text))
-        if later and chosen.run:
-            await each(session, drives, lambda drive: transfers.start(session, drive, chosen.file, wanted, text))
-
-    return runner.run([chosen.url], put, agreed=chosen.yes, tried=chosen.drive.split(","))
-
-
-def _checked(file: str) -> str:
-    """Read a program file. Raises Diagnostic for one that is correct in no language, in the language of its name."""
-    language, text = program_language_of(file), program_text_of(file)
-    if not correct_in(text, language):
-        program_languages()[language].language.read(text, file)
-    return text
-
-
-def _with_drive(
-    chosen: argparse.Namespace,
-    body: Callable[[Session, Drive], Awaitable[None]],
-    unsolicited: bool,
-) -> int:
-    async def work(session: Session) -> None:
-        await each(session, targets(session, chosen.drive, "programs"), lambda drive: body(session, drive))
-
-    return runner.run([chosen.url], work, unsolicited=unsolicited, tried=chosen.drive.split(","))
 
 
 def params_backup(chosen: argparse.Namespace) -> int:

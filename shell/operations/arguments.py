@@ -55,6 +55,13 @@ class Each(argparse.Action):
         setattr(chosen, self.dest, [*before, values])
 
 
+class United(argparse.Action):
+    """Keeps the names of all values of an option that is repeated."""
+
+    def __call__(self, parser: object, chosen: argparse.Namespace, values: Any, option: object = None) -> None:
+        setattr(chosen, self.dest, getattr(chosen, self.dest) | values)
+
+
 class Named(argparse.Action):
     """Keeps words `NAME=VALUE`, of which each name is given once."""
 
@@ -138,6 +145,11 @@ def key_and_values(text: str) -> tuple[str, str]:
     return key.strip(), values
 
 
+def setting_names(text: str) -> frozenset[str]:
+    """Read names of settings, with commas between several."""
+    return frozenset(name.strip().upper() for name in text.split(",") if name.strip())
+
+
 def allowed(text: str) -> str:
     if not text:
         raise argparse.ArgumentTypeError("an empty path would allow the current folder; name the path")
@@ -165,13 +177,22 @@ def address(text: str) -> tuple[str, int]:
 # Arguments
 
 
-def language() -> Mapping[str, Any]:
+def program_language_names() -> Sequence[str]:
+    from multidrop.dialects.families import program_languages
+
+    return list(program_languages())
+
+
+def language_help() -> str:
     from multidrop.dialects.families import DEFAULT, program_languages
 
     known = program_languages()
     named = (f"{name} for {', '.join(each.endings)}" for name, each in known.items() if name != DEFAULT)
-    endings = f"default: {'; '.join(named)}; else {DEFAULT}"
-    return {"help": endings, "choices": list(known)}
+    return f"default: {'; '.join(named)}; else {DEFAULT}"
+
+
+def language() -> Mapping[str, Any]:
+    return {"help": language_help(), "choices": program_language_names()}
 
 
 def titles() -> str:
@@ -180,11 +201,14 @@ def titles() -> str:
     return " or ".join(f"{each.title} ({', '.join(each.endings)})" for each in program_languages().values())
 
 
-class _Checked:
+class CheckedPersonalities:
     """The personalities on which a check of a program depends; a family is imported only to look for one of them."""
 
     def __contains__(self, personality: object) -> bool:
         return any(personality == each for each in self)
+
+    def __len__(self) -> int:
+        return sum(1 for _ in self)
 
     def __iter__(self) -> Iterator[str]:
         from multidrop.simulator.declared import simulated
@@ -198,17 +222,14 @@ class _Checked:
         )
 
 
-def personality(about: str) -> Mapping[str, Any]:
-    """Declare the drive that programs are checked for."""
+def usual_personality() -> str:
     from multidrop.simulator.cell.spec import DriveSpec
 
-    default = DriveSpec().personality
-    about = f"{about} (default: {default})"
-    return {"help": about, "type": str.upper, "choices": _Checked(), "default": default}
+    return DriveSpec().personality
 
 
-def checked_personality() -> Mapping[str, Any]:
-    return personality("the drive that the program is for")
+def checked_personality() -> str:
+    return f"the drive that the program is for (default: {usual_personality()})"
 
 
 def converted() -> Mapping[str, Any]:
@@ -219,18 +240,20 @@ def converted() -> Mapping[str, Any]:
 
 
 def edited_personality() -> Mapping[str, Any]:
-    return personality("the drive that programs are for, unless the editor names one")
+    default = usual_personality()
+    about = f"the drive that programs are for, unless the editor names one (default: {default})"
+    return {"help": about, "type": str.upper, "choices": CheckedPersonalities(), "default": default}
 
 
-def tested_personality() -> Mapping[str, Any]:
-    """Declare the simulated drive of a program test."""
-    from multidrop.simulator.cell.spec import DriveSpec
+def tested_personality() -> str:
+    return f"%(choices)s (default: the cell's, or {usual_personality()})"
+
+
+def tested_personalities() -> Sequence[str]:
     from multidrop.simulator.declared import simulated
     from multidrop.simulator.families import PROGRAMS
 
-    tested = tuple(personality for name in PROGRAMS for personality in simulated()[name].personalities)
-    about = f"%(choices)s (default: the cell's, or {DriveSpec().personality})"
-    return {"help": about, "type": str.upper, "choices": tested}
+    return tuple(personality for name in PROGRAMS for personality in simulated()[name].personalities)
 
 
 def spoken() -> Mapping[str, Any]:

@@ -75,6 +75,8 @@ class Argument:
     """The name of an option, where it is not that of the parameter."""
     rest: bool = False
     """The rest of a verb's line as it was typed; the words of a command, with blanks between them."""
+    at_least_one: bool = False
+    """Of `*values`: a line has one."""
     one_of: OneOf | None = None
     action: type[argparse.Action] | None = None
     """What argparse does with the values, where it is not the usual."""
@@ -201,7 +203,7 @@ def _of(one: inspect.Parameter, scope: Mapping[str, Any], function: Callable[...
         yield from (replace(each, holder=(one.name, kind)) for each in of_fields(kind))
         return
     starred = one.kind is ANY_NUMBER
-    default = () if starred else one.default
+    default = one.default if not starred else EMPTY if argument.at_least_one else ()
     yield Parameter(one.name, kind, argument, default, one.kind is BY_NAME, several or starred, starred)
 
 

@@ -18,6 +18,7 @@ from multidrop.dialects.program_files import LOCKED
 from multidrop.dialects.values import Change, Parameters, Permission, Plan, Readings, differing
 from multidrop.shell import snapshots
 from multidrop.shell.channel import transferring
+from multidrop.shell.operations.argument_types import Downloading
 from multidrop.shell.params.file import read, shown
 from multidrop.shell.params.work import Options, check_ready, send
 from multidrop.shell.programs import transfers
@@ -210,7 +211,7 @@ class _Replacement:
         if self._differs(here):  # the user's variables too; what was in the drive goes to a backup first
             clear = self._clearing and _tables(here).program(here).lines  # else an old program stays beside the new one
             lines = (*((self._clearing,) if clear else ()), *self._program.file)
-            text, saved = "".join(f"{line}\n" for line in lines), transfers.Wanted(save=True)
+            text, saved = "".join(f"{line}\n" for line in lines), Downloading(save=True)
             await transfers.download(self._session, self._drive, f"{self._file}#{self._spec.name}", saved, text)
             self._done.append("program")
         await self._change(communication=False)

@@ -14,6 +14,7 @@ import multidrop.features.twins.pair
 import multidrop.shell.macro_arguments
 import multidrop.shell.macro_changes
 import multidrop.shell.macro_recording
+import multidrop.shell.programs.typed_lines
 import multidrop.shell.prompt.terminal_input
 import multidrop.shell.scripts.executor
 import multidrop.shell.snapshots
