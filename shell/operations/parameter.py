@@ -55,7 +55,7 @@ class OneOf:
     required: bool = False
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Argument:
     """What an annotation says of an argument, besides its type. Functions are called when it is needed."""
 
