@@ -12,6 +12,7 @@ import os
 import sys
 from collections.abc import Mapping, Sequence
 from contextvars import copy_context
+from functools import partial
 from importlib.machinery import PathFinder
 from typing import TYPE_CHECKING, Any, NoReturn
 
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
     from _typeshed import SupportsWrite
 
     from multidrop.shell.operations import typed
+    from multidrop.shell.operations.parameter import Parameter
     from multidrop.shell.operations.table import AnyCommand
 
 URLS = """A URL is {}; sim: alone is the demo cell. Keys after a ?: dialect, drives=a,b,c, baud,
@@ -76,7 +78,6 @@ class Parser(argparse.ArgumentParser):
         """Add the arguments of the command, or its parts. One with both is a part if the first word names one."""
         if self.operation is None or self.complete:
             return
-        from multidrop.shell.hooks import with_options
         from multidrop.shell.operations import typed
         from multidrop.shell.operations.operation import add_arguments
         from multidrop.shell.operations.table import COMMANDS
@@ -86,21 +87,29 @@ class Parser(argparse.ArgumentParser):
         named = given[:1] and given[0] in own
         if isinstance(self.operation, typed.Operation):
             if self.operation.run and not named:
-                self._add_own(self.operation)
+                self._add_own(self.operation, given)
         elif self.operation.run and not named:
-            _check_options(self.operation.command, given)
-            arguments = with_options(self.operation.command, self.operation.arguments)
+            arguments = self.operation.arguments
             if _unknown(given, arguments):
                 _load_others(given)
-                arguments = with_options(self.operation.command, self.operation.arguments)
             add_arguments(self, arguments)
             _add_no_config(self)
             self.set_defaults(run_by=self.operation, command=self.operation.command)
         if own and (named or not self.operation.run):
             self.add_commands(own, given, "|".join(own), required=True)
 
-    def _add_own(self, operation: typed.Operation) -> None:
-        operation.add_to(self)
+    def _add_own(self, operation: typed.Operation, given: Sequence[str]) -> None:
+        """Add the arguments of the command, with the options of features."""
+        from multidrop.shell import hooks
+
+        added: Sequence[Parameter] = ()
+        if operation.open:
+            _check_options(operation.command, given)
+            added = hooks.added_to(operation.command)
+            if _has_others(given, (*operation.command_arguments, *added)):
+                _load_others(given)
+                added = hooks.added_to(operation.command)
+        operation.add_to(self, added)
         _add_no_config(self)
         self.set_defaults(run_by=operation, command=operation.command)
 
@@ -163,6 +172,12 @@ def _unknown(given: Sequence[str], arguments: Mapping[str, Any]) -> bool:
     return any(each.startswith("-") and each.partition("=")[0] not in known for each in given)
 
 
+def _has_others(given: Sequence[str], known: Sequence[Parameter]) -> bool:
+    """Whether a line has an option that no feature of the wheel declares, or asks for help: others may add one."""
+    names = {"--no-config", *(name for each in known if each.option for name in each.names)}
+    return any(each.startswith("-") and each.partition("=")[0] not in names for each in given)
+
+
 def _load_others(given: Sequence[str]) -> None:
     """Load the features by others, whose commands a line may mean; say of each that cannot be loaded why."""
     from multidrop.base.places import ignore_configuration
@@ -219,13 +234,15 @@ def run(chosen: argparse.Namespace) -> int:
     command = chosen.run_by.command_work
     from multidrop.base import registry
     from multidrop.base.errors import Diagnostic, TransportLost
+    from multidrop.shell.hooks import Added
     from multidrop.shell.streams.stdout import fail
 
     context = copy_context()
     if hasattr(chosen, "no_config"):
         context.run(imported("multidrop.commands.machine:ignore"))
     try:
-        code: int = context.run(command, chosen)
+        more = {"added": Added(chosen.command, chosen)} if getattr(chosen.run_by, "open", False) else {}
+        code: int = context.run(partial(command, **more), chosen)
         return code
     except (Diagnostic, TransportLost) as problem:
         return fail(problem)
@@ -255,10 +272,10 @@ def build(given: Sequence[str] = ()) -> Parser:
     parser.add_argument("--version", action=_Version, nargs=0, help="show the version and exit")
     _add_no_config(parser)
     if given[:1] != ["--version"]:
-        from multidrop.shell.operations.operation import Operation
+        from multidrop.commands.operations import START
         from multidrop.shell.operations.table import COMMANDS
 
-        parser.set_defaults(run_by=Operation(run="lines.start"))
+        parser.set_defaults(run_by=START)
         parser.add_commands(COMMANDS.parts(""), given, "COMMAND", required=False)
     return parser
 

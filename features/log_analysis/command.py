@@ -63,7 +63,7 @@ def judge(chosen: argparse.Namespace) -> int:
 
 def at(chosen: argparse.Namespace) -> int:
     """Print what was known at a time: the last entry of each kind and place, and the last polls."""
-    found = moments.known(log_path(chosen), chosen.time)
+    found = moments.known(log_path(chosen.file), chosen.time)
 
     def work() -> None:
         if found.backs and not chosen.json:

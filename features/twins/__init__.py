@@ -2,19 +2,25 @@
 
 from __future__ import annotations
 
-import argparse
-from typing import TYPE_CHECKING
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Annotated
 
 from multidrop.base.feature import Feature
 from multidrop.shell.hooks import AtSession, Options, Switch
+from multidrop.shell.operations.argument_types import RAW
 from multidrop.shell.operations.operation import Operation
+from multidrop.shell.operations.parameter import Argument
 
 if TYPE_CHECKING:
     from multidrop.shell.session import Session
     from multidrop.shell.verbs.call import Call
 
 
-TWIN = {"--twin": "run a simulated twin beside each drive; warn of differences"}
+@dataclass(frozen=True, kw_only=True)
+class Asked:
+    """What a command is asked for."""
+
+    twin: Annotated[bool, Argument("run a simulated twin beside each drive; warn of differences", one_of=RAW)] = False
 
 
 async def _twin(call: Call) -> None:
@@ -34,17 +40,17 @@ def _runs(session: Session) -> bool:
     return session.buses.get(session.selected_bus) in session.predicted
 
 
-def _want(session: Session, chosen: argparse.Namespace) -> None:
+def _want(session: Session, asked: Asked) -> None:
     """Let each bus whose drives are found get twins."""
-    if chosen.twin:
+    if asked.twin:
         from multidrop.features.twins.twins import Twins
 
         session.hooks.part(Twins).wanted = True
 
 
-async def _start(session: Session, chosen: argparse.Namespace) -> None:
+async def _start(session: Session, asked: Asked) -> None:
     """Begin twins before the first line of a stream."""
-    if chosen.twin:
+    if asked.twin:
         from multidrop.features.twins.twins import Twins
 
         for bus in list(session.buses.values()):
@@ -84,7 +90,7 @@ its twin moves on. `/twin` alone lists the twins.
             "a twin beside each drive of the line, or none",
             _runs,
         ),
-        Options("tui", TWIN, "--raw", prepare=_want),
-        Options("shell", TWIN, "--raw", prepare=_want, opened=_start),
+        Options("tui", Asked, prepare=_want),
+        Options("shell", Asked, prepare=_want, opened=_start),
     ),
 )

@@ -6,15 +6,24 @@ from dataclasses import dataclass
 from typing import Annotated
 
 from multidrop.shell.operations import arguments
-from multidrop.shell.operations.parameter import Argument, Listed
+from multidrop.shell.operations.parameter import Argument, Listed, OneOf
 
 # What is in files
 
 FileName = Annotated[str, Argument(metavar="FILE", listed=(Listed.FILE,))]
 MacroName = Annotated[str, Argument(metavar="MACRO", listed=(Listed.MACRO,))]
 
+# What is open
+
+Address = Annotated[str, Argument(metavar="ADDR", listed=(Listed.DRIVE,))]
+MaybeAddress = Annotated[str, Argument(metavar="ADDR", listed=(Listed.DRIVE,), omitted="")]
+"""Before an argument that may not be left out."""
+BusName = Annotated[str, Argument(metavar="BUS", listed=(Listed.BUS,))]
+
 # Values
 
+Seconds = Annotated[float, Argument(metavar="SECONDS", read=arguments.duration)]
+Switch = Annotated[str, Argument(metavar="on|off", words={"on": "", "off": ""})]
 NamedValue = Annotated[
     tuple[str, str], Argument(metavar="NAME=VALUE", read=arguments.named_value, action=arguments.Named)
 ]
@@ -22,6 +31,13 @@ NamedValue = Annotated[
 
 # What commands open, ask and report
 
+Url = Annotated[str, Argument("what to open", metavar="URL", listed=(Listed.URL,))]
+UrlForm = Annotated[str, Argument(metavar="URL", listed=(Listed.URL,))]
+"""Of a verb, whose help explains it."""
+SearchedPort = Annotated[
+    str,
+    Argument("the port to search; its baud rate is tried first", metavar="PORT-OR-URL", listed=(Listed.URL,)),
+]
 Opened = Annotated[str, Argument("what to open; may be repeated", metavar="URL", listed=(Listed.URL,))]
 RoleUrl = Annotated[
     tuple[str, str],
@@ -37,6 +53,22 @@ SetValue = Annotated[
 ]
 Yes = Annotated[bool, Argument("answer every question with yes beforehand")]
 Beyond = Annotated[bool, Argument("let moves leave the travel of their axis, which --yes does not")]
+JsonDrives = Annotated[bool, Argument("print one JSON object a drive")]
+JsonObjects = Annotated[bool, Argument("print one JSON object a line")]
+NoReconnect = Annotated[bool, Argument("give up a lost connection, and do not try again")]
+RAW = OneOf("raw")
+"""What excludes raw mode."""
+Raw = Annotated[bool, Argument("look for no drives: bytes both ways, with times and in hex", one_of=RAW)]
+Drives = Annotated[
+    str,
+    Argument(
+        "the drive (default: the first), or all; may be repeated",
+        metavar="ADDR",
+        listed=(Listed.DRIVE,),
+        action=arguments.Several,
+    ),
+]
+"""The drives of a command, with commas between several."""
 JsonLines = Annotated[bool, Argument("print one JSON object a line, and a summary")]
 JunitFile = Annotated[str, Argument("write the checks to a JUnit XML file", metavar="FILE", listed=(Listed.FILE,))]
 
@@ -66,23 +98,17 @@ class Agreeing:
     beyond: Beyond = False
 
 
-# Drives, and what is open for a command
+# Drives, programs and settings
 
-Url = Annotated[str, Argument("what to open", metavar="URL", listed=(Listed.URL,))]
-OfDrive = Annotated[str, Argument(metavar="ADDR", listed=(Listed.DRIVE,))]
-Drives = Annotated[
-    str, Argument("the drive (default: the first), or all; may be repeated", "ADDR", action=arguments.Several)
-]
-"""The drives of a command, with commas between several."""
 DrivesOfFiles = Annotated[
     str,
     Argument(
         "the drive (default: the first), or all; all or several: FILE is a folder of files; may be repeated",
         "ADDR",
+        listed=(Listed.DRIVE,),
         action=arguments.Several,
     ),
 ]
-AsJson = Annotated[bool, Argument("print one JSON object a line")]
 
 
 # Programs of drives
@@ -109,7 +135,7 @@ class Checking:
         ),
     ] = None
     format: Annotated[bool, Argument("rewrite files without errors in canonical spelling; remarks stay")] = False
-    json: AsJson = False
+    json: JsonObjects = False
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -138,7 +164,7 @@ class Testing:
         tuple[str, ...],
         Argument("print a variable whenever a line has changed it; may be repeated", "NAME"),
     ] = ()
-    json: AsJson = False
+    json: JsonObjects = False
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -124,6 +124,12 @@ def one_text(text: str) -> str:
     return words[0] if len(words) == 1 else text
 
 
+def per_turn(text: str) -> str:
+    if "/" not in text:
+        raise argparse.ArgumentTypeError(f"{text} is no unit of a turn or a step, as mm/turn")
+    return text
+
+
 def named_value(text: str) -> tuple[str, str]:
     name, sign, value = text.partition("=")
     if not sign or not name:
@@ -256,14 +262,10 @@ def tested_personalities() -> Sequence[str]:
     return tuple(personality for name in PROGRAMS for personality in simulated()[name].personalities)
 
 
-def spoken() -> Mapping[str, Any]:
+def languages() -> list[str]:
     from multidrop.dialects.families import FAMILIES
 
-    return {
-        "help": "in this language (default: the first that has the word)",
-        "choices": list(FAMILIES),
-        "default": None,
-    }
+    return list(FAMILIES)
 
 
 def relayed() -> str:
@@ -272,17 +274,15 @@ def relayed() -> str:
     return ports()
 
 
-def dialect() -> Mapping[str, Any]:
+def scanned_languages() -> list[str]:
     from multidrop.dialects.families import FAMILIES
 
-    languages = [name for name, family in FAMILIES.items() if family.scan is not None]
-    return {"help": "this language only", "choices": languages}
+    return [name for name, family in FAMILIES.items() if family.scan is not None]
 
 
-def freed_dialect() -> Mapping[str, Any]:
-    """Declare the language of a drive that `rescue` can free."""
+def freed_languages() -> list[str]:
+    """The languages of drives that `rescue` can free."""
     from multidrop.dialects.families import FAMILIES
 
     scans = {name: family.scan() for name, family in FAMILIES.items()}
-    languages = [name for name, scan in scans.items() if scan is not None and scan.clears]
-    return {"help": "this language only", "choices": languages}
+    return [name for name, scan in scans.items() if scan is not None and scan.clears]

@@ -55,7 +55,7 @@ class OneOf:
     required: bool = False
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Argument:
     """What an annotation says of an argument, besides its type. Functions are called when it is needed."""
 
@@ -73,10 +73,12 @@ class Argument:
     """Another name of an option: `-o`."""
     option: str = ""
     """The name of an option, where it is not that of the parameter."""
+    alone: Any = EMPTY
+    """The value of an option that is given without one."""
+    omitted: Any = EMPTY
+    """The default of an argument that may be left out before one that may not: `[ADDR] LABEL`."""
     rest: bool = False
     """The rest of a verb's line as it was typed; the words of a command, with blanks between them."""
-    at_least_one: bool = False
-    """Of `*values`: a line has one."""
     one_of: OneOf | None = None
     action: type[argparse.Action] | None = None
     """What argparse does with the values, where it is not the usual."""
@@ -182,14 +184,14 @@ def real(text: str) -> float:
 READERS: Mapping[Any, Read] = {int: whole, float: real}
 
 
-def parameters(function: Callable[..., object], given: int = 0) -> tuple[Parameter, ...]:
-    """The arguments of a function besides its first ones, which it is `given`, and which no line has.
+def parameters(function: Callable[..., object], given: int = 0, besides: Collection[str] = ()) -> tuple[Parameter, ...]:
+    """The arguments of a function, without the first ones, which it is `given`, and those `besides`: no line has them.
 
     Raises Diagnostic for an annotation that names what the module does not have, or is none.
     """
     found = [*inspect.signature(function).parameters.values()][given:]
     scope = getattr(inspect.unwrap(function), "__globals__", {})
-    return tuple(each for one in found for each in _of(one, scope, function))
+    return tuple(each for one in found if one.name not in besides for each in _of(one, scope, function))
 
 
 def _of(one: inspect.Parameter, scope: Mapping[str, Any], function: Callable[..., object]) -> Iterator[Parameter]:
@@ -203,7 +205,7 @@ def _of(one: inspect.Parameter, scope: Mapping[str, Any], function: Callable[...
         yield from (replace(each, holder=(one.name, kind)) for each in of_fields(kind))
         return
     starred = one.kind is ANY_NUMBER
-    default = one.default if not starred else EMPTY if argument.at_least_one else ()
+    default = () if starred else argument.omitted if one.default is EMPTY else one.default
     yield Parameter(one.name, kind, argument, default, one.kind is BY_NAME, several or starred, starred)
 
 

@@ -8,7 +8,7 @@ from typing import Any, NoReturn
 
 from multidrop.shell.line_syntax import divided, split
 from multidrop.shell.operations.arguments import Each, Once, OnceFlag
-from multidrop.shell.operations.parameter import OneOf, Parameter
+from multidrop.shell.operations.parameter import EMPTY, OneOf, Parameter
 
 
 class WrongWords(Exception):
@@ -22,11 +22,21 @@ def add_parameters(
     does.
     """
     groups: dict[OneOf, argparse._ActionsContainer] = {}
-    for each in parameters:
+    for each in _together(parameters):
         one_of = each.argument.one_of
         if one_of is not None and one_of not in groups:
             groups[one_of] = parser.add_mutually_exclusive_group(required=one_of.required)
         _add(parser if one_of is None else groups[one_of], each, flag)
+
+
+def _together(parameters: Sequence[Parameter]) -> list[Parameter]:
+    """The arguments, those that exclude each other one after the other: so argparse shows them."""
+    firsts = {each.argument.one_of: number for number, each in reversed([*enumerate(parameters)])}
+    at = {
+        each.key: firsts[each.argument.one_of] if each.argument.one_of is not None else number
+        for number, each in enumerate(parameters)
+    }
+    return sorted(parameters, key=lambda each: at[each.key])
 
 
 def _add(parser: argparse._ActionsContainer, one: Parameter, flag: str | type[argparse.Action]) -> None:
@@ -45,6 +55,8 @@ def _add(parser: argparse._ActionsContainer, one: Parameter, flag: str | type[ar
         options["metavar"] = one.value.removesuffix(" ...")
     if not one.required:
         options["default"] = list(one.default) if one.several else one.default
+    if one.argument.alone is not EMPTY:
+        options |= {"nargs": "?", "const": one.argument.alone}
     if one.argument.action is not None:
         options["action"] = one.argument.action
     if one.option:

@@ -21,6 +21,8 @@ from multidrop.shell.operations.parsing import LineParser, add_parameters, value
 if TYPE_CHECKING:
     from multidrop.shell.workspace import Workspace
 
+ADDED = "added"
+"""The parameter with the options of features."""
 Call = Any
 """`shell.verbs.call.Call`, which knows the session and so all verbs; a function names it, and mypy checks its body."""
 
@@ -74,6 +76,8 @@ class Operation(NamedTuple):
     """The help on a group explains URLs, as that on a command with a URL does."""
     own_urls: str = ""
     """The explanation of its own URLs, where it takes other ones."""
+    open: bool = False
+    """Features may add options to the command: `do` is given them as `added`, a `shell.hooks.Added`."""
     connection: bool = False
     """The standard output of the command is a connection, whose end it notices itself."""
 
@@ -149,15 +153,16 @@ class Operation(NamedTuple):
         """Whether the help on the command explains URLs."""
         return self.urls or any(Listed.URL in each.argument.listed for each in self.command_arguments)
 
-    def add_to(self, parser: argparse.ArgumentParser) -> None:
-        """Add the arguments of the command to its parser."""
-        add_parameters(parser, self.command_arguments)
+    def add_to(self, parser: argparse.ArgumentParser, added: Sequence[Parameter] = ()) -> None:
+        """Add the arguments of the command to its parser, with those that features add."""
+        add_parameters(parser, (*self.command_arguments, *added))
 
-    def command_work(self, chosen: argparse.Namespace) -> int:
-        """Run the command; return the exit code."""
+    def command_work(self, chosen: argparse.Namespace, **more: object) -> int:
+        """Run the command; return the exit code. `more`: what `do` is given besides its arguments."""
         assert self.do is not None
         do, found = self.do, values(self.command_arguments, chosen)
         places, named = gathered(_own(do, int(self.through is not None)), found)
+        named |= more
         if self.through is None:
             result = do(*places, **named)
         else:
@@ -171,7 +176,7 @@ class Operation(NamedTuple):
 
 
 def _own(function: Callable[..., Any] | None, given: int) -> tuple[Parameter, ...]:
-    return () if function is None else _parameters(function, given)
+    return () if function is None else _parameters(function, given, (ADDED,))
 
 
 _parameters = cache(parameters)

@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable
 from typing import TYPE_CHECKING, Annotated
 
 from multidrop.base.errors import Diagnostic, Stopped
-from multidrop.shell.events import By
 from multidrop.shell.operations import arguments
 from multidrop.shell.operations.argument_types import (
     Agreeing,
@@ -19,9 +17,9 @@ from multidrop.shell.operations.argument_types import (
 )
 from multidrop.shell.operations.parameter import Argument, Listed
 from multidrop.shell.operations.typed import Operation, typed
+from multidrop.shell.verbs.macro_places import AtTerminal, Macros, at_terminal, changing
 
 if TYPE_CHECKING:
-    from multidrop.macros import MacroStore
     from multidrop.shell.verbs.call import Call
 
 GROUP = "Macros"
@@ -57,99 +55,6 @@ Imported = Annotated[
     ),
 ]
 ExportedMacro = Annotated[str, Argument("a macro (default: those on keys)", metavar="MACRO", listed=(Listed.MACRO,))]
-
-
-# Where macros are listed and changed
-
-
-class Macros:
-    """The macros, and the person who changes them, in a session."""
-
-    def __init__(self, call: Call) -> None:
-        self.call = call
-
-    @property
-    def store(self) -> MacroStore:
-        return self.call.session.macros
-
-    def say(self, *lines: str) -> None:
-        """Say what was done."""
-        for line in lines:
-            self.call.session.notify(line)
-        self.call.session.changed()
-
-    def warn(self, line: str) -> None:
-        self.call.session.notify(line, warning=True)
-
-    def output(self, line: str) -> None:
-        self.call.session.output(line)
-
-    def row(self, line: str) -> None:
-        """Print a line of a table."""
-        self.call.session.output(line, columns=True)
-
-    def written(self, file: str) -> str:
-        """The path of a file to write. Raises Diagnostic for one that a macro may not write."""
-        return self.call.output_file(file)
-
-    def text(self, file: str) -> tuple[str, str]:
-        """The text of a file, and its name for messages. Raises Diagnostic."""
-        from multidrop.base.files import text_of
-
-        return text_of(file), file
-
-
-class AtTerminal(Macros):
-    """The macros, and the person who changes them, without a session: what was done is said on standard error."""
-
-    def __init__(self) -> None:
-        from multidrop.macros import MacroStore
-        from multidrop.shell.configuration import Settings
-
-        self.settings = Settings()
-        self._store = MacroStore(self.settings.macros, self.settings.project_macros)
-
-    @property
-    def store(self) -> MacroStore:
-        return self._store
-
-    def say(self, *lines: str) -> None:
-        for line in lines:
-            self.warn(line)
-
-    def warn(self, line: str) -> None:
-        from multidrop.shell.streams.stdout import write
-
-        write(sys.stderr, line)
-
-    def output(self, line: str) -> None:
-        from multidrop.shell.streams.stdout import write
-
-        write(sys.stdout, line)
-
-    row = output
-
-    def written(self, file: str) -> str:
-        return file
-
-    def text(self, file: str) -> tuple[str, str]:
-        from multidrop.base.files import bounded, utf8
-
-        if file != "-":
-            return super().text(file)
-        name = "standard input"
-        return utf8(bounded(sys.stdin.buffer, name), name), name
-
-
-def changing(call: Call) -> Macros:
-    """The macros, for a person who changes them. Raises Diagnostic for a macro."""
-    if call.by is By.MACRO:
-        raise Diagnostic("a macro does not change macros", "/macro", "type the line")
-    return Macros(call)
-
-
-def at_terminal(work: Callable[[AtTerminal], object]) -> None:
-    work(AtTerminal())
 
 
 # List and change
@@ -259,6 +164,7 @@ def delete_at_terminal(macros: AtTerminal, macro: MacroName, *, yes: Yes = False
 
 async def play(call: Call, macro: MacroName, *values: NamedValue, times: Rounds = 1, fast: Fast = False) -> None:
     from multidrop.macros import Macro
+    from multidrop.shell.events import By
     from multidrop.shell.macro_arguments import settled
     from multidrop.shell.scripts import executor
     from multidrop.shell.workspace import LATCHED

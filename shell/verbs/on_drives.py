@@ -10,7 +10,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Awaitable, Callable
 from typing import TYPE_CHECKING, Generic, TypeVar
 
-from multidrop.shell.operations.argument_types import Drives, DrivesOfFiles, OfDrive, Url, Yes
+from multidrop.shell.operations.argument_types import Address, Drives, DrivesOfFiles, Url, Yes
 
 if TYPE_CHECKING:
     from multidrop.drives.drive import Drive
@@ -119,11 +119,11 @@ class OfUrl(OnDrives[int]):
         return correct_text_of(file)
 
 
-def of_call(call: Call, addr: OfDrive = "") -> OfCall:
+def of_call(call: Call, addr: Address = "") -> OfCall:
     return OfCall(call, addr)
 
 
-def one_of_call(call: Call, addr: OfDrive = "") -> OfCall:
+def one_of_call(call: Call, addr: Address = "") -> OfCall:
     """The drive of a verb's line whose program is meant. Raises Diagnostic for several."""
     from multidrop.shell.params.work import is_several
     from multidrop.shell.program_listing import of_one

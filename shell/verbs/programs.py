@@ -5,11 +5,12 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Annotated
 
 from multidrop.shell.operations.argument_types import (
+    Address,
     Checking,
     Downloading,
     Drives,
     FileName,
-    OfDrive,
+    MaybeAddress,
     ProgramFile,
     Testing,
     Url,
@@ -31,7 +32,7 @@ Label = Annotated[str, Argument(metavar="LABEL")]
 OFF, NOW = "remove the break point", "break the running program where it is"
 BreakPoint = Annotated[str, Argument(metavar="LABEL|off|now", read=str, words={"off": OFF, "now": NOW})]
 Passes = Annotated[str, Argument(metavar="PASSES")]
-Watched = Annotated[str, Argument(metavar="NAME|off", read=str, words={"off": "watch nothing"}, at_least_one=True)]
+Watched = Annotated[str, Argument(metavar="NAME|off", read=str, words={"off": "watch nothing"})]
 AsDifferences = Annotated[bool, Argument("print one JSON object a difference: drive, line, here, at, there")]
 AsLines = Annotated[bool, Argument("print one JSON object a line of the drive: drive, at, text")]
 
@@ -70,7 +71,7 @@ def list_recorded(call: Call) -> str:
     return typed_lines.listed_line(call, words_of(call))
 
 
-async def list_(call: Call, addr: OfDrive = "", file: FileName = "") -> None:
+async def list_(call: Call, addr: Address = "", file: FileName = "") -> None:
     from multidrop.shell.programs import typed_lines
 
     await typed_lines.list_program(call, [addr, file])
@@ -147,31 +148,31 @@ def debugger_recorded(call: Call) -> str:
     return typed_lines.debugger_line(call, words_of(call))
 
 
-async def trace(call: Call, addr: OfDrive = "", label: Label = "") -> None:
+async def trace(call: Call, addr: Address = "", label: Label = "") -> None:
     from multidrop.shell.programs import typed_lines
 
     await typed_lines.trace(call, [addr, label])
 
 
-async def step(call: Call, addr: OfDrive = "", label: Label = "") -> None:
+async def step(call: Call, addr: Address = "", label: Label = "") -> None:
     from multidrop.shell.programs import typed_lines
 
     await typed_lines.step(call, [addr, label])
 
 
-async def continue_(call: Call, addr: OfDrive = "") -> None:
+async def continue_(call: Call, addr: Address = "") -> None:
     from multidrop.shell.programs import typed_lines
 
     await typed_lines.continue_(call, [addr])
 
 
-async def break_(call: Call, addr: OfDrive = "", place: BreakPoint = "", passes: Passes = "") -> None:
+async def break_(call: Call, addr: Address = "", place: BreakPoint = "", passes: Passes = "") -> None:
     from multidrop.shell.programs import typed_lines
 
     await typed_lines.break_(call, [addr, place, passes])
 
 
-async def watch(call: Call, addr: OfDrive = "", *names: Watched) -> None:
+async def watch(call: Call, addr: MaybeAddress, names: tuple[Watched, ...]) -> None:
     from multidrop.shell.programs import typed_lines
 
     await typed_lines.watch(call, [addr, *names])

@@ -5,7 +5,7 @@ import pytest
 from multidrop.base.errors import Diagnostic
 from multidrop.dialects.families import FAMILIES
 from multidrop.shell.operations.table import SCRIPT_VERBS, VERBS, find
-from multidrop.shell.verbs.session import described, explained, overview
+from multidrop.shell.verbs.explaining import described, explained, overview
 
 
 @pytest.mark.parametrize("name", SCRIPT_VERBS)
