@@ -37,6 +37,8 @@ OPERATIONS: tuple[str, ...] = (
     "multidrop.shell.verbs.units",
     "multidrop.shell.verbs.raw",
     "multidrop.shell.verbs.sim",
+    "multidrop.shell.verbs.settings",
+    "multidrop.shell.verbs.values",
     "multidrop.shell.verbs.programs",
     "multidrop.shell.verbs.macros",
     "multidrop.shell.verbs.waiting",

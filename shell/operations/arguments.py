@@ -6,8 +6,9 @@ A type makes a value of a text, or raises argparse's one line of error.
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterator, Mapping, Sequence
-from typing import Any
+import re
+from collections.abc import Iterator, Sequence
+from typing import Any, NamedTuple
 
 from multidrop.base.text import real
 
@@ -38,8 +39,10 @@ class Once(argparse.Action):
 class OnceFlag(Once):
     """Keeps that an option without a value was given, which a line may do once."""
 
-    def __init__(self, option_strings: Sequence[str], dest: str, help: str | None = None) -> None:
-        super().__init__(option_strings, dest, nargs=0, default=False, help=help)
+    def __init__(
+        self, option_strings: Sequence[str], dest: str, help: str | None = None, required: bool = False
+    ) -> None:
+        super().__init__(option_strings, dest, nargs=0, default=False, required=required, help=help)
 
     def __call__(self, parser: object, chosen: argparse.Namespace, values: object, option: object = None) -> None:
         super().__call__(parser, chosen, True, option)
@@ -156,6 +159,42 @@ def setting_names(text: str) -> frozenset[str]:
     return frozenset(name.strip().upper() for name in text.split(",") if name.strip())
 
 
+class Accessed(NamedTuple):
+    """Registers that a person reads or writes."""
+
+    address: int
+    count: int | None
+    """Of those to read; None: the value that begins there."""
+    values: Sequence[int] | None
+    """What is written; None: nothing."""
+
+
+def _number_of_register(text: str) -> int:
+    if not re.fullmatch(r"[+-]?(0[xX][0-9A-Fa-f]{1,16}|\d{1,20})", text, re.ASCII):
+        raise argparse.ArgumentTypeError(f"no number {text}; valid: as 87 or 0x57")
+    return int(text, 16 if "x" in text.lower() else 10)
+
+
+def register_access(text: str) -> Accessed:
+    """Read `ADDRESS`, `ADDRESS COUNT` or `ADDRESS =VALUE,VALUE`."""
+    found = re.fullmatch(r"(\S+?)(?:\s*=\s*(.+)|\s+(\S+))?", text.strip())
+    if found is None:
+        raise argparse.ArgumentTypeError("")
+    address = _number_of_register(found[1])
+    if not 0 <= address <= 0xFFFF:
+        raise argparse.ArgumentTypeError(f"no register {found[1]}; valid: 0 to 0xFFFF")
+    if found[2] is None:
+        return Accessed(address, _number_of_register(found[3]) if found[3] else None, None)
+    return Accessed(address, None, [_number_of_register(each.strip()) for each in found[2].split(",")])
+
+
+def output_number(text: str) -> int:
+    number = _number_of_register(text)
+    if not 1 <= number <= 0x10000:
+        raise argparse.ArgumentTypeError(f"no output {text}; valid: from 1")
+    return number
+
+
 def allowed(text: str) -> str:
     if not text:
         raise argparse.ArgumentTypeError("an empty path would allow the current folder; name the path")
@@ -197,10 +236,6 @@ def language_help() -> str:
     return f"default: {'; '.join(named)}; else {DEFAULT}"
 
 
-def language() -> Mapping[str, Any]:
-    return {"help": language_help(), "choices": program_language_names()}
-
-
 def titles() -> str:
     from multidrop.dialects.families import program_languages
 
@@ -238,17 +273,14 @@ def checked_personality() -> str:
     return f"the drive that the program is for (default: {usual_personality()})"
 
 
-def converted() -> Mapping[str, Any]:
+def converter_names() -> Sequence[str]:
     from multidrop.dialects.families import program_languages
 
-    names = [name for files in program_languages().values() for name in files.converters]
-    return {"help": "what the new file is for: %(choices)s", "choices": names, "required": True}
+    return [name for files in program_languages().values() for name in files.converters]
 
 
-def edited_personality() -> Mapping[str, Any]:
-    default = usual_personality()
-    about = f"the drive that programs are for, unless the editor names one (default: {default})"
-    return {"help": about, "type": str.upper, "choices": CheckedPersonalities(), "default": default}
+def edited_personality() -> str:
+    return f"the drive that programs are for, unless the editor names one (default: {usual_personality()})"
 
 
 def tested_personality() -> str:

@@ -42,7 +42,7 @@ def _together(parameters: Sequence[Parameter]) -> list[Parameter]:
 def _add(parser: argparse._ActionsContainer, one: Parameter, flag: str | type[argparse.Action]) -> None:
     options: dict[str, Any] = {"dest": one.key, "help": one.help or None}
     if one.flag:
-        parser.add_argument(*one.names, action=flag, **options)
+        parser.add_argument(*one.names, action=flag, required=one.required, **options)
         return
     choices = one.argument.choices() if one.argument.choices is not None else None
     if choices is not None:

@@ -71,7 +71,7 @@ SCRIPT_VERBS: Mapping[str, tuple[str, str]] = {
 """The verbs that only scripts have, each with its usage and its meaning."""
 SCRIPT_WORDS: Mapping[str, str] = {name: usage for name, (usage, _) in SCRIPT_VERBS.items()}
 """Their usage."""
-_FILES = ("drives",)
+_FILES: tuple[str, ...] = ()
 _HEAD = re.compile(r"""^\["?([^".\]]+)"?\]\n(?:usage = ["'](/\w+))?""", re.M)
 _ENTRY = re.compile(
     r"""^\[\S[^\n]*?(?:\.(\w+))?\]$|^((?:"[^"\n]*"|[\w.-]+)+)\ =\ (?:\"{3}\n(.*?)\"{3}|(\[\n.*?^\]|[^\n]+))$""",

@@ -7,7 +7,7 @@ functions that open a URL.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Sequence
 from typing import TYPE_CHECKING, Generic, TypeVar
 
 from multidrop.shell.operations.argument_types import Address, Drives, DrivesOfFiles, Url, Yes
@@ -99,17 +99,20 @@ class OfCall(OnDrives[Awaitable["int | None"]]):
 
 
 class OfUrl(OnDrives[int]):
-    """The drives of a URL, which is opened for the work. `agreed`: every question is answered with yes."""
+    """The drives of a URL, which is opened for the work.
 
-    def __init__(self, url: str, target: str, agreed: bool = False) -> None:
+    `agreed`: every question is answered with yes. `also`: other drives that the work is to find.
+    """
+
+    def __init__(self, url: str, target: str, agreed: bool = False, also: Sequence[str] = ()) -> None:
         super().__init__(target)
-        self.url, self.agreed = url, agreed
+        self.url, self.agreed, self.also = url, agreed, also
 
     def run(self, work: Work, *, unsolicited: bool = False) -> int:
         """Open the URL, do the work, and return the exit code."""
         from multidrop.shell.batch import runner
 
-        tried = self.target.split(",")
+        tried = [*self.target.split(","), *self.also]
         return runner.run([self.url], work, agreed=self.agreed, unsolicited=unsolicited, tried=tried)
 
     def program_text(self, file: str) -> str:
@@ -117,6 +120,16 @@ class OfUrl(OnDrives[int]):
         from multidrop.shell.programs.checking import correct_text_of
 
         return correct_text_of(file)
+
+
+def given_options(call: Call) -> list[str]:
+    """The options of a line as words, in the order of the usage."""
+    values = call.chosen.values
+    given = [(each.names[-1], values[each.key]) for each in call.chosen.form.options if values[each.key]]
+    words: list[str] = []
+    for name, value in given:
+        words += [name] if value is True else [name, value if isinstance(value, str) else ",".join(sorted(value))]
+    return words
 
 
 def of_call(call: Call, addr: Address = "") -> OfCall:

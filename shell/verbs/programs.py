@@ -17,7 +17,16 @@ from multidrop.shell.operations.argument_types import (
 )
 from multidrop.shell.operations.parameter import Argument, Listed
 from multidrop.shell.operations.typed import Operation, typed
-from multidrop.shell.verbs.on_drives import OfUrl, OnDrives, R_co, agreed_of_url, of_url, of_url_to_files, one_of_call
+from multidrop.shell.verbs.on_drives import (
+    OfUrl,
+    OnDrives,
+    R_co,
+    agreed_of_url,
+    given_options,
+    of_url,
+    of_url_to_files,
+    one_of_call,
+)
 
 if TYPE_CHECKING:
     from multidrop.drives.drive import Drive
@@ -93,7 +102,7 @@ def upload_recorded(call: Call) -> str:
     import shlex
 
     values = call.chosen.values
-    words = ("/upload", shlex.quote(values["file"]), _qualified(call, values["addr"]), "--raw" * values["raw"])
+    words = ("/upload", shlex.quote(values["file"]), _qualified(call, values["addr"]), *given_options(call))
     return " ".join(filter(None, words))
 
 
@@ -118,11 +127,8 @@ def download_recorded(call: Call) -> str:
     import shlex
 
     values = call.chosen.values
-    given = {each.names[-1]: values[each.key] for each in call.chosen.form.options}
-    options = [name if value is True else f"{name} {value}" for name, value in given.items() if value]
-    return " ".join(
-        filter(None, ("/download", shlex.quote(values["file"]), _qualified(call, values["addr"]), *options))
-    )
+    words = ("/download", shlex.quote(values["file"]), _qualified(call, values["addr"]), *given_options(call))
+    return " ".join(filter(None, words))
 
 
 def _qualified(call: Call, target: str) -> str:
