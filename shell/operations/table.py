@@ -39,38 +39,6 @@ VERB_GROUPS = {
 """The verbs in the order and the groups of `/help`."""
 COMMAND_ORDER = """demo tui shell send run sim program params macro poll snapshot ports relay scan rescue
     log config features help report completion"""
-SCRIPT_VERBS: Mapping[str, tuple[str, str]] = {
-    "/set": ("/set NAME EXPR", "gives a name a value, which is worked out once: a number, a text, a drive's word"),
-    "/if": ("/if EXPR", "executes the lines up to /else or /end if the expression holds"),
-    "/else": ("/else", "begins the lines that are executed if the expression of /if does not hold"),
-    "/end": ("/end", "ends a block of /if, /repeat, /while or /until"),
-    "/repeat": ("/repeat N", "executes the lines up to /end N times"),
-    "/while": (
-        "/while EXPR",
-        "executes the lines up to /end while the expression holds; it is asked before each round",
-    ),
-    "/until": (
-        "/until EXPR",
-        "executes the lines up to /end until the expression holds; it is asked before each round",
-    ),
-    "/expect": (
-        '/expect "TEXT" [SECONDS]',
-        "looks for a text in what the last command printed, and in what comes until then (1 s); fails without it",
-    ),
-    "/assert": (
-        "/assert [@ADDR] EXPR OP EXPR [+- N]",
-        "compares two values now, and ends the script where that does not hold; OP is ==, !=, <, <=, > or >=",
-    ),
-    "/verify": (
-        "/verify [@ADDR] EXPR OP EXPR [+- N]",
-        "compares as /assert does, but goes on where that does not hold; the end of the script is then exit code 1",
-    ),
-    "/print": ("/print TEXT", "prints a text to standard output; {NAME} is replaced by its value"),
-    "/call": ("/call FILE|MACRO [NAME=VALUE ...]", "executes another script, or plays a macro, with these values"),
-}
-"""The verbs that only scripts have, each with its usage and its meaning."""
-SCRIPT_WORDS: Mapping[str, str] = {name: usage for name, (usage, _) in SCRIPT_VERBS.items()}
-"""Their usage."""
 _FILES = ("programs", "drives")
 _HEAD = re.compile(r"""^\["?([^".\]]+)"?\]\n(?:usage = ["'](/\w+))?""", re.M)
 _ENTRY = re.compile(
@@ -101,7 +69,7 @@ def _verbs(those: Iterable[typed.Operation]) -> dict[str, AnyVerb]:
     """Verbs by name, each with its forms."""
     found: dict[str, list[typed.Operation]] = {}
     for each in those:
-        if each.verb:
+        if each.verb and each.script is None:
             found.setdefault(each.name, []).append(each)
     return {name: Verb(tuple(forms)) for name, forms in found.items()}
 
@@ -272,6 +240,18 @@ COMMANDS: Declared[AnyCommand] = Declared(
 """By their words, in the order of `--help`; the parts of a group after it."""
 
 
+@cache
+def script_verbs() -> Mapping[str, Verb]:
+    """The verbs that only scripts have, by name, in the order of `/help`."""
+    return {each.name: Verb((each,)) for each in core() if each.script is not None}
+
+
+def script_verb(name: str) -> typed.Operation | None:
+    """A verb of scripts; None for any other word."""
+    found = script_verbs().get(name)
+    return found.main if found is not None else None
+
+
 def groups() -> dict[str, list[str]]:
     """The verbs by the titles of `/help`, those of features among them."""
     found = {title: names.split() for title, names in VERB_GROUPS.items()}
@@ -352,15 +332,15 @@ def find(name: str) -> AnyVerb:
 
     Raises Diagnostic with similar names.
     """
-    if name not in VERBS and name not in SCRIPT_WORDS:
+    if name not in VERBS and name not in script_verbs():
         join_others()
     if name in VERBS:
         return VERBS[name]
     import difflib
 
-    if name in SCRIPT_WORDS:
+    if name in script_verbs():
         raise Diagnostic(f"{name} is a verb of scripts", hint="multidrop run SCRIPT, or run - for standard input")
-    near = difflib.get_close_matches(name, [*VERBS, *SCRIPT_WORDS], 2) or ["/help"]
+    near = difflib.get_close_matches(name, [*VERBS, *script_verbs()], 2) or ["/help"]
     raise Diagnostic(f"no verb {name}", hint=f"try {' or '.join(near)}")
 
 

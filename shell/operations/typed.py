@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable, Mapping, Sequence
+from enum import Enum, auto
 from functools import cache
 from inspect import isawaitable, iscoroutine
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -20,6 +21,40 @@ from multidrop.shell.operations.parsing import LineParser, add_parameters, value
 
 if TYPE_CHECKING:
     from multidrop.shell.workspace import Workspace
+
+
+class Kind(Enum):
+    """What a verb of scripts is to the lines around it."""
+
+    STEP = auto()
+    IF = auto()
+    """Whether it returns true decides over the lines up to `/else` or `/end`."""
+    COUNT = auto()
+    """The lines up to `/end` are executed as often as it returns."""
+    WHILE = auto()
+    """They are executed as long as it returns true, before each round."""
+    BETWEEN = auto()
+    """It divides or ends a block."""
+    CALL = auto()
+    """It stands for the lines of a file or a macro."""
+
+
+class Scripted(NamedTuple):
+    """What makes a verb one of scripts, which get to it line by line. `do` is given a `shell.scripts.use.Use`."""
+
+    kind: Kind = Kind.STEP
+    check: Callable[..., None] | None = None
+    """Raises Diagnostic for arguments that are wrong before anything is sent. It is given a `Checking` of
+    `shell.scripts.use`, and the arguments."""
+    bare: bool = False
+    """Its names have no braces: it has an expression."""
+    steers: bool = False
+    """It has a result only where it fails."""
+    verdict: bool = False
+    """It is a check, which reports count."""
+    goes_on: bool = False
+    """A check that fails is noted, and the script goes on."""
+
 
 ADDED = "added"
 """The parameter with the options of features."""
@@ -68,6 +103,8 @@ class Operation(NamedTuple):
     """It changes a drive, or lets it run."""
     checked: bool = False
     """A script is refused as a whole for arguments that are wrong; of other verbs a value may be unknown by then."""
+    script: Scripted | None = None
+    """It is a verb of scripts alone."""
     immediate: bool = False
     """The verb is done at once, so a stop has nothing to end."""
     concurrent: bool = False
@@ -125,15 +162,18 @@ class Operation(NamedTuple):
 
     async def work(self, call: Call, found: Mapping[str, Any]) -> None:
         """Do it for a verb's line."""
-        assert self.do is not None
         first: Any = call
         if self.at is not None:
             places, named = gathered(_own(self.at, 1), found)
             first = self.at(call, *places, **named)
+        await self.done(first, found)
+
+    async def done(self, first: Any, found: Mapping[str, Any]) -> Any:
+        """Call the function with what it is given first; return what it returns."""
+        assert self.do is not None
         places, named = gathered(_own(self.do, 1), found)
         result = self.do(first, *places, **named)
-        if isawaitable(result):
-            await result
+        return await result if isawaitable(result) else result
 
     # As a command
 
