@@ -43,6 +43,7 @@ OPERATIONS: tuple[str, ...] = (
     "multidrop.shell.verbs.macros",
     "multidrop.shell.verbs.waiting",
     "multidrop.shell.verbs.session",
+    "multidrop.shell.verbs.scripts",
 )
 """The modules that declare the core's own operations: each has a tuple `OPERATIONS`."""
 WHEEL = "multidrop"

@@ -7,8 +7,8 @@ from typing import Annotated
 from multidrop.base.feature import Feature
 from multidrop.shell.operations import arguments
 from multidrop.shell.operations.argument_types import Url
+from multidrop.shell.operations.operation import Operation
 from multidrop.shell.operations.parameter import Argument, Listed, OneOf
-from multidrop.shell.operations.typed import Operation
 
 REPORT = OneOf("report", required=True)
 Certified = Annotated[

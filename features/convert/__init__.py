@@ -7,8 +7,8 @@ from typing import Annotated
 from multidrop.base.feature import Feature
 from multidrop.shell.operations import arguments
 from multidrop.shell.operations.argument_types import ProgramFile
+from multidrop.shell.operations.operation import Operation
 from multidrop.shell.operations.parameter import Argument, Listed
-from multidrop.shell.operations.typed import Operation
 
 For = Annotated[
     str, Argument("what the new file is for: %(choices)s", metavar="DRIVES", choices=arguments.converter_names)

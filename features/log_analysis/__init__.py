@@ -6,8 +6,8 @@ from typing import Annotated
 
 from multidrop.base.feature import Feature
 from multidrop.shell.operations.argument_types import Yes
+from multidrop.shell.operations.operation import Operation
 from multidrop.shell.operations.parameter import Argument, Listed, OneOf
-from multidrop.shell.operations.typed import Operation
 
 AGAINST = OneOf("against", required=True)
 FILE = (Listed.FILE,)

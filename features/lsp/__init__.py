@@ -8,8 +8,8 @@ from typing import Annotated
 from multidrop.base.errors import Diagnostic
 from multidrop.base.feature import Feature
 from multidrop.shell.operations import arguments
+from multidrop.shell.operations.operation import Operation
 from multidrop.shell.operations.parameter import Argument, OneOf
-from multidrop.shell.operations.typed import Operation
 from multidrop.shell.streams.stdout import write
 
 SERVED = OneOf("served")

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 
 from multidrop.base.feature import Feature
 from multidrop.shell.operations.argument_types import NoReconnect, Url
+from multidrop.shell.operations.operation import Operation, typed
 from multidrop.shell.operations.parameter import Argument, Listed, OneOf
-from multidrop.shell.operations.typed import Operation, typed
 from multidrop.shell.plot_targets import PlotTargets
 
 if TYPE_CHECKING:

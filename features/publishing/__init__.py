@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 from multidrop.base.feature import Feature
 from multidrop.shell.connect.scheme import NoLine
 from multidrop.shell.operations.argument_types import JsonObjects, NoReconnect, Url
+from multidrop.shell.operations.operation import Operation
 from multidrop.shell.operations.parameter import Argument, Listed
-from multidrop.shell.operations.typed import Operation
 from multidrop.shell.sections import Section
 
 if TYPE_CHECKING:

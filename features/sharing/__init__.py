@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import Annotated
 
 from multidrop.base.feature import Feature
+from multidrop.shell.operations.operation import Operation
 from multidrop.shell.operations.parameter import Argument, Listed
-from multidrop.shell.operations.typed import Operation
 
 Lent = Annotated[str, Argument("the port to lend", metavar="URL", listed=(Listed.URL,))]
 Endpoint = Annotated[

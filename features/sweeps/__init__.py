@@ -8,8 +8,8 @@ from typing import Annotated
 from multidrop.base.feature import Feature
 from multidrop.shell.operations import arguments
 from multidrop.shell.operations.argument_types import ProgramFile, ProgramLanguage, RunLabel, Yes
+from multidrop.shell.operations.operation import Operation
 from multidrop.shell.operations.parameter import Argument, Listed, OneOf
-from multidrop.shell.operations.typed import Operation
 from multidrop.shell.sections import Section, text_list
 
 CASES, WHERE = OneOf("cases"), OneOf("where")

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import Annotated
 
 from multidrop.base.feature import Feature
+from multidrop.shell.operations.operation import Operation
 from multidrop.shell.operations.parameter import Argument, Listed
-from multidrop.shell.operations.typed import Operation
 
 Log = Annotated[str, Argument("a session log; its last session is used", listed=(Listed.FILE,))]
 Cell = Annotated[

@@ -10,8 +10,8 @@ from multidrop.base.feature import Feature
 from multidrop.base.text import whole
 from multidrop.shell.hooks import AtSession, Options, Switch
 from multidrop.shell.operations.argument_types import RAW, Address
+from multidrop.shell.operations.operation import Operation, typed
 from multidrop.shell.operations.parameter import Argument
-from multidrop.shell.operations.typed import Operation, typed
 
 if TYPE_CHECKING:
     from multidrop.shell.session import Session

@@ -127,6 +127,12 @@ def one_text(text: str) -> str:
     return words[0] if len(words) == 1 else text
 
 
+def some_text(text: str) -> str:
+    if not text:
+        raise argparse.ArgumentTypeError("")
+    return text
+
+
 def per_turn(text: str) -> str:
     if "/" not in text:
         raise argparse.ArgumentTypeError(f"{text} is no unit of a turn or a step, as mm/turn")

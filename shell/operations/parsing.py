@@ -8,7 +8,7 @@ from typing import Any, NoReturn
 
 from multidrop.shell.line_syntax import divided, split
 from multidrop.shell.operations.arguments import Each, Once, OnceFlag
-from multidrop.shell.operations.parameter import EMPTY, OneOf, Parameter
+from multidrop.shell.operations.parameter import EMPTY, READ_RAISES, OneOf, Parameter
 
 
 class WrongWords(Exception):
@@ -105,7 +105,7 @@ class LineParser(argparse.ArgumentParser):
                 raise WrongWords
             try:
                 rest = {self._rest.key: self._rest.read(text) if text else self._rest.default}
-            except argparse.ArgumentTypeError as wrong:
+            except READ_RAISES as wrong:
                 raise WrongWords(str(wrong)) from None
         else:
             words = split(text, where)

@@ -8,7 +8,7 @@ from multidrop.base.errors import Diagnostic
 from multidrop.dialects.families import DEFAULT, FAMILIES, languages, program_languages
 from multidrop.dialects.family import Language
 from multidrop.shell.operations.conditions import ON_SCREEN
-from multidrop.shell.operations.table import SCRIPT_VERBS, VERBS, groups
+from multidrop.shell.operations.table import VERBS, groups, script_verbs
 from multidrop.shell.session import Session
 
 WIDTH = 28
@@ -47,9 +47,9 @@ def overview() -> list[str]:
             mark = "[screen] " * (each.fits in ON_SCREEN)
             lines.append(f"{each.usage if len(each.usage) <= WIDTH else '':<{WIDTH}}  {mark}{each.lines[0]}")
     lines += ["", "In scripts only:"]
-    for usage, meaning in SCRIPT_VERBS.values():
-        lines += [usage] if len(usage) > WIDTH else []
-        lines.append(f"{usage if len(usage) <= WIDTH else '':<{WIDTH}}  {meaning}")
+    for each in script_verbs().values():
+        lines += [each.usage] if len(each.usage) > WIDTH else []
+        lines.append(f"{each.usage if len(each.usage) <= WIDTH else '':<{WIDTH}}  {each.help}")
     return [*lines, "", "[screen]: only on the screen, which multidrop tui shows"]
 
 
@@ -65,7 +65,7 @@ def described(name: str, language: Language | None = None, product: str = "") ->
     files = program_languages().items()
     stored = {key: lines for key, each in files if (lines := each.editing.describe(name, product))}
     also = f"/{name.lower()}"
-    more = [f"also: the verb {also}; help {also} explains it"] * (also in VERBS or also in SCRIPT_VERBS)
+    more = [f"also: the verb {also}; help {also} explains it"] * (also in VERBS or also in script_verbs())
     for each in [language] if language else languages():
         if each.knows(name):
             return [*each.describe(name, product), *more]
@@ -75,11 +75,11 @@ def described(name: str, language: Language | None = None, product: str = "") ->
     if f"/{name}" in VERBS:
         return described(f"/{name}")
     word = name.lower() if name.startswith("/") else f"/{name.lower()}"
-    if word in SCRIPT_VERBS:
-        usage, meaning = SCRIPT_VERBS[word]
+    if word in script_verbs():
+        verb = script_verbs()[word]
         return [
-            usage,
-            f"{meaning[0].upper()}{meaning[1:]}.",
+            verb.usage,
+            f"{verb.help[0].upper()}{verb.help[1:]}.",
             "In scripts only: multidrop run SCRIPT, or /play of a macro.",
         ]
     if language is None and stored:
@@ -89,7 +89,7 @@ def described(name: str, language: Language | None = None, product: str = "") ->
             f"this drive has no command {name}", "/help", f"multidrop help {name} --dialect {others[0]} explains it"
         )
     own = language or FAMILIES[DEFAULT].language
-    known = {key.removeprefix("/").upper(): key for key in (*SCRIPT_VERBS, *VERBS)}
+    known = {key.removeprefix("/").upper(): key for key in (*script_verbs(), *VERBS)}
     known |= {} if name.startswith("/") else {each.upper(): each for each in own.names()}
     near = difflib.get_close_matches(name.removeprefix("/").upper(), known, 3)
     hint = f"similar: {', '.join(known[each] for each in near)}" if near else "/help lists the verbs"

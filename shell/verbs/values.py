@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Annotated
 
 from multidrop.shell.operations import arguments, conditions
+from multidrop.shell.operations.operation import Operation, typed
 from multidrop.shell.operations.parameter import Argument, Listed
-from multidrop.shell.operations.typed import Operation, typed
 
 if TYPE_CHECKING:
     from multidrop.shell.verbs.call import Call
