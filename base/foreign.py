@@ -19,7 +19,7 @@ from types import GeneratorType
 from typing import Any
 
 from multidrop.base.errors import Diagnostic, DriveError, FeatureFailed, TransportLost, kind_and_text
-from multidrop.base.feature import Feature, Kinds
+from multidrop.base.feature import GUARD, Feature, Kinds
 from multidrop.base.isolation import LOG, OTHERS
 
 READ: Kinds = (Diagnostic, DriveError, TransportLost, BrokenPipeError)
@@ -59,6 +59,7 @@ class Guard:
             with self.calling(passes):
                 return self._result(function(*given, **named), passes)
 
+        vars(guarded)[GUARD] = self
         return guarded
 
     def _result(self, found: Any, passes: Kinds) -> Any:

@@ -21,9 +21,8 @@ from multidrop.base.on_demand import imported
 if TYPE_CHECKING:
     from _typeshed import SupportsWrite
 
-    from multidrop.shell.operations import typed
+    from multidrop.shell.operations.operation import Operation
     from multidrop.shell.operations.parameter import Parameter
-    from multidrop.shell.operations.table import AnyCommand
 
 URLS = """A URL is {}; sim: alone is the demo cell. Keys after a ?: dialect, drives=a,b,c, baud,
 party=0|1, checksum=0|1|2, em=0..3, echo=local, address=none, timeout=SECONDS, relay=multidrop|socat."""
@@ -62,7 +61,7 @@ def _columns() -> int:
 class Parser(argparse.ArgumentParser):
     """An argument parser that reports wrong usage in one line, and adds a command's arguments when it parses them."""
 
-    operation: AnyCommand | None = None
+    operation: Operation | None = None
     """None: the parser of all commands."""
     complete = True
     """False until the arguments of the command have been added."""
@@ -78,27 +77,17 @@ class Parser(argparse.ArgumentParser):
         """Add the arguments of the command, or its parts. One with both is a part if the first word names one."""
         if self.operation is None or self.complete:
             return
-        from multidrop.shell.operations import typed
-        from multidrop.shell.operations.operation import add_arguments
         from multidrop.shell.operations.table import COMMANDS
 
         self.complete = True
         own = COMMANDS.parts(self.operation.command)
         named = given[:1] and given[0] in own
-        if isinstance(self.operation, typed.Operation):
-            if self.operation.run and not named:
-                self._add_own(self.operation, given)
-        elif self.operation.run and not named:
-            arguments = self.operation.arguments
-            if _unknown(given, arguments):
-                _load_others(given)
-            add_arguments(self, arguments)
-            _add_no_config(self)
-            self.set_defaults(run_by=self.operation, command=self.operation.command)
+        if self.operation.run and not named:
+            self._add_own(self.operation, given)
         if own and (named or not self.operation.run):
             self.add_commands(own, given, "|".join(own), required=True)
 
-    def _add_own(self, operation: typed.Operation, given: Sequence[str]) -> None:
+    def _add_own(self, operation: Operation, given: Sequence[str]) -> None:
         """Add the arguments of the command, with the options of features."""
         from multidrop.shell import hooks
 
@@ -114,7 +103,7 @@ class Parser(argparse.ArgumentParser):
         self.set_defaults(run_by=operation, command=operation.command)
 
     def add_commands(
-        self, commands: Mapping[str, AnyCommand], given: Sequence[str], metavar: str, *, required: bool
+        self, commands: Mapping[str, Operation], given: Sequence[str], metavar: str, *, required: bool
     ) -> None:
         """Add the commands, or only the one that the first word names."""
         added = self.add_subparsers(prog=self.prog, metavar=metavar, required=required, parser_class=Parser)
@@ -163,15 +152,6 @@ class _Version(argparse.Action):
         parser.exit()
 
 
-def _unknown(given: Sequence[str], arguments: Mapping[str, Any]) -> bool:
-    """Whether a line has an option that no feature of the wheel declares, or asks for help: others may add one."""
-    known = {"--no-config"}
-    for notation, about in arguments.items():
-        inner = about if " | " in notation else [notation]
-        known |= {name for each in inner for name in each.partition(" ")[0].split("|")}
-    return any(each.startswith("-") and each.partition("=")[0] not in known for each in given)
-
-
 def _has_others(given: Sequence[str], known: Sequence[Parameter]) -> bool:
     """Whether a line has an option that no feature of the wheel declares, or asks for help: others may add one."""
     names = {"--no-config", *(name for each in known if each.option for name in each.names)}
@@ -196,7 +176,7 @@ def _warn(warnings: Sequence[str]) -> None:
         write(sys.stderr, *(f"warning: {each}" for each in warnings))
 
 
-def _the_one(name: str, commands: Mapping[str, AnyCommand]) -> Mapping[str, AnyCommand]:
+def _the_one(name: str, commands: Mapping[str, Operation]) -> Mapping[str, Operation]:
     """The command that a line asks for. Raises SystemExit where its feature is not there."""
     from multidrop.base.errors import Diagnostic
     from multidrop.shell.streams.stdout import fail
@@ -287,7 +267,7 @@ def urls() -> str:
     return URLS.format(sentence())
 
 
-def _epilog(operation: AnyCommand) -> str:
+def _epilog(operation: Operation) -> str:
     import textwrap
 
     from multidrop.shell.hooks import examples

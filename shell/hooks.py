@@ -16,7 +16,7 @@ from multidrop.base import registry
 from multidrop.base.errors import Diagnostic
 from multidrop.base.feature import Kinds
 from multidrop.shell.operations.operation import Examples
-from multidrop.shell.operations.parameter import Parameter, of_fields
+from multidrop.shell.operations.parameter import Parameter, guarded_as, of_fields
 from multidrop.shell.operations.parsing import values
 
 if TYPE_CHECKING:
@@ -80,7 +80,8 @@ class Options(NamedTuple):
     @property
     def parameters(self) -> tuple[Parameter, ...]:
         """The options. Raises Diagnostic where they cannot be read."""
-        return tuple(replace(each, holder=(self.options.__name__, self.options)) for each in of_fields(self.options))
+        found = (replace(each, holder=(self.options.__name__, self.options)) for each in of_fields(self.options))
+        return guarded_as(self.prepare, found)
 
 
 class Added:

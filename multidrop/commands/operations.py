@@ -22,8 +22,8 @@ from multidrop.shell.operations.argument_types import (
     Url,
     Yes,
 )
+from multidrop.shell.operations.operation import Operation
 from multidrop.shell.operations.parameter import Argument, Listed
-from multidrop.shell.operations.typed import Operation
 
 if TYPE_CHECKING:
     from multidrop.shell.hooks import Added

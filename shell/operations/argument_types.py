@@ -96,3 +96,102 @@ class Agreeing:
 
     yes: Yes = False
     beyond: Beyond = False
+
+
+# Drives, programs and settings
+
+DrivesOfFiles = Annotated[
+    str,
+    Argument(
+        "the drive (default: the first), or all; all or several: FILE is a folder of files; may be repeated",
+        "ADDR",
+        listed=(Listed.DRIVE,),
+        action=arguments.Several,
+    ),
+]
+
+
+# Programs of drives
+
+ProgramFile = Annotated[str, Argument(arguments.titles, metavar="FILE", listed=(Listed.FILE,))]
+ProgramLanguage = Annotated[str, Argument(arguments.language_help, choices=arguments.program_language_names)]
+RunLabel = Annotated[str, Argument("the label or program to execute (default: its own start)", metavar="LABEL")]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Checking:
+    """How program files are checked."""
+
+    language: ProgramLanguage = ""
+    personality: Annotated[
+        str,
+        Argument(arguments.checked_personality, "P", read=str.upper, choices=arguments.CheckedPersonalities),
+    ] = ""
+    cell: Annotated[
+        str | None,
+        Argument(
+            "the drive that the program is for, from a cell file such as a snapshot (CELL, CELL#BUS or CELL#BUS:NAME): "
+            "commands that its firmware or size lacks are named, too"
+        ),
+    ] = None
+    format: Annotated[bool, Argument("rewrite files without errors in canonical spelling; remarks stay")] = False
+    json: JsonObjects = False
+
+
+@dataclass(frozen=True, kw_only=True)
+class Testing:
+    """How program files are tested."""
+
+    language: ProgramLanguage = ""
+    personality: Annotated[
+        str | None,
+        Argument(arguments.tested_personality, "P", read=str.upper, choices=arguments.tested_personalities),
+    ] = None
+    cell: Annotated[str | None, Argument("a drive of a cell file and its world: CELL, CELL#BUS or CELL#BUS:NAME")] = (
+        None
+    )
+    until: Annotated[
+        float | None,
+        Argument("virtual seconds at most, for a program without an end", "SECONDS", read=arguments.duration),
+    ] = None
+    run: RunLabel = ""
+    trace: Annotated[bool, Argument("print each line that is executed, with its time and what it changed")] = False
+    breaks: Annotated[
+        tuple[str, ...],
+        Argument("end the run before this line; may be repeated", "LINE|LABEL[,PASSES]", option="--break"),
+    ] = ()
+    watch: Annotated[
+        tuple[str, ...],
+        Argument("print a variable whenever a line has changed it; may be repeated", "NAME"),
+    ] = ()
+    json: JsonObjects = False
+
+
+@dataclass(frozen=True, kw_only=True)
+class Downloading:
+    """How a program goes to a drive."""
+
+    save: Annotated[bool, Argument("save it with S, so that power-off does not lose it")] = False
+    run: Annotated[str, Argument("execute the program at this label at the end", metavar="LABEL")] = ""
+    only_changed: Annotated[bool, Argument("send nothing where the drive holds it already")] = False
+    no_verify: Annotated[bool, Argument("do not read the program back")] = False
+
+
+@dataclass(frozen=True, kw_only=True)
+class Restoring:
+    """How settings of a file go to a drive."""
+
+    dry_run: Annotated[bool, Argument("show the steps, and send nothing")] = False
+    save: Annotated[bool, Argument("keep the settings over power-off (S, STORE, STAP)")] = False
+    communication: Annotated[bool, Argument("restore communication settings too")] = False
+    named: Annotated[
+        frozenset[str],
+        Argument(
+            "restore these settings too, which can move the motor or belong to the unit",
+            metavar="NAME,...",
+            option="--with",
+            read=arguments.setting_names,
+            action=arguments.United,
+        ),
+    ] = frozenset()
+    other_product: Annotated[bool, Argument("restore what the drive has of another product's file")] = False

@@ -6,8 +6,9 @@ A type makes a value of a text, or raises argparse's one line of error.
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterator, Mapping, Sequence
-from typing import Any
+import re
+from collections.abc import Iterator, Sequence
+from typing import Any, NamedTuple
 
 from multidrop.base.text import real
 
@@ -42,8 +43,10 @@ class Once(argparse.Action):
 class OnceFlag(Once):
     """Keeps that an option without a value was given, which a line may do once."""
 
-    def __init__(self, option_strings: Sequence[str], dest: str, help: str | None = None) -> None:
-        super().__init__(option_strings, dest, nargs=0, default=False, help=help)
+    def __init__(
+        self, option_strings: Sequence[str], dest: str, help: str | None = None, required: bool = False
+    ) -> None:
+        super().__init__(option_strings, dest, nargs=0, default=False, required=required, help=help)
 
     def __call__(self, parser: object, chosen: argparse.Namespace, values: object, option: object = None) -> None:
         super().__call__(parser, chosen, True, option)
@@ -57,6 +60,13 @@ class Each(argparse.Action):
         if isinstance(values, tuple) and any(values[0] == name for name, *_ in before):
             raise argparse.ArgumentError(self, f"{values[0]} is given twice")
         setattr(chosen, self.dest, [*before, values])
+
+
+class United(argparse.Action):
+    """Keeps the names of all values of an option that is repeated."""
+
+    def __call__(self, parser: object, chosen: argparse.Namespace, values: Any, option: object = None) -> None:
+        setattr(chosen, self.dest, getattr(chosen, self.dest) | values)
 
 
 class Named(argparse.Action):
@@ -154,6 +164,47 @@ def key_and_values(text: str) -> tuple[str, str]:
     return key.strip(), values
 
 
+def setting_names(text: str) -> frozenset[str]:
+    """Read names of settings, with commas between several."""
+    return frozenset(name.strip().upper() for name in text.split(",") if name.strip())
+
+
+class Accessed(NamedTuple):
+    """Registers that a person reads or writes."""
+
+    address: int
+    count: int | None
+    """Of those to read; None: the value that begins there."""
+    values: Sequence[int] | None
+    """What is written; None: nothing."""
+
+
+def _number_of_register(text: str) -> int:
+    if not re.fullmatch(r"[+-]?(0[xX][0-9A-Fa-f]{1,16}|\d{1,20})", text, re.ASCII):
+        raise argparse.ArgumentTypeError(f"no number {text}; valid: as 87 or 0x57")
+    return int(text, 16 if "x" in text.lower() else 10)
+
+
+def register_access(text: str) -> Accessed:
+    """Read `ADDRESS`, `ADDRESS COUNT` or `ADDRESS =VALUE,VALUE`."""
+    found = re.fullmatch(r"(\S+?)(?:\s*=\s*(.+)|\s+(\S+))?", text.strip())
+    if found is None:
+        raise argparse.ArgumentTypeError("")
+    address = _number_of_register(found[1])
+    if not 0 <= address <= 0xFFFF:
+        raise argparse.ArgumentTypeError(f"no register {found[1]}; valid: 0 to 0xFFFF")
+    if found[2] is None:
+        return Accessed(address, _number_of_register(found[3]) if found[3] else None, None)
+    return Accessed(address, None, [_number_of_register(each.strip()) for each in found[2].split(",")])
+
+
+def output_number(text: str) -> int:
+    number = _number_of_register(text)
+    if not 1 <= number <= 0x10000:
+        raise argparse.ArgumentTypeError(f"no output {text}; valid: from 1")
+    return number
+
+
 def allowed(text: str) -> str:
     if not text:
         raise argparse.ArgumentTypeError("an empty path would allow the current folder; name the path")
@@ -181,13 +232,18 @@ def address(text: str) -> tuple[str, int]:
 # Arguments
 
 
-def language() -> Mapping[str, Any]:
+def program_language_names() -> Sequence[str]:
+    from multidrop.dialects.families import program_languages
+
+    return list(program_languages())
+
+
+def language_help() -> str:
     from multidrop.dialects.families import DEFAULT, program_languages
 
     known = program_languages()
     named = (f"{name} for {', '.join(each.endings)}" for name, each in known.items() if name != DEFAULT)
-    endings = f"default: {'; '.join(named)}; else {DEFAULT}"
-    return {"help": endings, "choices": list(known)}
+    return f"default: {'; '.join(named)}; else {DEFAULT}"
 
 
 def titles() -> str:
@@ -196,11 +252,14 @@ def titles() -> str:
     return " or ".join(f"{each.title} ({', '.join(each.endings)})" for each in program_languages().values())
 
 
-class _Checked:
+class CheckedPersonalities:
     """The personalities on which a check of a program depends; a family is imported only to look for one of them."""
 
     def __contains__(self, personality: object) -> bool:
         return any(personality == each for each in self)
+
+    def __len__(self) -> int:
+        return sum(1 for _ in self)
 
     def __iter__(self) -> Iterator[str]:
         from multidrop.simulator.declared import simulated
@@ -214,39 +273,35 @@ class _Checked:
         )
 
 
-def personality(about: str) -> Mapping[str, Any]:
-    """Declare the drive that programs are checked for."""
+def usual_personality() -> str:
     from multidrop.simulator.cell.spec import DriveSpec
 
-    default = DriveSpec().personality
-    about = f"{about} (default: {default})"
-    return {"help": about, "type": str.upper, "choices": _Checked(), "default": default}
+    return DriveSpec().personality
 
 
-def checked_personality() -> Mapping[str, Any]:
-    return personality("the drive that the program is for")
+def checked_personality() -> str:
+    return f"the drive that the program is for (default: {usual_personality()})"
 
 
-def converted() -> Mapping[str, Any]:
+def converter_names() -> Sequence[str]:
     from multidrop.dialects.families import program_languages
 
-    names = [name for files in program_languages().values() for name in files.converters]
-    return {"help": "what the new file is for: %(choices)s", "choices": names, "required": True}
+    return [name for files in program_languages().values() for name in files.converters]
 
 
-def edited_personality() -> Mapping[str, Any]:
-    return personality("the drive that programs are for, unless the editor names one")
+def edited_personality() -> str:
+    return f"the drive that programs are for, unless the editor names one (default: {usual_personality()})"
 
 
-def tested_personality() -> Mapping[str, Any]:
-    """Declare the simulated drive of a program test."""
-    from multidrop.simulator.cell.spec import DriveSpec
+def tested_personality() -> str:
+    return f"%(choices)s (default: the cell's, or {usual_personality()})"
+
+
+def tested_personalities() -> Sequence[str]:
     from multidrop.simulator.declared import simulated
     from multidrop.simulator.families import PROGRAMS
 
-    tested = tuple(personality for name in PROGRAMS for personality in simulated()[name].personalities)
-    about = f"%(choices)s (default: the cell's, or {DriveSpec().personality})"
-    return {"help": about, "type": str.upper, "choices": tested}
+    return tuple(personality for name in PROGRAMS for personality in simulated()[name].personalities)
 
 
 def languages() -> list[str]:

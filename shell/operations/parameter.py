@@ -10,17 +10,23 @@ from __future__ import annotations
 
 import argparse
 import inspect
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import MISSING, Field, dataclass, field, fields, is_dataclass, replace
 from enum import Enum, auto
 from functools import cached_property
 from types import NoneType, UnionType
-from typing import Annotated, Any, Literal, TypeVar, Union, get_args, get_origin
+from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeVar, Union, get_args, get_origin
 
 from multidrop.base.errors import Diagnostic
+from multidrop.base.feature import GUARD, Kinds
+
+if TYPE_CHECKING:
+    from multidrop.base.foreign import Guard
 
 Read = Callable[[str], Any]
 """Makes a value of a text, or raises argparse.ArgumentTypeError with what is wrong."""
+READ_RAISES: Kinds = (ValueError, TypeError, argparse.ArgumentTypeError)
+"""What argparse expects a `read` to raise."""
 EMPTY = inspect.Parameter.empty
 BY_NAME = inspect.Parameter.KEYWORD_ONLY
 ANY_NUMBER = inspect.Parameter.VAR_POSITIONAL
@@ -191,7 +197,27 @@ def parameters(function: Callable[..., object], given: int = 0, besides: Collect
     """
     found = [*inspect.signature(function).parameters.values()][given:]
     scope = getattr(inspect.unwrap(function), "__globals__", {})
-    return tuple(each for one in found if one.name not in besides for each in _of(one, scope, function))
+    read = tuple(each for one in found if one.name not in besides for each in _of(one, scope, function))
+    return guarded_as(function, read)
+
+
+def guarded_as(function: Callable[..., Any], those: Iterable[Parameter]) -> tuple[Parameter, ...]:
+    """Arguments whose functions are guarded as a function of the same feature is."""
+    guard: Guard | None = getattr(function, GUARD, None)
+    if guard is None:
+        return tuple(those)
+    return tuple(
+        replace(
+            each,
+            argument=replace(
+                each.argument,
+                help=guard.value(each.argument.help, {}, "help"),
+                read=guard.value(each.argument.read, {"read": READ_RAISES}, "read"),
+                choices=guard.value(each.argument.choices, {}, "choices"),
+            ),
+        )
+        for each in those
+    )
 
 
 def _of(one: inspect.Parameter, scope: Mapping[str, Any], function: Callable[..., object]) -> Iterator[Parameter]:

@@ -8,7 +8,7 @@ from typing import Any, NoReturn
 
 from multidrop.shell.line_syntax import divided, split
 from multidrop.shell.operations.arguments import NOT_GIVEN, Each, Once, OnceFlag
-from multidrop.shell.operations.parameter import EMPTY, OneOf, Parameter
+from multidrop.shell.operations.parameter import EMPTY, READ_RAISES, OneOf, Parameter
 
 
 class WrongWords(Exception):
@@ -42,7 +42,7 @@ def _together(parameters: Sequence[Parameter]) -> list[Parameter]:
 def _add(parser: argparse._ActionsContainer, one: Parameter, flag: str | type[argparse.Action]) -> None:
     options: dict[str, Any] = {"dest": one.key, "help": one.help or None}
     if one.flag:
-        parser.add_argument(*one.names, action=flag, **options)
+        parser.add_argument(*one.names, action=flag, required=one.required, **options)
         return
     choices = one.argument.choices() if one.argument.choices is not None else None
     if choices is not None:
@@ -107,7 +107,7 @@ class LineParser(argparse.ArgumentParser):
                 raise WrongWords
             try:
                 rest = {self._rest.key: self._rest.read(text) if text else self._rest.default}
-            except argparse.ArgumentTypeError as wrong:
+            except READ_RAISES as wrong:
                 raise WrongWords(str(wrong)) from None
         else:
             words = split(text, where)

@@ -1,28 +1,24 @@
 """All operations: `VERBS["/open"]`, `COMMANDS["program check"]`, and `find` for a typed name.
 
-The `.toml` files of this folder declare them. A section is an operation: its head is the command, or the verb where it
-has no command; its keys are the fields of `Operation`. A value `@NAME` is NAME of `arguments`, and `@MODULE:NAME` is in
-another module. A new operation is one section, and its work. The two orders below are those of the overviews; an
-operation that they do not name comes last.
+The modules in `base.registry.OPERATIONS` declare those of multidrop itself, and features theirs. The two orders below
+are those of the overviews; an operation that they do not name comes last.
 """
 
 from __future__ import annotations
 
-import os
 import re
 from argparse import ArgumentParser
-from ast import literal_eval
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from functools import cache, cached_property, reduce
+from functools import cache, cached_property
 from itertools import chain
-from typing import Any, TypeVar
+from typing import TypeVar
 
 from multidrop.base import registry
 from multidrop.base.errors import Diagnostic
 from multidrop.base.feature import Feature
 from multidrop.base.on_demand import imported
-from multidrop.shell.operations import arguments, conditions, typed
-from multidrop.shell.operations.operation import Forms, Operation, add_arguments
+from multidrop.shell.operations.operation import Operation
+from multidrop.shell.operations.parsing import LineParser
 from multidrop.shell.operations.verb import Verb
 
 VERB_GROUPS = {
@@ -39,62 +35,49 @@ VERB_GROUPS = {
 """The verbs in the order and the groups of `/help`."""
 COMMAND_ORDER = """demo tui shell send run sim program params macro poll snapshot ports relay scan rescue
     log config features help report completion"""
-_FILES = ("programs", "drives")
-_HEAD = re.compile(r"""^\["?([^".\]]+)"?\]\n(?:usage = ["'](/\w+))?""", re.M)
-_ENTRY = re.compile(
-    r"""^\[\S[^\n]*?(?:\.(\w+))?\]$|^((?:"[^"\n]*"|[\w.-]+)+)\ =\ (?:\"{3}\n(.*?)\"{3}|(\[\n.*?^\]|[^\n]+))$""",
-    re.M | re.S,
-)
-"""A head, with the name of its table; or a key and its text of several lines, or another value."""
 _VERB = re.compile(r"/[a-z][a-z0-9-]*")
 _COMMAND = re.compile(r"[a-z][a-z0-9-]*( [a-z][a-z0-9-]*)?")
 BY_OTHERS = "Added by others"
 """The title of `/help` for verbs that name no other one."""
-_KEY = re.compile(r'"([^"]*)"|([\w-]+)')
-_ELSEWHERE = re.compile(r"@([\w.]+:\w+)")
 
 
-AnyVerb = Operation | Verb
-AnyCommand = Operation | typed.Operation
-D = TypeVar("D", bound=Operation | Verb | typed.Operation)
+D = TypeVar("D", bound=Verb | Operation)
 
 
 @cache
-def core() -> tuple[typed.Operation, ...]:
-    """The operations of multidrop itself that are typed Python, in the order of their modules."""
+def core() -> tuple[Operation, ...]:
+    """The operations of multidrop itself, in the order of their modules."""
     return tuple(each for module in registry.OPERATIONS for each in imported(f"{module}:OPERATIONS"))
 
 
-def _verbs(those: Iterable[typed.Operation]) -> dict[str, AnyVerb]:
+def _verbs(those: Iterable[Operation]) -> dict[str, Verb]:
     """Verbs by name, each with its forms."""
-    found: dict[str, list[typed.Operation]] = {}
+    found: dict[str, list[Operation]] = {}
     for each in those:
-        if each.verb and each.script is None:
+        if each.verb and each.script is None and not each.extends:
             found.setdefault(each.name, []).append(each)
     return {name: Verb(tuple(forms)) for name, forms in found.items()}
 
 
-def _commands(those: Iterable[typed.Operation]) -> dict[str, AnyCommand]:
+def _commands(those: Iterable[Operation]) -> dict[str, Operation]:
     return {each.command: each for each in those if each.command}
 
 
 class Declared(Mapping[str, D]):
     """Operations by name: the core's, then those of features, each after the one that it names.
 
-    A section is parsed, and a feature imported, when its operation is asked for: a start needs one or two of them.
+    A feature is imported when its operation is asked for: a start needs one or two of them.
     """
 
     def __init__(
         self,
-        sections: Mapping[str, str],
         order: Sequence[str],
-        name_of: Callable[[Operation], str],
-        by_name: Callable[[Iterable[typed.Operation]], Mapping[str, D]],
+        by_name: Callable[[Iterable[Operation]], Mapping[str, D]],
+        extended: Callable[[D], D],
         named: re.Pattern[str],
     ) -> None:
-        """`named`: matches the names; the table of features has other words, too."""
-        self._sections, self._order = sections, order
-        self._name_of, self._by_name, self._named = name_of, by_name, named
+        """`extended`: adds to an operation what features add. `named`: matches the names; features have other words."""
+        self._order, self._by_name, self._extended, self._named = order, by_name, extended, named
 
     @cached_property
     def _core(self) -> Mapping[str, D]:
@@ -103,14 +86,11 @@ class Declared(Mapping[str, D]):
     @cached_property
     def core_names(self) -> Sequence[str]:
         """The names of the core's operations."""
-        every = {**self._sections, **self._core}
-        return list(dict.fromkeys((*(each for each in self._order if each in every), *every)))
+        return list(dict.fromkeys((*(each for each in self._order if each in self._core), *self._core)))
 
     def __getitem__(self, name: str) -> D:
-        if name in self._sections:
-            return reduce(Operation.with_forms, _forms(name), _operation(self._sections[name]))  # type: ignore[return-value]
         if name in self._core:
-            return self._core[name]
+            return self._extended(self._core[name])
         feature = registry.with_word(name)
         for each in (feature,) if feature is not None else registry.by_others():
             if (found := self._added(each).get(name)) is not None:
@@ -133,9 +113,8 @@ class Declared(Mapping[str, D]):
             return True
         return name in registry.words() and self._named.fullmatch(str(name)) is not None
 
-    def _added(self, feature: Feature) -> dict[str, D]:
-        found = {name: each for each in registry.records((feature,), Operation) if (name := self._name_of(each))}
-        return found | dict(self._by_name(registry.records((feature,), typed.Operation)))  # type: ignore[return-value]
+    def _added(self, feature: Feature) -> Mapping[str, D]:
+        return self._by_name(registry.records((feature,), Operation))
 
     def parts(self, group: str) -> Parts[D]:
         """The commands of a group by their last word; of "" all first words."""
@@ -162,81 +141,16 @@ class Parts(Mapping[str, D]):
         return isinstance(word, str) and word.split() == [word] and f"{self._group} {word}".strip() in self._every
 
 
-def _forms(verb: str) -> Iterator[Forms]:
-    """The forms that features add to a verb; none of them is imported for another name."""
-    if verb.startswith("/"):
-        those = (*registry.with_words(f"{verb} "), *registry.by_others())
-        yield from (each for each in registry.records(those, Forms) if each.verb == verb)
+def _with_forms(verb: Verb) -> Verb:
+    """A verb with the forms that features add; none of them is imported for another name."""
+    those = (*registry.with_words(f"{verb.name} "), *registry.by_others())
+    added = [each for each in registry.records(those, Operation) if each.extends and each.name == verb.name]
+    return verb.extended(added) if added else verb
 
 
-@cache
-def _operation(section: str) -> Operation:
-    head, fields = section[1:].partition("]")[0].strip('"'), fields_of(section)
-    if "usage" in fields:
-        fields["usage"] = _ELSEWHERE.sub(lambda found: imported(found[1]), fields["usage"])
-    if "fits" in fields:
-        fields["fits"] = getattr(conditions, fields["fits"])
-    for name in fields.keys() & {"words", "arguments", "changes", "examples"}:
-        fields[name] = _meant(fields[name])
-    return Operation(**fields) if head.startswith("/") else Operation(command=head, **fields)
-
-
-def fields_of(section: str) -> dict[str, Any]:
-    """The values of a section. It is TOML of one sort; tomllib would cost every start 8 ms."""
-    fields: dict[str, Any] = {}
-    table = fields
-    for head, key, text, value in _ENTRY.findall(section):
-        if head:
-            table = fields[head] = {}
-        elif key:
-            *path, last = (quoted or bare for quoted, bare in _KEY.findall(key))
-            place = table
-            for each in path:
-                place = place.setdefault(each, {})
-            place[last] = text or value == "true" or literal_eval(value)
-    return fields
-
-
-def _meant(value: Any) -> Any:
-    """A value with what its names stand for."""
-    if isinstance(value, dict):
-        return {name: _meant(each) for name, each in value.items()}
-    if isinstance(value, list):
-        return tuple(value)
-    if not isinstance(value, str) or not value.startswith("@"):
-        return value
-    return imported(value[1:]) if ":" in value else getattr(arguments, value[1:])
-
-
-def sections(text: str) -> Iterator[tuple[str, str, str]]:
-    """(verb, command, text) of each section of a file; an empty name is none."""
-    heads = [*_HEAD.finditer(text)]
-    for found, end in zip(heads, [*(each.start() for each in heads[1:]), len(text)], strict=True):
-        yield found[2] or "", "" if found[1].startswith("/") else found[1], text[found.start() : end]
-
-
-def _declared() -> Iterator[tuple[str, str, str]]:
-    for name in _FILES:
-        with open(os.path.join(os.path.dirname(__file__), f"{name}.toml"), encoding="utf-8") as file:
-            yield from sections(file.read())
-
-
-_FOUND = [*_declared()]
-VERBS: Declared[AnyVerb] = Declared(
-    {verb: text for verb, _, text in _FOUND if verb},
-    " ".join(VERB_GROUPS.values()).split(),
-    lambda each: each.name,
-    _verbs,
-    _VERB,
-)
+VERBS: Declared[Verb] = Declared(" ".join(VERB_GROUPS.values()).split(), _verbs, _with_forms, _VERB)
 """By name, in the order of `/help`."""
-COMMANDS: Declared[AnyCommand] = Declared(
-    {command: text for _, command, text in _FOUND if command},
-    COMMAND_ORDER.split(),
-    lambda each: each.command,
-    _commands,
-    _COMMAND,
-)
+COMMANDS: Declared[Operation] = Declared(COMMAND_ORDER.split(), _commands, lambda each: each, _COMMAND)
 """By their words, in the order of `--help`; the parts of a group after it."""
 
 
@@ -246,7 +160,7 @@ def script_verbs() -> Mapping[str, Verb]:
     return {each.name: Verb((each,)) for each in core() if each.script is not None}
 
 
-def script_verb(name: str) -> typed.Operation | None:
+def script_verb(name: str) -> Operation | None:
     """A verb of scripts; None for any other word."""
     found = script_verbs().get(name)
     return found.main if found is not None else None
@@ -264,22 +178,34 @@ def groups() -> dict[str, list[str]]:
     return found
 
 
-def _wrong(added: Operation) -> str:
-    """What an operation by others lacks, in words; empty: nothing. Raises TypeError or ValueError for a wrong kind."""
-    dict(added.words), " ".join(added.examples)
-    if not added.name and not added.command:
-        return "an Operation has neither the usage of a verb nor a command"
-    for name, named in (added.name, _VERB), (added.command, _COMMAND):
-        if name and not named.fullmatch(name):
-            return f"{name} is no name of a verb or a command"
-    if added.name and not added.help.strip():
-        return f"{added.name} has no help"
-    if added.command and not added.meaning.strip():
-        return f"{added.command} has no meaning"
-    if added.name and not callable(added.work):
-        return f"{added.name} has no function"
-    if added.command and not callable(added.run) and not COMMANDS.parts(added.command):
-        return f"{added.command} has no function"
+def _wrong(added: Sequence[Operation]) -> str:
+    """What operations by others lack, in words; empty: nothing. Raises Diagnostic, TypeError or ValueError for a wrong
+    kind.
+    """
+    for each in added:
+        " ".join(each.examples)
+        if not each.name and not each.command:
+            return "an Operation has neither a verb nor a command"
+        for name, named in (each.name, _VERB), (each.command, _COMMAND):
+            if name and not named.fullmatch(name):
+                return f"{name} is no name of a verb or a command"
+        if each.name and not each.extends and (each.name in VERBS.core_names or each.name in script_verbs()):
+            return f"{each.name} is taken"
+        if each.extends and each.name not in VERBS.core_names:
+            return f"multidrop has no verb {each.name} to extend"
+        if each.command and not each.meaning.strip():
+            return f"{each.command} has no meaning"
+        if each.do is not None and not callable(each.do):
+            return f"{each.verb or each.command} has no function"
+        if each.command and each.do is None and not COMMANDS.parts(each.command):
+            return f"{each.command} has no function"
+        LineParser(each.arguments)
+        each.add_to(ArgumentParser())
+    for verb in _verbs(added).values():
+        if not verb.help.strip():
+            return f"{verb.name} has no help"
+        if not verb.working:
+            return f"{verb.name} has no function"
     return ""
 
 
@@ -311,23 +237,19 @@ _checked: list[Feature] = []
 def _check(feature: Feature) -> None:
     """Raise Diagnostic, or what argparse raises, if the core has a word of a feature, or cannot use what it adds."""
     from multidrop.shell.connect.schemes import CORE
+    from multidrop.shell.hooks import Options
     from multidrop.shell.sections import CORE as TABLES
 
     core = {*VERBS.core_names, *COMMANDS.core_names, *(f"{each}:" for each in CORE), *(f"[{each}]" for each in TABLES)}
     if taken := next((each for each in registry.claims(feature) if each in core), ""):
         raise Diagnostic(f"{taken} is taken")
-    for each in registry.records((feature,), Operation):
-        if wrong := _wrong(each):
-            raise Diagnostic(wrong)
-    for record in feature.adds:
-        if (added := getattr(record, "arguments", None)) is not None:  # of a command, or more of one that is there
-            command = str(getattr(record, "command", ""))
-            parser = ArgumentParser()
-            add_arguments(parser, COMMANDS[command].arguments if command in COMMANDS._sections else {})  # type: ignore[arg-type]
-            add_arguments(parser, added)
+    if wrong := _wrong([*registry.records((feature,), Operation)]):
+        raise Diagnostic(wrong)
+    for added in registry.records((feature,), Options):
+        COMMANDS[added.command].add_to(ArgumentParser(), added.parameters)
 
 
-def find(name: str) -> AnyVerb:
+def find(name: str) -> Verb:
     """Find a verb by name; one that is unknown may be of others, as a script is checked before a session opens.
 
     Raises Diagnostic with similar names.
@@ -342,10 +264,3 @@ def find(name: str) -> AnyVerb:
         raise Diagnostic(f"{name} is a verb of scripts", hint="multidrop run SCRIPT, or run - for standard input")
     near = difflib.get_close_matches(name, [*VERBS, *script_verbs()], 2) or ["/help"]
     raise Diagnostic(f"no verb {name}", hint=f"try {' or '.join(near)}")
-
-
-def load() -> None:
-    """Import the work of all verbs; a screen does this in a thread before the first verb is typed."""
-    for verb in VERBS.values():
-        if isinstance(verb, Operation):
-            verb.imported(verb.work)

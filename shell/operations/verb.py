@@ -7,11 +7,12 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from multidrop.base import registry
 from multidrop.base.errors import Diagnostic
 from multidrop.shell.line_syntax import divided
+from multidrop.shell.operations.operation import Operation
 from multidrop.shell.operations.parameter import Parameter
 from multidrop.shell.operations.parsing import WrongWords
-from multidrop.shell.operations.typed import Operation
 
 if TYPE_CHECKING:
     from multidrop.shell.workspace import Workspace
@@ -70,6 +71,11 @@ class Verb:
     def working(self) -> tuple[Operation, ...]:
         """The forms that do something."""
         return tuple(each for each in self.forms if each.do is not None)
+
+    def extended(self, added: Sequence[Operation]) -> Verb:
+        """The verb with forms of features, which come first and take the place of its own ones."""
+        own = tuple(each for each in self.forms if all(each.verb != other.verb for other in added))
+        return Verb((*added, *own))
 
     @property
     def name(self) -> str:
@@ -143,7 +149,10 @@ class Verb:
         return Diagnostic(message, self.name, usage) if message else Diagnostic(usage, self.name)
 
     def parsed(self, rest: str) -> Chosen:
-        """Parse the text after the name. Raises Diagnostic with the usage of the forms that can be meant."""
+        """Parse the text after the name.
+
+        Raises Diagnostic with the usage of the forms that can be meant, or with the name of a feature that is gone.
+        """
         forms = self._meant(divided(rest)[0])
         found: list[str] = []
         for form in forms:
@@ -154,6 +163,9 @@ class Verb:
                 return Chosen(form, form.parsed(text))
             except WrongWords as wrong:
                 found.append(str(wrong))
+        for word in rest.split():
+            if word.startswith("--"):
+                registry.with_word(f"{self.name} {word.partition('=')[0]}")
         raise self.wrong(next(filter(None, found), ""), forms if rest.strip() else ())
 
     def check(self, rest: str) -> None:

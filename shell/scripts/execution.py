@@ -18,8 +18,8 @@ from multidrop.macros import checked_values, fill
 from multidrop.shell import waits
 from multidrop.shell.events import FAILURES, By, Failed
 from multidrop.shell.motions import OUTCOME, check_own
+from multidrop.shell.operations.operation import Kind, Scripted
 from multidrop.shell.operations.table import script_verb
-from multidrop.shell.operations.typed import Kind, Scripted
 from multidrop.shell.playing import Playing, StepProgress, cast
 from multidrop.shell.scripts import words
 from multidrop.shell.scripts.captured_prints import Hearing

@@ -20,8 +20,8 @@ from multidrop.macros import Macro, MacroStore, check_name, checked_values, fill
 from multidrop.macros.model import Parameter, plain, written
 from multidrop.macros.toml_format import in_text
 from multidrop.shell.line_syntax import ENDS, VerbLine, parse
+from multidrop.shell.operations.operation import Kind
 from multidrop.shell.operations.table import find, script_verb
-from multidrop.shell.operations.typed import Kind
 from multidrop.shell.scripts import words
 from multidrop.shell.scripts.model import CallFile, CallMacro, If, MacroScript, Node, Repeat, Script, ScriptLine, Step
 from multidrop.shell.scripts.use import Checking, chosen

@@ -9,8 +9,8 @@ from multidrop.base.errors import Diagnostic, Inexpressible, NoAnswer
 from multidrop.shell.line_syntax import split_target
 from multidrop.shell.operations import conditions
 from multidrop.shell.operations.argument_types import Address, BusName, UrlForm
+from multidrop.shell.operations.operation import Operation
 from multidrop.shell.operations.parameter import Argument, Listed
-from multidrop.shell.operations.typed import Operation
 
 if TYPE_CHECKING:
     from multidrop.drives.drive import Drive

@@ -15,8 +15,8 @@ from multidrop.shell.operations.argument_types import (
     Reporting,
     Yes,
 )
+from multidrop.shell.operations.operation import Operation, typed
 from multidrop.shell.operations.parameter import Argument, Listed
-from multidrop.shell.operations.typed import Operation, typed
 from multidrop.shell.verbs.macro_places import AtTerminal, Macros, at_terminal, changing
 
 if TYPE_CHECKING:

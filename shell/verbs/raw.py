@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Annotated
 from multidrop.base.errors import Diagnostic
 from multidrop.shell.operations import arguments, conditions
 from multidrop.shell.operations.argument_types import Switch, UrlForm
+from multidrop.shell.operations.operation import Operation
 from multidrop.shell.operations.parameter import Argument
-from multidrop.shell.operations.typed import Operation
 
 if TYPE_CHECKING:
     from multidrop.shell import raw

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 
 from multidrop.shell.operations import arguments
 from multidrop.shell.operations.argument_types import NamedValue
+from multidrop.shell.operations.operation import Kind, Operation, Scripted
 from multidrop.shell.operations.parameter import Argument, Listed
-from multidrop.shell.operations.typed import Kind, Operation, Scripted
 from multidrop.shell.verbs.waiting import Seconds
 
 if TYPE_CHECKING:

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 from multidrop.base.errors import Diagnostic, Stopped
 from multidrop.shell.operations import conditions
 from multidrop.shell.operations.argument_types import FileName
+from multidrop.shell.operations.operation import Operation
 from multidrop.shell.operations.parameter import Argument, Listed
-from multidrop.shell.operations.typed import Operation
 from multidrop.shell.roles import EVERYTHING, TIMES, Filter
 
 if TYPE_CHECKING:

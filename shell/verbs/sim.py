@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Annotated
 from multidrop.base.errors import Diagnostic
 from multidrop.shell.operations import conditions
 from multidrop.shell.operations.argument_types import BusName
+from multidrop.shell.operations.operation import Operation, typed
 from multidrop.shell.operations.parameter import Argument, Listed
-from multidrop.shell.operations.typed import Operation, typed
 from multidrop.simulator import MEANINGS, table
 
 if TYPE_CHECKING:

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Annotated
 
 from multidrop.base.errors import Diagnostic
 from multidrop.shell.operations import arguments
+from multidrop.shell.operations.operation import Operation
 from multidrop.shell.operations.parameter import Argument, Listed
-from multidrop.shell.operations.typed import Operation
 
 if TYPE_CHECKING:
     from multidrop.drives.drive import Drive

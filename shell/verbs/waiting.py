@@ -6,8 +6,8 @@ import argparse
 import re
 from typing import TYPE_CHECKING, Annotated, NamedTuple
 
+from multidrop.shell.operations.operation import Operation, typed
 from multidrop.shell.operations.parameter import Argument, Listed
-from multidrop.shell.operations.typed import Operation, typed
 
 if TYPE_CHECKING:
     from multidrop.shell.verbs.call import Call

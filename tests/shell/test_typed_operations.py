@@ -16,9 +16,9 @@ from hypothesis import strategies as st
 from multidrop.base.errors import Diagnostic
 from multidrop.shell.operations import arguments, table, typed
 from multidrop.shell.operations.argument_types import NamedValue
+from multidrop.shell.operations.operation import Operation
 from multidrop.shell.operations.parameter import Argument, Listed, OneOf, Parameter, parameters
 from multidrop.shell.operations.parsing import add_parameters, values
-from multidrop.shell.operations.typed import Operation
 from multidrop.shell.operations.verb import Verb
 from tests.support.cases import for_each
 
