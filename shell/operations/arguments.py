@@ -16,12 +16,16 @@ HOST = "127.0.0.1"
 KEYS = [f"F{number}" for number in range(2, 13)]
 
 
+NOT_GIVEN = object()
+"""The value of an argument that a line does not have: argparse would read a default as if it were typed."""
+
+
 class Several(argparse.Action):
     """Joins the drives of an option that is repeated: `a,b`."""
 
     def __call__(self, parser: object, chosen: argparse.Namespace, values: object, option: object = None) -> None:
         before = getattr(chosen, self.dest)
-        setattr(chosen, self.dest, f"{before},{values}" if before else values)
+        setattr(chosen, self.dest, f"{before},{values}" if isinstance(before, str) and before else values)
 
 
 class Once(argparse.Action):

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from typing import Any, NoReturn
 
 from multidrop.shell.line_syntax import divided, split
-from multidrop.shell.operations.arguments import Each, Once, OnceFlag
+from multidrop.shell.operations.arguments import NOT_GIVEN, Each, Once, OnceFlag
 from multidrop.shell.operations.parameter import EMPTY, READ_RAISES, OneOf, Parameter
 
 
@@ -54,7 +54,7 @@ def _add(parser: argparse._ActionsContainer, one: Parameter, flag: str | type[ar
     if "choices" not in options or one.argument.metavar:
         options["metavar"] = one.value.removesuffix(" ...")
     if not one.required:
-        options["default"] = list(one.default) if one.several else one.default
+        options["default"] = list(one.default) if one.several else NOT_GIVEN
     if one.argument.alone is not EMPTY:
         options |= {"nargs": "?", "const": one.argument.alone}
     if one.argument.action is not None:
@@ -74,7 +74,9 @@ def values(parameters: Sequence[Parameter], found: argparse.Namespace) -> dict[s
     """The values of a parsed line by the keys of the arguments."""
     every = {each.key: getattr(found, each.key) for each in parameters}
     for each in parameters:
-        if each.argument.rest and not isinstance(every[each.key], str):
+        if every[each.key] is NOT_GIVEN:
+            every[each.key] = each.default
+        elif each.argument.rest and not isinstance(every[each.key], str):
             every[each.key] = " ".join(every[each.key])
         elif each.several:
             every[each.key] = tuple(every[each.key])

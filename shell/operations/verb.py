@@ -176,7 +176,7 @@ class Verb:
     def _meant(self, word: str) -> Sequence[Operation]:
         """The forms that begin with a fixed word; else those that begin with any word, or have none."""
         fixed = [each for each in self.working if word in _first_words(each)]
-        return fixed or [each for each in self.working if not each.fixed] or self.working
+        return fixed or [each for each in self.working if not _begins_with_fixed_word(each)] or self.working
 
     # What is typed
 
@@ -215,6 +215,12 @@ def _first_words(form: Operation) -> Iterable[str]:
     """The fixed words with which a form can begin."""
     steps = _steps(form)
     return steps[0].words if steps else ()
+
+
+def _begins_with_fixed_word(form: Operation) -> bool:
+    """Whether a form begins with one of its fixed words, and with nothing else."""
+    steps = _steps(form)
+    return bool(steps) and bool(steps[0].words) and not steps[0].optional and not steps[0].takes("\0")
 
 
 def reached(form: Operation, words: Sequence[str]) -> Reached | None:
