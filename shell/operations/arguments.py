@@ -64,7 +64,8 @@ class United(argparse.Action):
     """Keeps the names of all values of an option that is repeated."""
 
     def __call__(self, parser: object, chosen: argparse.Namespace, values: Any, option: object = None) -> None:
-        setattr(chosen, self.dest, getattr(chosen, self.dest) | values)
+        before = getattr(chosen, self.dest)
+        setattr(chosen, self.dest, values if before is NOT_GIVEN else before | values)
 
 
 class Named(argparse.Action):

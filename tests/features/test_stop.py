@@ -18,6 +18,7 @@ from multidrop.base import registry
 from multidrop.base.errors import Stopped
 from multidrop.base.feature import Feature
 from multidrop.base.registry import Entry
+from multidrop.cli import parse
 from multidrop.drives.events import Changed
 from multidrop.shell.configuration import Settings
 from multidrop.shell.hooks import Added, AtSession, Options
@@ -30,7 +31,7 @@ from multidrop.simulator.serving.running import RunningFloor
 from multidrop.transports import Transport
 from tests.support import foreign_features as foreign
 from tests.support.cell_session import TCP, CellSession, bus, party
-from tests.support.foreign_features import ASYNC, CALLS, CHOSEN, NAMES, Slowness
+from tests.support.foreign_features import ASYNC, CALLS, NAMES, Slowness
 
 PATIENCE = 10.0
 """s; far longer than a thread takes to write."""
@@ -224,7 +225,7 @@ async def test_options_that_hold_the_loop_up_delay_no_stop(tmp_path: Path, add: 
     add(Options("shell", Slowness, opened=opened))
     async with served(tmp_path) as session:
         thread, wrote = key_thread(session, held)
-        await Added("shell", CHOSEN).opened(session)
+        await Added("shell", parse(["shell", "--slow"])).opened(session)
         await asyncio.to_thread(thread.join, PATIENCE)
         assert held.was_written and wrote
 

@@ -194,10 +194,10 @@ def broken(kind: type, name: str, function: Callable[..., Any]) -> Any:
         found = function(*given, **named)
         return await found if isinstance(found, Awaitable) else found
 
-    def one(given: object) -> Any:
+    def one(given: object = None) -> Any:
         return function(given)
 
-    called = awaited if (kind, name) in ASYNC else one if kind is Operation else function
+    called = awaited if (kind, name) in ASYNC else one if kind is Operation else function  # which has no **named
     if kind is Scheme:
         return type("Broken", (Slow,), {name: lambda self, *given, **named: called(*given, **named)})()
     if (kind, name) == (Pictures, "html"):

@@ -14,7 +14,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from multidrop.base.errors import Diagnostic
-from multidrop.shell.operations import arguments, table, typed
+from multidrop.shell.operations import arguments, table
 from multidrop.shell.operations.argument_types import NamedValue
 from multidrop.shell.operations.operation import Operation
 from multidrop.shell.operations.parameter import Argument, Listed, OneOf, Parameter, parameters
@@ -291,7 +291,7 @@ def test_a_parameter_that_says_no_type_is_a_clear_error() -> None:
 
 
 @pytest.mark.parametrize("operation", table.core(), ids=lambda each: each.verb or each.command)
-def test_every_operation_is_declared_well(operation: typed.Operation) -> None:
+def test_every_operation_is_declared_well(operation: Operation) -> None:
     """Its annotations are read, its keys differ, and what is said in one line is one."""
     for arguments_of in (operation.arguments, operation.command_arguments):
         assert len({each.key for each in arguments_of}) == len(arguments_of)
