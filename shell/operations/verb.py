@@ -50,7 +50,7 @@ class Reached(NamedTuple):
 
 
 class Chosen(NamedTuple):
-    """The form of a line, and its values by the keys of the arguments."""
+    """The form of a line, and its values by the names of the arguments."""
 
     form: Operation
     values: Mapping[str, Any]

@@ -14,7 +14,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from multidrop.base.errors import Diagnostic
-from multidrop.shell.operations import arguments, table, typed
+from multidrop.shell.operations import arguments, table
 from multidrop.shell.operations.argument_types import NamedValue
 from multidrop.shell.operations.operation import Operation
 from multidrop.shell.operations.parameter import Argument, Listed, OneOf, Parameter, parameters
@@ -291,10 +291,10 @@ def test_a_parameter_that_says_no_type_is_a_clear_error() -> None:
 
 
 @pytest.mark.parametrize("operation", table.core(), ids=lambda each: each.verb or each.command)
-def test_every_operation_is_declared_well(operation: typed.Operation) -> None:
-    """Its annotations are read, its keys differ, and what is said in one line is one."""
+def test_every_operation_is_declared_well(operation: Operation) -> None:
+    """Its annotations are read, its names differ, and what is said in one line is one."""
     for arguments_of in (operation.arguments, operation.command_arguments):
-        assert len({each.key for each in arguments_of}) == len(arguments_of)
+        assert len({each.name for each in arguments_of}) == len(arguments_of)
         optional = [not each.required for each in arguments_of if not each.option]
         add_parameters(argparse.ArgumentParser(), arguments_of)
         assert all(isinstance(each.help, str) for each in arguments_of) and optional is not None
@@ -303,7 +303,7 @@ def test_every_operation_is_declared_well(operation: typed.Operation) -> None:
     assert not operation.verb or operation.do is None or VERBS_OF[operation.name].help
 
 
-VERBS_OF = {name: verb for name, verb in table.VERBS.items() if isinstance(verb, Verb)}
+VERBS_OF = {**table.VERBS, **table.script_verbs()}
 
 
 def test_a_value_that_is_not_given_is_the_default() -> None:
