@@ -7,9 +7,9 @@ from functools import partial
 
 from multidrop.features.plot_files.plot import begin, write
 from multidrop.features.plot_files.request import DEFAULT, parse_rate, parse_target
-from multidrop.shell.plots import on_screen
 from multidrop.shell.plots.batch import Batch
 from multidrop.shell.plots.series import parse_series, read_first
+from multidrop.shell.verbs import plotting
 from multidrop.shell.verbs.call import Call
 
 ENDINGS = (".rrd", ".csv", ".parquet")
@@ -28,7 +28,7 @@ async def plot(call: Call, texts: Sequence[str], to: str | None, serve: str | No
     if to is None and serve is None:
         if rate:
             raise call.wrong("no target for the plot")
-        return await on_screen.plot(call, texts)
+        return await plotting.plot(call, texts)
     workspace = call.session
     target = parse_target(to, serve)
     if target.file is not None:

@@ -1,4 +1,4 @@
-"""`multidrop program check|test|list|diff`: errors in program files, runs in virtual time, and what drives hold.
+"""`multidrop program check|test`: errors in program files, and runs on a simulated drive in virtual time.
 
 Prints, facts and summaries go to standard output, errors to standard error. With --json everything is an object on
 standard output.
@@ -19,13 +19,10 @@ from multidrop.shell.programs.checking import USUAL, Checked, examine, rewrite, 
 from multidrop.shell.streams.stdout import fail, reader_left, shortened, write
 
 if TYPE_CHECKING:
-    from multidrop.drives.drive import Drive
-    from multidrop.shell.session import Session
-    from multidrop.shell.verbs.on_drives import OfUrl
     from multidrop.simulator.cell.spec import DriveSpec
 
-WRONG = FAILED = DIFFERS = 1
-"""The exit codes of files with errors, of a test that failed, and of a program that is another one."""
+WRONG = FAILED = 1
+"""The exit codes of files with errors, and of a test that failed."""
 MOST = 100
 """The largest number of problems of a file that are shown."""
 
@@ -126,60 +123,3 @@ def _test(file: str, how: Testing, given: DriveSpec | None, several: bool) -> in
             write(sys.stderr, f"{file}: interrupted")
         raise
     return FAILED if failed else 0
-
-
-# Programs of drives
-
-
-def list_programs(drives: OfUrl, as_json: bool) -> int:
-    """Print the program of each drive; with several the name of its drive is before each line."""
-    import json
-
-    from multidrop.shell import program_listing
-    from multidrop.shell.workspace import address_of
-
-    async def show(session: Session, drive: Drive) -> None:
-        name = session.display_name(drive)
-        if as_json:
-            held = await program_listing.read(session, drive, "list")
-            held.check_listed(name)
-            if not held.lines:
-                program_listing.say_none(session, drive)
-            for at, text in held.lines:
-                session.output(json.dumps({"drive": address_of(session, drive), "at": at, "text": text}))
-            return
-        lines = await program_listing.readable(session, drive)
-        if not lines:
-            program_listing.say_none(session, drive)
-        for line in lines:
-            session.output(f"{name}: {line}" if drives.several else line)
-
-    return drives.each(show, unsolicited=not as_json)
-
-
-def diff(file: str, drives: OfUrl, as_json: bool) -> int:
-    """Print the lines that differ; the exit code says whether any does."""
-    import json
-
-    from multidrop.shell.programs import transfers
-    from multidrop.shell.workspace import address_of
-
-    text, differ = drives.program_text(file), False
-
-    async def compare(session: Session, drive: Drive) -> None:
-        nonlocal differ
-        name, found = session.display_name(drive), await transfers.differences(session, drive, file, text)
-        for row in found:
-            facts = {
-                "drive": address_of(session, drive),
-                "line": row.number or None,
-                "here": row.here,
-                "at": row.at,
-                "there": row.there,
-            }
-            session.output(json.dumps(facts) if as_json else transfers.in_words(file, row, name))
-        differ = differ or bool(found)
-        if not found:
-            session.notify(f"{name} holds {file}", outcome=True)
-
-    return drives.each(compare, unsolicited=False) or (DIFFERS if differ else 0)

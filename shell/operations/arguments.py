@@ -1,6 +1,6 @@
-"""What the sections of operations name with `@`: the types of values, and arguments that come from other tables.
+"""The texts of arguments: what makes a value of one, and the words and helps that come from other tables.
 
-A type makes a value of a text, or raises argparse's one line of error.
+A `read` makes a value of a text, or raises argparse's one line of error.
 """
 
 from __future__ import annotations
@@ -14,8 +14,6 @@ from multidrop.base.text import real
 
 HOST = "127.0.0.1"
 KEYS = [f"F{number}" for number in range(2, 13)]
-NONE = None
-upper, integer = str.upper, int
 
 
 NOT_GIVEN = object()
@@ -173,7 +171,7 @@ class Accessed(NamedTuple):
     """Registers that a person reads or writes."""
 
     address: int
-    count: int | None
+    length: int | None
     """Of those to read; None: the value that begins there."""
     values: Sequence[int] | None
     """What is written; None: nothing."""

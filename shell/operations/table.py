@@ -186,6 +186,8 @@ def _wrong(added: Sequence[Operation]) -> str:
         " ".join(each.examples)
         if not each.name and not each.command:
             return "an Operation has neither a verb nor a command"
+        if each.script is not None:
+            return f"{each.name}: features add no verbs of scripts"
         for name, named in (each.name, _VERB), (each.command, _COMMAND):
             if name and not named.fullmatch(name):
                 return f"{name} is no name of a verb or a command"
@@ -237,7 +239,6 @@ _checked: list[Feature] = []
 def _check(feature: Feature) -> None:
     """Raise Diagnostic, or what argparse raises, if the core has a word of a feature, or cannot use what it adds."""
     from multidrop.shell.connect.schemes import CORE
-    from multidrop.shell.hooks import Options
     from multidrop.shell.sections import CORE as TABLES
 
     core = {*VERBS.core_names, *COMMANDS.core_names, *(f"{each}:" for each in CORE), *(f"[{each}]" for each in TABLES)}
@@ -245,8 +246,9 @@ def _check(feature: Feature) -> None:
         raise Diagnostic(f"{taken} is taken")
     if wrong := _wrong([*registry.records((feature,), Operation)]):
         raise Diagnostic(wrong)
-    for added in registry.records((feature,), Options):
-        COMMANDS[added.command].add_to(ArgumentParser(), added.parameters)
+    for record in feature.adds:
+        if (added := getattr(record, "parameters", None)) is not None:  # more options of a command
+            COMMANDS[record.command].add_to(ArgumentParser(), added)  # type: ignore[attr-defined]
 
 
 def find(name: str) -> Verb:

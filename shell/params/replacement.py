@@ -16,12 +16,11 @@ from multidrop.base.errors import Diagnostic, DriveError, Inexpressible, Refused
 from multidrop.base.text import counted
 from multidrop.dialects.program_files import LOCKED
 from multidrop.dialects.values import Change, Parameters, Permission, Plan, Readings, differing
-from multidrop.shell import configuration, snapshots
+from multidrop.shell import snapshots
 from multidrop.shell.channel import transferring
 from multidrop.shell.operations.argument_types import Downloading, Restoring
-from multidrop.shell.params import work
 from multidrop.shell.params.file import read, shown
-from multidrop.shell.params.work import check_ready, send, targets
+from multidrop.shell.params.work import check_ready, send
 from multidrop.shell.programs import transfers
 from multidrop.simulator import cells
 from multidrop.simulator.cell.writer import BusText, write
@@ -31,7 +30,6 @@ if TYPE_CHECKING:
     from multidrop.dialects.values import Snapshot
     from multidrop.drives.drive import Drive
     from multidrop.shell.session import Session
-    from multidrop.shell.verbs.on_drives import OfUrl
     from multidrop.simulator.cell.spec import Cell, DriveSpec
     from multidrop.simulator.family import SimulatedFamily
 
@@ -258,28 +256,3 @@ def _spec(snapshot: Snapshot) -> DriveSpec:
     """A drive that was read, as a cell file describes it."""
     text = write([BusText("line", [snapshots.described(snapshot)])])
     return cells.read(text, "snapshot").buses[0].drives[0]
-
-
-# From a command
-
-
-def apply_each(drives: OfUrl, file: str, source: str, wanted: Restoring) -> int:
-    """Put drives of a cell file onto replacements, and return the exit code.
-
-    `source`: the name of the only drive in the file. Raises Diagnostic for a wrong file, before anything is opened.
-    """
-    if source and drives.several:
-        raise Diagnostic(f"--from {source} is for one drive", "snapshot apply", "--drive names one")
-    cell = cells.load(file, configuration.load().allowed)
-
-    async def put(session: Session) -> None:
-        there = [drive for bus in session.buses.values() for drive in bus.drives.values()]
-        if not drives.target and len(there) > 1:
-            names = ", ".join(session.display_name(drive) for drive in there)
-            raise Diagnostic("several drives have replied", hint=f"--drive names one of {names}")
-        found = targets(session, drives.target)
-        # All are found in the file before the first one is written to.
-        specs = {drive: chosen(cell, file, drive, source, drives.several) for drive in found}
-        await work.each(session, found, lambda drive: apply(session, drive, file, specs[drive], wanted))
-
-    return drives.run(put, unsolicited=True)

@@ -11,7 +11,6 @@ import asyncio
 import contextlib
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
 from weakref import WeakSet
 
 from multidrop.base.errors import Diagnostic, Differs, DriveError, Refused
@@ -25,15 +24,11 @@ from multidrop.shell import motions
 from multidrop.shell.channel import running, transferring
 from multidrop.shell.events import By, Printed
 from multidrop.shell.operations.argument_types import Downloading
-from multidrop.shell.params import work
 from multidrop.shell.program_listing import Sight, check_one, read
 from multidrop.shell.session import Session
 from multidrop.shell.state.backups import Copy, Sources, write_backup
 from multidrop.shell.state.crash_marks import marked
 from multidrop.shell.workspace import Workspace
-
-if TYPE_CHECKING:
-    from multidrop.shell.verbs.on_drives import OnDrives, R_co
 
 PLAIN = Downloading()
 LIMIT = 10.0
@@ -124,24 +119,6 @@ async def download(
             await made.run(text, lines)
     finally:
         _under_way.discard(drive)
-
-
-def to_each(drives: OnDrives[R_co], file: str, wanted: Downloading) -> R_co:
-    """Send a program file to each drive; see `OnDrives.run`. Every one gets the text that was checked at first."""
-    text, later = drives.program_text(file), drives.several
-
-    async def put(session: Session) -> None:
-        found = work.targets(session, drives.target, "programs")
-        kept = await asyncio.to_thread(program_text_of, file) if text is None and later else text
-
-        async def send(drive: Drive) -> None:
-            await download(session, drive, file, wanted, kept, drives.by, later=later)
-
-        await work.each(session, found, send)
-        if later and wanted.run:
-            await work.each(session, found, lambda drive: start(session, drive, file, wanted, kept))
-
-    return drives.run(put, unsolicited=True)
 
 
 async def start(session: Session, drive: Drive, file: str, wanted: Downloading, text: str | None) -> None:

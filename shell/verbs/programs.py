@@ -29,8 +29,6 @@ from multidrop.shell.verbs.on_drives import (
 )
 
 if TYPE_CHECKING:
-    from multidrop.drives.drive import Drive
-    from multidrop.shell.session import Session
     from multidrop.shell.verbs.call import Call
 
 GROUP = "Programs of drives"
@@ -51,9 +49,9 @@ AsLines = Annotated[bool, Argument("print one JSON object a line of the drive: d
 
 
 async def check(call: Call, file: FileName, personality: Personality = "") -> None:
-    from multidrop.shell.programs import typed_lines
+    from multidrop.shell.verbs import program_lines
 
-    await typed_lines.check(call, file, personality)
+    await program_lines.check(call, file, personality)
 
 
 def check_files(files: tuple[ProgramFile, ...], *, how: Checking) -> int:
@@ -77,27 +75,27 @@ def words_of(call: Call) -> list[str]:
 
 
 def list_recorded(call: Call) -> str:
-    from multidrop.shell.programs import typed_lines
+    from multidrop.shell.verbs import program_lines
 
-    return typed_lines.listed_line(call, words_of(call))
+    return program_lines.listed_line(call, words_of(call))
 
 
 async def list_(call: Call, addr: Address = "", file: FileName = "") -> None:
-    from multidrop.shell.programs import typed_lines
+    from multidrop.shell.verbs import program_lines
 
-    await typed_lines.list_program(call, [addr, file])
+    await program_lines.list_program(call, [addr, file])
 
 
 def list_of_url(drives: OfUrl, *, json: AsLines = False) -> int:
-    from multidrop.shell.batch import program_runs
+    from multidrop.shell.verbs import programs_in_drives
 
-    return program_runs.list_programs(drives, json)
+    return programs_in_drives.list_programs(drives, json)
 
 
 def diff(file: ProgramFile, url: Url, *, drive: Drives = "", json: AsDifferences = False) -> int:
-    from multidrop.shell.batch import program_runs
+    from multidrop.shell.verbs import programs_in_drives
 
-    return program_runs.diff(file, OfUrl(url, drive), json)
+    return programs_in_drives.diff(file, OfUrl(url, drive), json)
 
 
 def upload_recorded(call: Call) -> str:
@@ -109,20 +107,9 @@ def upload_recorded(call: Call) -> str:
 
 
 def upload(drives: OnDrives[R_co], file: NewFile, *, raw: AsStored = False) -> R_co:
-    """Save the program to a new file that can be downloaded again; several to a folder."""
-    from multidrop.base.new_file import STANDARD_OUTPUT
-    from multidrop.shell import program_listing
-    from multidrop.shell.params.work import file_of, make_place
+    from multidrop.shell.verbs import programs_in_drives
 
-    drives.new_file(file)
-
-    async def save(session: Session, drive: Drive) -> None:
-        lines = await program_listing.upload(session, drive, raw)
-        own = file_of(session, drive, file, drives.target, drive.program_files.endings[0])
-        make_place(own, drives.target)
-        program_listing.save_new(session, drive, own, lines)
-
-    return drives.each(save, unsolicited=file != STANDARD_OUTPUT)
+    return programs_in_drives.upload(drives, file, raw)
 
 
 def download_recorded(call: Call) -> str:
@@ -141,49 +128,48 @@ def _qualified(call: Call, target: str) -> str:
 
 
 def download(drives: OnDrives[R_co], file: ProgramFile, *, how: Downloading) -> R_co:
-    """Send a file to the drives; report a wrong file before a URL is opened."""
-    from multidrop.shell.programs import transfers
+    from multidrop.shell.verbs import programs_in_drives
 
-    return transfers.to_each(drives, file, how)
+    return programs_in_drives.download(drives, file, how)
 
 
 # The debugger
 
 
 def debugger_recorded(call: Call) -> str:
-    from multidrop.shell.programs import typed_lines
+    from multidrop.shell.verbs import program_lines
 
-    return typed_lines.debugger_line(call, words_of(call))
+    return program_lines.debugger_line(call, words_of(call))
 
 
 async def trace(call: Call, addr: Address = "", label: Label = "") -> None:
-    from multidrop.shell.programs import typed_lines
+    from multidrop.shell.verbs import program_lines
 
-    await typed_lines.trace(call, [addr, label])
+    await program_lines.trace(call, [addr, label])
 
 
 async def step(call: Call, addr: Address = "", label: Label = "") -> None:
-    from multidrop.shell.programs import typed_lines
+    from multidrop.shell.verbs import program_lines
 
-    await typed_lines.step(call, [addr, label])
+    await program_lines.step(call, [addr, label])
 
 
 async def continue_(call: Call, addr: Address = "") -> None:
-    from multidrop.shell.programs import typed_lines
+    from multidrop.shell.verbs import program_lines
 
-    await typed_lines.continue_(call, [addr])
+    await program_lines.continue_(call, [addr])
 
 
 async def break_(call: Call, addr: Address = "", place: BreakPoint = "", passes: Passes = "") -> None:
-    from multidrop.shell.programs import typed_lines
+    from multidrop.shell.verbs import program_lines
 
-    await typed_lines.break_(call, [addr, place, passes])
+    await program_lines.break_(call, [addr, place, passes])
 
 
 async def watch(call: Call, addr: MaybeAddress, names: tuple[Watched, ...]) -> None:
-    from multidrop.shell.programs import typed_lines
+    from multidrop.shell.verbs import program_lines
 
-    await typed_lines.watch(call, [addr, *names])
+    await program_lines.watch(call, [addr, *names])
 
 
 OPERATIONS = (

@@ -195,10 +195,10 @@ def apply(
     yes: Yes = False,
 ) -> int:
     """Put the state of one drive of a cell file onto a replacement; report a wrong file before anything is opened."""
-    from multidrop.shell.params import replacement
+    from multidrop.shell.verbs import replacing
 
     how = Restoring(named=named, dry_run=dry_run, other_product=other_product)
-    return replacement.apply_each(OfUrl(url, drive, yes), file, source, how)
+    return replacing.apply_each(OfUrl(url, drive, yes), file, source, how)
 
 
 OPERATIONS = (

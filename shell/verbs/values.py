@@ -22,31 +22,31 @@ Level = Annotated[str, Argument(metavar="0|1", words={"0": "", "1": ""})]
 
 
 async def plot(call: Call, *texts: Plotted) -> None:
-    from multidrop.shell.plots import on_screen
+    from multidrop.shell.verbs import plotting
 
-    await on_screen.plot(call, texts)
+    await plotting.plot(call, texts)
 
 
 async def end_plots(call: Call) -> None:
-    from multidrop.shell.plots import on_screen
+    from multidrop.shell.verbs import plotting
 
-    await on_screen.end(call.session)
+    await plotting.end(call.session)
 
 
 async def register(call: Call, wanted: Access) -> None:
-    from multidrop.shell import register_access
+    from multidrop.shell.verbs import register_access
 
     await register_access.register(call, wanted)
 
 
 async def coil(call: Call, number: Output, level: Level = "") -> None:
-    from multidrop.shell import register_access
+    from multidrop.shell.verbs import register_access
 
     await register_access.coil(call, number, level)
 
 
 async def device(call: Call) -> None:
-    from multidrop.shell import register_access
+    from multidrop.shell.verbs import register_access
 
     await register_access.device(call)
 

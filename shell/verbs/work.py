@@ -2,24 +2,24 @@
 
 from __future__ import annotations
 
-from multidrop.shell import macro_arguments, macro_changes, program_listing, raw, register_access, waits
+from multidrop.shell import macro_arguments, macro_changes, program_listing, raw, waits
 from multidrop.shell.params import work
-from multidrop.shell.plots import on_screen
-from multidrop.shell.programs import transfers, typed_lines
+from multidrop.shell.programs import transfers
 from multidrop.shell.scripts import executor
-from multidrop.shell.verbs import explaining
+from multidrop.shell.verbs import explaining, plotting, program_lines, programs_in_drives, register_access
 
 ALL = (
     executor,
     explaining,
     macro_arguments,
     macro_changes,
-    on_screen,
+    plotting,
     program_listing,
     raw,
     register_access,
     transfers,
-    typed_lines,
+    program_lines,
+    programs_in_drives,
     waits,
     work,
 )

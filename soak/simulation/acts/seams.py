@@ -14,7 +14,6 @@ import multidrop.features.twins.pair
 import multidrop.shell.macro_arguments
 import multidrop.shell.macro_changes
 import multidrop.shell.macro_recording
-import multidrop.shell.programs.typed_lines
 import multidrop.shell.prompt.terminal_input
 import multidrop.shell.scripts.executor
 import multidrop.shell.snapshots
@@ -23,6 +22,7 @@ import multidrop.shell.verbs.call
 import multidrop.shell.verbs.explaining
 import multidrop.shell.verbs.macros
 import multidrop.shell.verbs.programs
+import multidrop.shell.verbs.programs_in_drives
 import multidrop.shell.verbs.session
 import multidrop.shell.verbs.settings
 import multidrop.shell.verbs.waiting

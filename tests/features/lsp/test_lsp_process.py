@@ -20,7 +20,6 @@ from multidrop.base.errors import Diagnostic
 from multidrop.cli import run
 from multidrop.features.lsp.server import Server
 from multidrop.features.lsp.serving import serve_port
-from multidrop.shell.operations.operation import add_arguments
 from multidrop.shell.operations.table import COMMANDS
 from tests.support.lsp_session import Editor
 from tests.support.processes import environment
@@ -134,7 +133,7 @@ def test_without_its_extra_it_says_what_to_install(
 )
 def test_a_port_is_on_this_computer_unless_a_host_is_named(text: str, address: tuple[str, int] | None) -> None:
     parser = argparse.ArgumentParser(exit_on_error=False)
-    add_arguments(parser, COMMANDS["lsp"].arguments)
+    COMMANDS["lsp"].add_to(parser)
     if address is None:
         with pytest.raises(argparse.ArgumentError, match="valid: PORT or HOST:PORT"):
             parser.parse_args(["--tcp", text])

@@ -54,7 +54,7 @@ async def register(call: Call, wanted: Accessed) -> None:
     drive, registers = _registered(call)
     address, values = wanted.address, wanted.values
     if values is None:
-        await _show(call, drive, registers.read(address, wanted.count))
+        await _show(call, drive, registers.read(address, wanted.length))
         return
     lines = registers.lines(address, values)
     for line in lines:
