@@ -65,7 +65,7 @@ def _run(arguments: Sequence[str], own: bool) -> int:
         chosen = parse(arguments)
         from multidrop.shell.streams import output_streams, stdout
 
-        output_streams.as_json = any(each is True for key, each in vars(chosen).items() if key.split(".")[-1] == "json")
+        output_streams.as_json = getattr(chosen, "json", False) is True
         if own and not chosen.run_by.connection:
             stdout.watch_reader(signal.SIGINT)
         code = run(chosen)

@@ -91,7 +91,7 @@ class Added:
         self._given: list[tuple[Options, Any]] = []
         for each in options(command):
             found = values(each.parameters, chosen)
-            self._given.append((each, each.options(**{one.name: found[one.key] for one in each.parameters})))
+            self._given.append((each, each.options(**{one.name: found[one.name] for one in each.parameters})))
 
     def prepare(self, session: Session) -> None:
         """Do what the options ask for before a URL is opened."""

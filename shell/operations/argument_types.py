@@ -131,7 +131,8 @@ class Checking:
         str | None,
         Argument(
             "the drive that the program is for, from a cell file such as a snapshot (CELL, CELL#BUS or CELL#BUS:NAME): "
-            "commands that its firmware or size lacks are named, too"
+            "commands that its firmware or size lacks are named, too",
+            listed=(Listed.FILE,),
         ),
     ] = None
     format: Annotated[bool, Argument("rewrite files without errors in canonical spelling; remarks stay")] = False
@@ -147,9 +148,10 @@ class Testing:
         str | None,
         Argument(arguments.tested_personality, "P", read=str.upper, choices=arguments.tested_personalities),
     ] = None
-    cell: Annotated[str | None, Argument("a drive of a cell file and its world: CELL, CELL#BUS or CELL#BUS:NAME")] = (
-        None
-    )
+    cell: Annotated[
+        str | None,
+        Argument("a drive of a cell file and its world: CELL, CELL#BUS or CELL#BUS:NAME", listed=(Listed.FILE,)),
+    ] = None
     until: Annotated[
         float | None,
         Argument("virtual seconds at most, for a program without an end", "SECONDS", read=arguments.duration),

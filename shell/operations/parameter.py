@@ -117,11 +117,6 @@ class Parameter:
         return self.option and self.kind is bool
 
     @property
-    def key(self) -> str:
-        """Its name among all arguments of an operation."""
-        return self.name if self.holder is None else f"{self.holder[0]}.{self.name}"
-
-    @property
     def names(self) -> tuple[str, ...]:
         """The names of an option."""
         own = self.argument.option or f"--{self.name.strip('_').replace('_', '-')}"
@@ -271,13 +266,13 @@ def _kind(annotation: Any, scope: Mapping[str, Any], where: str) -> tuple[Any, A
 
 
 def gathered(found: Sequence[Parameter], values: Mapping[str, Any]) -> tuple[list[Any], dict[str, Any]]:
-    """The arguments of a call, by place and by name, of the values by key."""
+    """The arguments of a call, by place and by name, of the values by name."""
     by_place = any(each.starred for each in found)
     places: list[Any] = []
     named: dict[str, Any] = {}
     sets: dict[tuple[str, type], dict[str, Any]] = {}
     for each in found:
-        value = values[each.key]
+        value = values[each.name]
         if each.holder is not None:
             sets.setdefault(each.holder, {})[each.name] = value
         elif each.starred:

@@ -33,14 +33,14 @@ def _together(parameters: Sequence[Parameter]) -> list[Parameter]:
     """The arguments, those that exclude each other one after the other: so argparse shows them."""
     firsts = {each.argument.one_of: number for number, each in reversed([*enumerate(parameters)])}
     at = {
-        each.key: firsts[each.argument.one_of] if each.argument.one_of is not None else number
+        each.name: firsts[each.argument.one_of] if each.argument.one_of is not None else number
         for number, each in enumerate(parameters)
     }
-    return sorted(parameters, key=lambda each: at[each.key])
+    return sorted(parameters, key=lambda each: at[each.name])
 
 
 def _add(parser: argparse._ActionsContainer, one: Parameter, flag: str | type[argparse.Action]) -> None:
-    options: dict[str, Any] = {"dest": one.key, "help": one.help or None}
+    options: dict[str, Any] = {"dest": one.name, "help": one.help or None}
     if one.flag:
         parser.add_argument(*one.names, action=flag, required=one.required, **options)
         return
@@ -61,25 +61,30 @@ def _add(parser: argparse._ActionsContainer, one: Parameter, flag: str | type[ar
         options["action"] = one.argument.action
     if one.option:
         options.setdefault("action", Each if one.several else Once)
-        parser.add_argument(*one.names, required=one.required, **options)
+        _note(parser.add_argument(*one.names, required=one.required, **options), one)
         return
     if one.several or one.argument.rest:
         options["nargs"] = "+" if one.required else "*"
     elif not one.required:
         options["nargs"] = "?"
-    parser.add_argument(**options)
+    _note(parser.add_argument(**options), one)
+
+
+def _note(action: argparse.Action, one: Parameter) -> None:
+    """Keep what completion offers for an argument, for the completions of the shells."""
+    action.listed = one.argument.listed  # type: ignore[attr-defined]
 
 
 def values(parameters: Sequence[Parameter], found: argparse.Namespace) -> dict[str, Any]:
-    """The values of a parsed line by the keys of the arguments."""
-    every = {each.key: getattr(found, each.key) for each in parameters}
+    """The values of a parsed line by the names of the arguments."""
+    every = {each.name: getattr(found, each.name) for each in parameters}
     for each in parameters:
-        if every[each.key] is NOT_GIVEN:
-            every[each.key] = each.default
-        elif each.argument.rest and not isinstance(every[each.key], str):
-            every[each.key] = " ".join(every[each.key])
+        if every[each.name] is NOT_GIVEN:
+            every[each.name] = each.default
+        elif each.argument.rest and not isinstance(every[each.name], str):
+            every[each.name] = " ".join(every[each.name])
         elif each.several:
-            every[each.key] = tuple(every[each.key])
+            every[each.name] = tuple(every[each.name])
     return every
 
 
@@ -93,7 +98,7 @@ class LineParser(argparse.ArgumentParser):
         add_parameters(self, [each for each in parameters if each is not self._rest], OnceFlag)
 
     def line(self, text: str, where: str) -> dict[str, Any]:
-        """Parse a line; return the values by the keys of the arguments.
+        """Parse a line; return the values by the names of the arguments.
 
         Raises WrongWords; Diagnostic for a quotation mark that is not closed.
         """
@@ -106,7 +111,7 @@ class LineParser(argparse.ArgumentParser):
             if not text and self._rest.required:
                 raise WrongWords
             try:
-                rest = {self._rest.key: self._rest.read(text) if text else self._rest.default}
+                rest = {self._rest.name: self._rest.read(text) if text else self._rest.default}
             except READ_RAISES as wrong:
                 raise WrongWords(str(wrong)) from None
         else:

@@ -248,7 +248,11 @@ def _check(feature: Feature) -> None:
         raise Diagnostic(wrong)
     for record in feature.adds:
         if (added := getattr(record, "parameters", None)) is not None:  # more options of a command
-            COMMANDS[record.command].add_to(ArgumentParser(), added)  # type: ignore[attr-defined]
+            command = COMMANDS[record.command]  # type: ignore[attr-defined]
+            command.add_to(ArgumentParser(), added)
+            names = {each.name for each in command.command_arguments}
+            if taken := next((each.name for each in added if each.name in names), ""):
+                raise Diagnostic(f"{command.command}: the name {taken} is taken")
 
 
 def find(name: str) -> Verb:

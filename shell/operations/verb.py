@@ -50,7 +50,7 @@ class Reached(NamedTuple):
 
 
 class Chosen(NamedTuple):
-    """The form of a line, and its values by the keys of the arguments."""
+    """The form of a line, and its values by the names of the arguments."""
 
     form: Operation
     values: Mapping[str, Any]
@@ -156,9 +156,12 @@ class Verb:
         forms = self._meant(divided(rest)[0])
         found: list[str] = []
         for form in forms:
-            text = rest
+            text, words = rest, list[str]()
             for _ in form.fixed:
-                text = divided(text)[1]
+                word, text = divided(text)
+                words.append(word)
+            if (*words,) != form.fixed:
+                continue
             try:
                 return Chosen(form, form.parsed(text))
             except WrongWords as wrong:

@@ -125,7 +125,7 @@ class OfUrl(OnDrives[int]):
 def given_options(call: Call) -> list[str]:
     """The options of a line as words, in the order of the usage."""
     values = call.chosen.values
-    given = [(each.names[-1], values[each.key]) for each in call.chosen.form.options if values[each.key]]
+    given = [(each.names[-1], values[each.name]) for each in call.chosen.form.options if values[each.name]]
     words: list[str] = []
     for name, value in given:
         words += [name] if value is True else [name, value if isinstance(value, str) else ",".join(sorted(value))]

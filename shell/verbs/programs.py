@@ -34,8 +34,7 @@ if TYPE_CHECKING:
 GROUP = "Programs of drives"
 Personality = Annotated[str, Argument(metavar="PERSONALITY", listed=(Listed.PERSONALITY,))]
 NewFile = Annotated[
-    str,
-    Argument("the new file; it can be downloaded again; -: standard output", metavar="FILE", listed=(Listed.FILE,)),
+    str, Argument("the new file; it can be downloaded again; -: standard output", metavar="FILE", listed=(Listed.FILE,))
 ]
 AsStored = Annotated[bool, Argument("save the lines as they are stored, without remarks")]
 Label = Annotated[str, Argument(metavar="LABEL")]

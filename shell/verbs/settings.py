@@ -35,9 +35,13 @@ NewFile = Annotated[str, Argument("the new file; -: standard output", metavar="F
 Backup = Annotated[str, Argument("a file of `params backup`", metavar="FILE", listed=(Listed.FILE,))]
 With = Annotated[str, Argument("compare with this drive", metavar="ADDR", listed=(Listed.DRIVE,))]
 Defaults = Annotated[bool, Argument("compare with the defaults")]
-Elsewhere = Annotated[str, Argument("compare with a drive there", metavar="URL2")]
-Other = Annotated[str, Argument("the drive to compare with (default: the first of URL2)", metavar="ADDR")]
-NewCell = Annotated[str, Argument("the new file; -: standard output", metavar="CELL.toml", short="-o")]
+Elsewhere = Annotated[str, Argument("compare with a drive there", metavar="URL2", listed=(Listed.URL,))]
+Other = Annotated[
+    str, Argument("the drive to compare with (default: the first of URL2)", metavar="ADDR", listed=(Listed.DRIVE,))
+]
+NewCell = Annotated[
+    str, Argument("the new file; -: standard output", metavar="CELL.toml", short="-o", listed=(Listed.FILE,))
+]
 CellFile = Annotated[str, Argument("a cell file, as snapshot writes it", metavar="CELL.toml", listed=(Listed.FILE,))]
 Replacement = Annotated[
     str,
@@ -70,7 +74,7 @@ def params_recorded(call: Call) -> str:
     import shlex
 
     form, values = call.chosen
-    names = [values[each.key] for each in form.places if each.name != "addr"]
+    names = [values[each.name] for each in form.places if each.name != "addr"]
     target = values["addr"] or call.session.qualified_address(call.drive())
     words = (form.name, *form.fixed, *names, *filter(None, [target]), *given_options(call))
     return " ".join(map(shlex.quote, words))

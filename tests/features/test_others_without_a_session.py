@@ -102,6 +102,7 @@ ADDED_BY = {"EndpointKind": "usb", "PlotTargets": "plot_files", "Pictures": "not
     [
         ('Options("shell", Agreed)', "ArgumentError: argument --yes: conflicting option string: --yes"),
         ('Options("shell", Twin)', "shell --twin is taken"),
+        ('Options("shell", Urls)', "shell: the name urls is taken"),
         ('Section("keys", (), "[keys]", read, dict)', "[keys] is taken"),
         ('Section("mqtt", (), "[mqtt]", read, dict)', "[mqtt] is taken"),
         ('Operation(read, verb="/gate")', "/gate has no help"),
@@ -163,6 +164,10 @@ def to(call, *, to: str = ""):
 @dataclass(frozen=True, kw_only=True)
 class Agreed:
     yes: bool = False
+
+@dataclass(frozen=True, kw_only=True)
+class Urls:
+    urls: bool = False
 
 @dataclass(frozen=True, kw_only=True)
 class Twin:

@@ -292,9 +292,9 @@ def test_a_parameter_that_says_no_type_is_a_clear_error() -> None:
 
 @pytest.mark.parametrize("operation", table.core(), ids=lambda each: each.verb or each.command)
 def test_every_operation_is_declared_well(operation: Operation) -> None:
-    """Its annotations are read, its keys differ, and what is said in one line is one."""
+    """Its annotations are read, its names differ, and what is said in one line is one."""
     for arguments_of in (operation.arguments, operation.command_arguments):
-        assert len({each.key for each in arguments_of}) == len(arguments_of)
+        assert len({each.name for each in arguments_of}) == len(arguments_of)
         optional = [not each.required for each in arguments_of if not each.option]
         add_parameters(argparse.ArgumentParser(), arguments_of)
         assert all(isinstance(each.help, str) for each in arguments_of) and optional is not None
@@ -303,7 +303,7 @@ def test_every_operation_is_declared_well(operation: Operation) -> None:
     assert not operation.verb or operation.do is None or VERBS_OF[operation.name].help
 
 
-VERBS_OF = {name: verb for name, verb in table.VERBS.items() if isinstance(verb, Verb)}
+VERBS_OF = {**table.VERBS, **table.script_verbs()}
 
 
 def test_a_value_that_is_not_given_is_the_default() -> None:
@@ -311,3 +311,13 @@ def test_a_value_that_is_not_given_is_the_default() -> None:
     parser = argparse.ArgumentParser()
     add_parameters(parser, found)
     assert values(found, parser.parse_args(["f"])) == {"file": "f", "count": 1, "values": (), "fast": False, "to": ""}
+
+
+FORMS_ALONE = Verb((Operation(verb="/y", help="Be."), Operation(alone, verb="/y on", help="go"), *VERB.forms[1:2]))
+
+
+@for_each("line", ["", "off", "o", "on f"])
+def test_a_line_without_the_fixed_words_of_a_form_is_not_that_form(line: str) -> None:
+    with pytest.raises(Diagnostic, match="usage: /y "):
+        FORMS_ALONE.parsed(line)
+    assert FORMS_ALONE.parsed("on").form.verb == "/y on"

@@ -115,7 +115,7 @@ PLAIN: Mapping[type, Any] = MappingProxyType(
     }
 )
 """A record of each kind that does no harm."""
-CHOSEN = Namespace(**{"command": "shell", "Slowness.slow": True})
+CHOSEN = Namespace(command="shell", slow=True)
 TABLE = "[slow]\nkey = 1\n"
 
 
