@@ -17,8 +17,6 @@ from multidrop.shell.operations.parsing import WrongWords
 if TYPE_CHECKING:
     from multidrop.shell.workspace import Workspace
 
-NO_WORDS: Mapping[str, str] = {}
-
 
 class Step(NamedTuple):
     """The place of one word in a form: fixed words with their meanings, or an argument, or both."""
