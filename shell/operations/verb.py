@@ -177,7 +177,7 @@ class Verb:
     def _meant(self, word: str) -> Sequence[Operation]:
         """The forms that begin with a fixed word; else those that begin with any word, or have none."""
         fixed = [each for each in self.working if word in _first_words(each)]
-        return fixed or [each for each in self.working if not _begins_with_fixed_word(each)] or self.working
+        return fixed or [each for each in self.working if not _begins_with_fixed_word(each)]
 
     # What is typed
 
