@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from typing import Any, Generic, NamedTuple, TypeVar
 
 from multidrop.base.errors import TransportLost
-from multidrop.base.isolation import isolated
+from multidrop.base.isolation import at_once, isolated
 from multidrop.dialects import DriveState, Reply, Request
 from multidrop.dialects.values import Conditions
 
@@ -192,8 +192,9 @@ class Publisher(Generic[E]):
     def subscribe(self, callback: Callable[[E], None], *kinds: type) -> Callable[[], None]:
         """Call back with every event of these kinds, by default of all, from the event loop.
 
-        The function returned ends the subscription.
+        The function returned ends the subscription. Raises Diagnostic for an async callback.
         """
+        at_once(callback)
         return self.subscribers.add(callback, kinds)
 
     def publish(self, event: E) -> None:

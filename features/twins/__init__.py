@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from multidrop.base.feature import Feature
 from multidrop.base.text import whole
-from multidrop.shell.hooks import AtSession, Options, Switch
+from multidrop.shell.hooks import AtSession, Options, Predicting, Switch
 from multidrop.shell.operations.argument_types import RAW, Address
 from multidrop.shell.operations.operation import Operation, typed
 from multidrop.shell.operations.parameter import Argument
@@ -116,6 +116,7 @@ its twin moves on. `/twin` alone lists the twins.
         Operation(_off, verb="/twin off", recorded=typed, help="end all twins"),
         Operation(_limit, verb="/twin limit", recorded=typed, help="the steps by which a drive at rest may differ"),
         AtSession(_begin),
+        Predicting("no twin runs that it could differ from", "/twin on begins one"),
         Switch(
             "twin",
             "/twin",

@@ -16,7 +16,7 @@ from multidrop.shell.hooks import Around, Prepare
 from multidrop.shell.operations.argument_types import Agreeing, Opening, Reporting
 
 if TYPE_CHECKING:
-    from multidrop.dialects.family import Language
+    from multidrop.dialects.language import Language
     from multidrop.shell.hooks import Added
     from multidrop.shell.session import Session
 

@@ -153,7 +153,7 @@ class Parameter:
         """Make a value of a text. Raises argparse.ArgumentTypeError for a wrong one."""
         if text in self.words or self.argument.read is None and self.words:
             if text not in self.words:
-                raise argparse.ArgumentTypeError(f"no {self.metavar} {text}; valid: {', '.join(self.words)}")
+                raise argparse.ArgumentTypeError(f"{text} is none of {', '.join(self.words)}")
             return text if self.argument.read is None else self.argument.read(text)
         if self.argument.read is not None:
             return self.argument.read(text)

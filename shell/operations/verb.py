@@ -17,8 +17,6 @@ from multidrop.shell.operations.parsing import WrongWords
 if TYPE_CHECKING:
     from multidrop.shell.workspace import Workspace
 
-NO_WORDS: Mapping[str, str] = {}
-
 
 class Step(NamedTuple):
     """The place of one word in a form: fixed words with their meanings, or an argument, or both."""
@@ -181,7 +179,7 @@ class Verb:
     def _meant(self, word: str) -> Sequence[Operation]:
         """The forms that begin with a fixed word; else those that begin with any word, or have none."""
         fixed = [each for each in self.working if word in _first_words(each)]
-        return fixed or [each for each in self.working if not _begins_with_fixed_word(each)] or self.working
+        return fixed or [each for each in self.working if not _begins_with_fixed_word(each)]
 
     # What is typed
 

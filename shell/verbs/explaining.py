@@ -6,7 +6,7 @@ import difflib
 
 from multidrop.base.errors import Diagnostic
 from multidrop.dialects.families import DEFAULT, FAMILIES, languages, program_languages
-from multidrop.dialects.family import Language
+from multidrop.dialects.language import Language, labelled
 from multidrop.shell.operations.conditions import ON_SCREEN
 from multidrop.shell.operations.table import VERBS, groups, script_verbs
 from multidrop.shell.session import Session
@@ -24,7 +24,7 @@ def on(session: Session, word: str) -> list[str]:
         from multidrop.shell import setting_units
 
         taken = setting_units.example(session.units, selected, word.upper())
-        lines = [*lines, f"  {'units':<10} {taken}"] if taken else lines
+        lines = [*lines, *labelled([("units", taken)])]
     return lines
 
 

@@ -41,7 +41,7 @@ def _seconds(text: str) -> float:
 def _text(text: str) -> TextWait:
     match = _TEXT.fullmatch(text)
     if match is None:
-        raise argparse.ArgumentTypeError("")
+        raise argparse.ArgumentTypeError("a quotation mark is not closed" if text[:1] in ("'", '"') else "")
     return TextWait(match["text"], None if match["seconds"] is None else _seconds(match["seconds"]))
 
 

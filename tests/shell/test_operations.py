@@ -113,7 +113,7 @@ COPY = "usage: /x FILE [N] [NAME=VALUE ...] [--fast] [--to FILE]"
         ("f --fas", f"/x: no option --fas; {COPY}"),
         ("f 'a", "/x: a quotation mark is not closed"),
         ("tell f", "/x: usage: /x tell FILE TEXT ..."),
-        ("paint blue", "/x: no COLOUR blue; valid: red, green; usage: /x paint red|green [left|right]"),
+        ("paint blue", "/x: blue is none of red, green; usage: /x paint red|green [left|right]"),
         ("paint red left more", "/x: usage: /x paint red|green [left|right]"),
     ],
 )

@@ -65,7 +65,7 @@ async def test_a_filter_is_understood(line: str, wanted: Filter, tmp_path: Path)
         ("/filter a b", "usage"),
         ("/filter mine mine", "usage"),
         ("/filter text", "usage"),
-        ("/filter off mine", "no drive off"),
+        ("/filter off mine", "usage: /filter off"),
         ("/times noon", "no form noon"),
         ("/save", "usage"),
         ("/unsent now", "usage"),

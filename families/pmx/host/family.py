@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from typing import ClassVar
 
 from multidrop.dialects.certifying import Certifying
 from multidrop.dialects.codec import Codec, Priority, Procedure
@@ -19,7 +18,6 @@ from multidrop.dialects.family import (
     Family,
     Guard,
     Hints,
-    Language,
     Motion,
     Printed,
     Programs,
@@ -100,7 +98,7 @@ class PmxFamily(Family):
 
     name = Pmx.family
     codec = Pmx()
-    language: ClassVar[Language] = help
+    language = help.LANGUAGE
     stop_bytes = STOP_BYTES
 
     @classmethod

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
-
 from multidrop.dialects.certifying import Certifying
 from multidrop.dialects.codec import Codec, Priority, Procedure
 from multidrop.dialects.debugging import Debugging
-from multidrop.dialects.family import Guard, Hints, Language, Motion, Printed, Programs, Referencing
+from multidrop.dialects.family import Guard, Hints, Motion, Printed, Programs, Referencing
 from multidrop.dialects.motions import Motions
 from multidrop.dialects.scanning import Scan
 from multidrop.dialects.state import DriveState, Remembered
@@ -40,7 +38,7 @@ class MCodeFamily(LexiumFamily):
 
     name = MCode.family
     codec = MCode()
-    language: ClassVar[Language] = help
+    language = help.LANGUAGE
     repairs = True
     stop_bytes = STOP_BYTES
 

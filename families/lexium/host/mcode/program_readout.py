@@ -284,7 +284,7 @@ def read_names(state: MCodeState) -> Procedure[Held]:
 
 def offered(held: Held, line: str) -> list[tuple[str, str]]:
     """The names that may end a line: labels where a line takes one, variables elsewhere, both after PR."""
-    word = help.typing(line)
+    word = help.LANGUAGE.typing(line)
     head = line[: len(line) - len(word)]
     in_text = head.count('"') % 2 == 1
     begun = bool(word or (head.strip() and head.endswith((" ", ",", "="))))

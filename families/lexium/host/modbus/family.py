@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import ClassVar
 
 from multidrop.dialects.certifying import Certifying
 from multidrop.dialects.codec import Codec, Priority, Procedure
-from multidrop.dialects.family import Guard, Hints, Language, Motion, Printed, Referencing, Registers
+from multidrop.dialects.family import Guard, Hints, Motion, Printed, Referencing, Registers
 from multidrop.dialects.motions import Motions
 from multidrop.dialects.state import DriveState
 from multidrop.dialects.units import Units
@@ -79,7 +78,7 @@ class ModbusFamily(LexiumFamily):
 
     name = Modbus.family
     codec = Modbus()
-    language: ClassVar[Language] = help
+    language = help.LANGUAGE
     no_programs = f"programs are neither listed nor written over Modbus; {ALTERNATIVE} does both with the same drive"
 
     @classmethod
