@@ -11,7 +11,7 @@ from multidrop.base import new_file
 from multidrop.shell import program_listing
 from multidrop.shell.operations.argument_types import Downloading, Restoring
 from multidrop.shell.params import file as files
-from multidrop.shell.params.work import Difference, differences, restore
+from multidrop.shell.params.work import Difference, backup_text, differences, restore
 from multidrop.shell.programs import transfers
 
 if TYPE_CHECKING:
@@ -80,8 +80,7 @@ class AsyncParameters(Fixed):
         """Read every setting, and write them to a new file. Raises Diagnostic for a file that exists."""
         new_file.check(file)
         found = await self.read()
-        identity = files.identity(self._drive.state, self._drive.family.values.parameters.language)
-        new_file.write(file, files.formatted(identity, found))
+        new_file.write(file, backup_text(self._drive, found))
         return found
 
     async def diff(self, file: str = "") -> list[Difference]:

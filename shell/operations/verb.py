@@ -167,7 +167,9 @@ class Verb:
         for word in rest.split():
             if word.startswith("--"):
                 registry.with_word(f"{self.name} {word.partition('=')[0]}")
-        raise self.wrong(next(filter(None, found), ""), forms if rest.strip() else ())
+        known = {f"no option {name}" for form in forms for each in form.options for name in each.names}
+        messages = (each for each in found if each and each not in known)
+        raise self.wrong(next(messages, ""), forms if rest.strip() else ())
 
     def check(self, rest: str) -> None:
         """Raise Diagnostic for arguments that are wrong whatever is open."""

@@ -127,6 +127,11 @@ async def each(workspace: Workspace, drives: Sequence[Drive], work: Work) -> Non
         raise Diagnostic(text)
 
 
+def backup_text(drive: Drive, found: Readings) -> str:
+    """The file of settings that were read of a drive."""
+    return files.formatted(files.identity(drive.state, drive.family.values.parameters.language), found)
+
+
 async def backup(workspace: Workspace, name: str, target: str) -> None:
     """Write the settings of drives to new files, or to standard output."""
 
@@ -135,8 +140,7 @@ async def backup(workspace: Workspace, name: str, target: str) -> None:
         make_place(own, target)
         new_file.check(own, printed=True)
         found, who = await files.read(workspace, drive, "backup"), workspace.display_name(drive)
-        text = files.formatted(files.identity(drive.state, drive.family.values.parameters.language), found)
-        new_file.write(own, text, workspace.output)
+        new_file.write(own, backup_text(drive, found), workspace.output)
         workspace.notify(f"{who}: {counted(len(found.readings), 'setting')}{new_file.place(own)}")
         if found.unread:
             names = files.listed([name for name, _ in found.unread])

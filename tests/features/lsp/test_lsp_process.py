@@ -17,7 +17,7 @@ from pytest_lsp import client_capabilities
 from pytest_lsp.client import make_test_lsp_client
 
 from multidrop.base.errors import Diagnostic
-from multidrop.cli import run
+from multidrop.cli import parse, run
 from multidrop.features.lsp.server import Server
 from multidrop.features.lsp.serving import serve_port
 from multidrop.shell.operations.table import COMMANDS
@@ -116,7 +116,7 @@ def test_without_its_extra_it_says_what_to_install(
         monkeypatch.delitem(sys.modules, name)
     monkeypatch.setitem(sys.modules, "pygls", None)
     monkeypatch.setitem(sys.modules, "lsprotocol", None)
-    assert run(argparse.Namespace(run_by=COMMANDS["lsp"], personality="LMDCM", tcp=None)) == 2
+    assert run(parse(["lsp"])) == 2
     line = "the language server needs pygls, which is not installed; pipx install 'multidrop[lsp]'\n"
     assert capsys.readouterr().err == line
 
