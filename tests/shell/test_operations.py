@@ -328,4 +328,4 @@ def test_an_option_that_another_form_has_is_not_called_unknown() -> None:
     with pytest.raises(Diagnostic, match="^/z: usage: /z FILE"):
         verb.parsed("--fast")
     with pytest.raises(Diagnostic, match="^/z: no option --slow; usage: /z FILE"):
-        verb.parsed("--slow f f")
+        verb.parsed("f --slow")
