@@ -324,8 +324,11 @@ def test_a_line_without_the_fixed_words_of_a_form_is_not_that_form(line: str) ->
 
 
 def test_an_option_that_another_form_has_is_not_called_unknown() -> None:
-    verb = Verb((Operation(copy, verb="/z", help="Copy."), Operation(tell, verb="/z", help="Tell.")))
+    def crawl(at: object, *, slow: bool = False) -> None:
+        """Never called."""
+
+    verb = Verb((Operation(copy, verb="/z", help="Copy."), Operation(crawl, verb="/z")))
     with pytest.raises(Diagnostic, match="^/z: usage: /z FILE"):
         verb.parsed("--fast")
-    with pytest.raises(Diagnostic, match="^/z: no option --slow; usage: /z FILE"):
-        verb.parsed("f --slow")
+    with pytest.raises(Diagnostic, match="^/z: no option --other; usage: /z FILE"):
+        verb.parsed("--other")
