@@ -20,7 +20,7 @@ from types import GeneratorType
 from typing import Any
 
 from multidrop.base.errors import Diagnostic, DriveError, FeatureFailed, TransportLost, kind_and_text
-from multidrop.base.feature import Feature, Kinds
+from multidrop.base.feature import GUARD, Feature, Kinds
 from multidrop.base.isolation import LOG, OTHERS, at_once, takes_signals
 
 READ: Kinds = (Diagnostic, DriveError, TransportLost, BrokenPipeError)
@@ -70,7 +70,9 @@ class Guard:
             with self.calling(passes):
                 return self._result(function(*given, **named), passes)
 
-        return awaited if iscoroutinefunction(function) else guarded
+        found = awaited if iscoroutinefunction(function) else guarded
+        vars(found)[GUARD] = self
+        return found
 
     def _result(self, found: Any, passes: Kinds) -> Any:
         if isinstance(found, GeneratorType):

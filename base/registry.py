@@ -31,6 +31,21 @@ GROUP, FAMILY_GROUP = "multidrop.features", "multidrop.families"
 """The entry points of features and of families, and the packages of the wheel's."""
 RECORDS = {GROUP: "FEATURE", FAMILY_GROUP: "FAMILY"}
 """The name of the record in a module."""
+OPERATIONS: tuple[str, ...] = (
+    "multidrop.commands.operations",
+    "multidrop.shell.verbs.buses",
+    "multidrop.shell.verbs.units",
+    "multidrop.shell.verbs.raw",
+    "multidrop.shell.verbs.sim",
+    "multidrop.shell.verbs.settings",
+    "multidrop.shell.verbs.values",
+    "multidrop.shell.verbs.programs",
+    "multidrop.shell.verbs.macros",
+    "multidrop.shell.verbs.waiting",
+    "multidrop.shell.verbs.session",
+    "multidrop.shell.verbs.scripts",
+)
+"""The modules that declare the core's own operations: each has a tuple `OPERATIONS`."""
 WHEEL = "multidrop"
 KEPT = "features.json"
 
