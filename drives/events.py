@@ -14,7 +14,7 @@ from typing import Any, Generic, NamedTuple, TypeVar
 
 from multidrop.base.errors import TransportLost
 from multidrop.base.isolation import at_once, isolated
-from multidrop.dialects import DriveState, Reply, Request
+from multidrop.dialects import DriveState, End, Reply, Request
 from multidrop.dialects.values import Conditions
 
 
@@ -29,6 +29,11 @@ class Transaction(NamedTuple):
     """When the last byte of the request had left, calculated from the baud rate."""
     sent: bool = True
     """Whether the request was written; one that was stopped before that was not."""
+
+    @property
+    def replied(self) -> bool:
+        """Whether its drive has replied to it, a refusal included."""
+        return self.reply.end in (End.DONE, End.REFUSED, End.NAK) and not self.reply.doubtful
 
 
 class Sent(NamedTuple):

@@ -169,7 +169,8 @@ class Verb:
                 registry.with_word(f"{self.name} {word.partition('=')[0]}")
         known = {f"no option {name}" for form in forms for each in form.options for name in each.names}
         messages = (each for each in found if each and each not in known)
-        raise self.wrong(next(messages, ""), forms if rest.strip() else ())
+        fixed = any(divided(rest)[0] in _first_words(form) for form in forms)
+        raise self.wrong(next(messages, ""), forms if fixed else ())
 
     def check(self, rest: str) -> None:
         """Raise Diagnostic for arguments that are wrong whatever is open."""

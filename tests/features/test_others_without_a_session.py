@@ -203,7 +203,7 @@ def test_a_verb_that_is_not_async_is_done(tmp_path: Path, multidrop: Command) ->
 
 
 def test_a_verb_that_interrupts_itself_is_one_line(tmp_path: Path, multidrop: Command) -> None:
-    text = VERB.replace('print("imported")', "").replace("def gate(call):\n    pass", ENDS)
+    text = VERB.replace('print("imported")', "").replace('def gate(call):\n    call.session.output("open")', ENDS)
     write(tmp_path, "gate", text)
     done = multidrop("send", "sim:#press", "/gate")
     assert (done.returncode, done.stderr) == (2, "the feature gate failed at gate.py:8: KeyboardInterrupt\n")

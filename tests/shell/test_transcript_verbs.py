@@ -66,7 +66,7 @@ async def test_a_filter_is_understood(line: str, wanted: Filter, tmp_path: Path)
         ("/filter mine mine", "usage"),
         ("/filter text", "usage"),
         ("/filter off mine", "usage: /filter off"),
-        ("/times noon", "no form noon"),
+        ("/times noon", "noon is none of off, clock, start, last"),
         ("/save", "usage"),
         ("/unsent now", "usage"),
     ],

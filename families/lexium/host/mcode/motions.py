@@ -16,7 +16,18 @@ from dataclasses import replace
 
 from multidrop.base.errors import DriveError
 from multidrop.dialects.codec import Procedure
-from multidrop.dialects.motions import NOTHING, Effect, Ending, Evidence, Motions, Move, MoveKind, Outcome, Signs
+from multidrop.dialects.motions import (
+    NOTHING,
+    Effect,
+    Ending,
+    Evidence,
+    Motions,
+    Move,
+    MoveKind,
+    Outcome,
+    Signs,
+    restarted,
+)
 from multidrop.dialects.state import DriveState, who
 from multidrop.dialects.values import Value
 from multidrop.families.lexium.host.mcode import classify, exchange, operations
@@ -33,7 +44,9 @@ from multidrop.families.lexium.manual.table import lookup
 
 AXIS = ""
 ONLY = frozenset({AXIS})
-SIGNS = ("EF", "MV", "BY", "ST", "P", "AF", "TE")
+LOST = "VM"
+"""A setting that a power-up sets to what was saved last, often another value."""
+SIGNS = ("EF", "MV", "BY", "ST", "P", "AF", "TE", LOST)
 """What is read before a motion."""
 END = ("EF", "BY", "MP", "ST", "EE", "P", "DB", "AF", "AS")
 """What is read at its end."""
@@ -88,8 +101,8 @@ WITHOUT_TARGET = {"AS": (TORQUE,), "JE": (1,), "FL": (1,), "SC": (1,)}
 """Words that with one of these values start, or let inputs start, motion without a target."""
 CLEARED = {"ER", "ST"}
 """Words whose value is a sign of a failure, which a line clears that sets it."""
-REFERS = {"RS", "IP", "FD"}
-"""Words after which a target is not known any more: they go on with another one, or set what positions count."""
+REFERS = {"IP", "FD"}
+"""Words after which a target is not known any more: they set what positions count."""
 
 
 # What a line does
@@ -105,7 +118,9 @@ def effect(state: DriveState, text: str) -> Effect:
         absolute, relative = (value, None) if word == "MA" else (None, value)
         return Effect(begins=(Move(MoveKind.POSITION, AXIS, absolute, relative),))
     if word == "SL":
-        return Effect(ends=ONLY) if value == 0 else Effect(begins=(Move(MoveKind.VELOCITY, AXIS, endless=True),))
+        # A velocity that is not a number may be 0.
+        slew = Move(MoveKind.VELOCITY, AXIS, endless=value is not None)
+        return Effect(ends=ONLY) if value == 0 else Effect(begins=(slew,))
     if word in HOMINGS and statement.arguments:
         return Effect(begins=(Move(MoveKind.HOMING, AXIS),))
     if word in PROGRAMS:
@@ -114,6 +129,8 @@ def effect(state: DriveState, text: str) -> Effect:
         return Effect(begins=(Move(MoveKind.VELOCITY, AXIS),))
     if word == "PS":
         return Effect(ends=ONLY)
+    if word == "RS":  # what PS has paused goes on, perhaps to another target
+        return Effect(unknown=ONLY, resumes=True)
     if word == "E":  # a motion that is under way goes on (5.1.35)
         return Effect(halts=True)
     if word == "CF" or classify.written_word(text) in CLEARED:
@@ -194,6 +211,10 @@ class LexiumMotions(Motions, ABC):
         found = yield from self.read(END)
         before, move, position = evidence.before, evidence.move, found.get("P")
         ending = Ending(Outcome.REACHED, AXIS, position)
+        if position == 0 and evidence.alone and not evidence.program and LOST in before:
+            speed = (yield from self.read((LOST,))).get(LOST, before[LOST])
+            if speed != before[LOST]:
+                return restarted(ending, f"{LOST} {before[LOST]} before, {speed} now")
         if move is None:
             seen = _seen(found, before, ending)
             return None if seen is ending and (yield from self._makes_up(found)) else seen
