@@ -1,25 +1,23 @@
-"""Settings, conditions and other values of drives, a snapshot, the controls of an axis; the family's record of these.
+"""Settings, conditions and other values of drives, and a snapshot; what a family says of these.
 
 A reading has no side effect: it starts and clears nothing, and asks no word that the product refuses. A plan of changes
 is computed from the present values, so that the drive refuses none of its steps. Conditions beyond position and
 velocity are read in parts, each a short conversation: a typed line for a drive waits for one part at most. A part that
-is `slow` reads settings, which change only when a line was sent. Every move among the controls is bounded: it ends by
-itself. A line of a control holds `{by}` for a distance and `{to}` for a position.
+is `slow` reads settings, which change only when a line was sent.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cache
 from math import isclose
 from types import MappingProxyType
 from typing import ClassVar
 
 from multidrop.base.errors import Diagnostic, Inexpressible, Refused
-from multidrop.base.files import rows
 from multidrop.base.text import real
 from multidrop.dialects.codec import Priority, Procedure
+from multidrop.dialects.controls import NAMES, Control, Controls
 from multidrop.dialects.state import OfDrive, who
 
 # Settings, and the steps that change them
@@ -152,17 +150,55 @@ class Parameters(OfDrive):
         yield  # a conversation
 
     def plan(self, present: Readings, wanted: Mapping[str, Value], permission: Permission) -> Plan:
-        """Order the steps from the present to the wanted values. Raises Diagnostic for a value that it refuses."""
-        return Plan()
+        """Plan the steps from the present to the wanted values. Raises Diagnostic for a value that it refuses."""
+        now = present.values
+        given = {self.spelled(name): value for name, value in wanted.items()}
+        changed = {name: value for name, value in given.items() if not same(value, now.get(name))}
+        cannot = {name: why for name, value in changed.items() if (why := self.impossible(name, value, present))}
+        named = {self.spelled(name) for name in permission.named}
+        withheld: dict[str, str] = {}
+        for name, value in changed.items():
+            if name in cannot or name in named or (permission.communication and self.communicates(name)):
+                continue
+            if why := COMMUNICATION if self.communicates(name) else self.risk(name, value, now):
+                withheld[name] = why
+        steps = self.steps(present, given, withheld, cannot)
+        rescaled = [step.name for step in steps if self.rescales(step.name)]
+        return Plan(tuple(steps), tuple(withheld.items()), tuple(cannot.items()), reference_lost(steps, rescaled))
+
+    def spelled(self, name: str) -> str:
+        """A name that a person wrote, as the drive has it."""
+        return name.upper()
+
+    def impossible(self, name: str, value: Value, present: Readings) -> str:
+        """The reason for which the drive cannot get a value now; empty: it can."""
+        return ""
+
+    def communicates(self, name: str) -> bool:
+        """Whether it is a setting of communication, which waits for a person's word."""
+        return False
+
+    def risk(self, name: str, value: Value, now: Mapping[str, Value]) -> str:
+        """Another reason for which a setting waits for a person's word; empty: there is none."""
+        return ""
+
+    def rescales(self, name: str) -> bool:
+        """Whether positions count another distance or direction after it changed."""
+        return False
+
+    def steps(
+        self, present: Readings, wanted: Mapping[str, Value], withheld: Mapping[str, str], cannot: dict[str, str]
+    ) -> Sequence[Change]:
+        """Order the steps so that the drive refuses none. Raises Diagnostic for a value that it refuses.
+
+        `wanted`: all values, as `spelled`. `withheld` and `cannot`: the settings that are left alone, each with the
+        reason; a family may add to `cannot`.
+        """
+        return ()
 
     def ready(self) -> Procedure[str]:
         """Return the reason for which settings must not be changed now: it moves, a program runs; empty: none."""
         return ""
-        yield
-
-    def write(self, change: Change) -> Procedure[object]:
-        """Carry out a step, and make sure of it."""
-        raise Inexpressible(f"{who(self.state)}: no settings of such drives are known; nothing was sent")
         yield
 
     def save(self) -> Procedure[object]:
@@ -345,46 +381,6 @@ class Snapshot:
     """Analog inputs, one for each axis."""
     remarks: tuple[str, ...] = ()
     """What a person must know of it: it moves, its program is locked."""
-
-
-BY, TO, HOME_MINUS, HOME_PLUS = "by", "to", "home-", "home+"
-STOP, ENABLE, DISABLE = "stop", "enable", "disable"
-NAMES = (BY, TO, HOME_MINUS, HOME_PLUS, STOP, ENABLE, DISABLE)
-LOW, HIGH = -(2**31), 2**31 - 1
-"""The range of positions of every family."""
-
-
-@dataclass(frozen=True)
-class Control:
-    """One control. `about`: what it does, where its lines do not say it."""
-
-    lines: tuple[str, ...] = ()
-    about: str = ""
-    absent: str = ""
-    """The reason for which the family has no such control; it has no lines then."""
-
-    def filled(self, by: int = 0, to: int = 0) -> tuple[str, ...]:
-        return tuple(line.format(by=by, to=to) for line in self.lines)
-
-    def shown(self, by: str = "", to: str = "") -> str:
-        return ", ".join(line.format(by=by, to=to) for line in self.lines)
-
-
-Controls = Mapping[str, Control]
-"""Controls by name; every name of `NAMES` is there."""
-
-
-@cache
-def controls_of(module: str, axis: str = "", number: int = 1) -> Controls:
-    """Read the controls of an axis: `controls.csv` beside a module, whose `__file__` is given.
-
-    Its lines are divided by ` // `; in them `{axis}` is the name of the axis, and `{number}` its number.
-    """
-    found = {}
-    for row in rows(module, "controls.csv"):
-        lines = row["lines"].replace("{axis}", axis).replace("{number}", str(number)).split(" // ")
-        found[row["name"]] = Control(tuple(filter(None, lines)), row["about"], row.get("absent", ""))
-    return found
 
 
 class Actions(OfDrive):

@@ -115,7 +115,6 @@ class MultidropApp(Dressed):
         self.main.times = look.times
         self.keyboard = Keyboard(self, self._tell)
         self.outbox = Outbox(session, self._warn, self.run_worker)
-        self.outbox.follows = self._enter_waits
         self.selection = Selection(
             session, self.model, self.main, self.purpose.label, self.keyboard.turn_deaf, self.show_line
         )
@@ -147,6 +146,7 @@ class MultidropApp(Dressed):
 
     def _set_actions(self) -> None:
         """Make what keys, the palette and the session ask of the screen."""
+        self.outbox.follows = self._enter_waits
         parts = Parts(
             self.session,
             self.model,

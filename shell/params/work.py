@@ -311,7 +311,7 @@ async def send(
         for number, change in enumerate(plan, 1):
             named = change.name in options.named
             async with session.path.starting(drive, change.text) if named else contextlib.nullcontext():
-                await transferring(drive, drive.family.values.parameters.write(change))
+                await transferring(drive, drive.family.perform(change.text))
             written.append(change)
             progress(number, len(plan))
 

@@ -41,7 +41,7 @@ async def close(call: Call, name: BusName) -> None:
     bus, session = call.session.bus(name), call.session
     selected = session.selected_bus == bus.name
     if selected:  # what follows was written for this bus, and never goes to another one
-        session.selected_bus = ""
+        session.selected_bus, session.deselected = "", True
     try:
         await session.forget(bus)
     finally:

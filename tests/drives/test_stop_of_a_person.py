@@ -9,10 +9,12 @@ from typing import Any
 
 import pytest
 
-from multidrop.dialects import Started
+from multidrop.dialects import Started, StopPiece
 from multidrop.drives import pacing
 from multidrop.drives.events import Traffic
+from multidrop.drives.line import Line, Write
 from multidrop.drives.stop_forms import stop_forms
+from multidrop.families.pmx.host.codec import Pmx
 from tests.drives.test_whole_stop import SharedPipe, VirtualPacer
 from tests.support.cell_session import drive, party, pmx
 from tests.support.simulated_bus import SimulatedBus
@@ -186,4 +188,23 @@ async def test_an_automations_stop_of_another_drive_still_waits_for_the_gap():
     assert all(later - sooner >= 0.03 for sooner, later in zip(times, times[1:], strict=False))
     assert [each for each in shop.events if isinstance(each, Traffic)]
     await shop.bus.stopped()
+    await shop.bus.close()
+
+
+def test_a_piece_of_a_stop_of_some_drives_is_half_sent_until_it_has_left_and_one_of_all_is_not():
+    """No port says how much of it is still in the hardware."""
+    for only, half in ((("01",), True), (None, False)):
+        line = Line(Pmx(), baud=9600)
+        line.stop(0.0, StopPiece(b"@01ABORTX\r", 0.03), only=only)
+        assert [type(each) for each in line.events(0.2)] == [Write]
+        assert line.half_sent(0.205) is half and not line.half_sent(0.22)
+
+
+async def test_so_is_its_beginning():
+    shop = await Shop(*(pmx(name) for name in NAMES["pmx"]), family="pmx", pipe=SharedPipe).open(*NAMES["pmx"])
+    await asyncio.sleep(1.0)
+    for only, half in (([shop.bus.drives["02"]], True), (None, False)):
+        shop.bus.halt(only)
+        assert shop.bus.line.half_sent(shop.bus.now() + 0.005) is half
+        await asyncio.sleep(2.0)
     await shop.bus.close()

@@ -122,7 +122,7 @@ async def test_a_line_to_all_is_all(shop):
     with pytest.raises(DriveError):
         await script(shop.session, "@press:* SL 50000", "@stages:* JX+", "/sleep 1", "/wait stopped 1")
     assert shop.moving() == set()
-    every = "press:a, press:b, stages:00, stages:01 and any other drive on this line"
+    every = "press:a, press:b, stages:00 X, stages:01 X and any other drive on this line"
     assert shop.warned()[-2] == f"stopped {every}: velocity 0 was read from all 4"
 
 

@@ -137,7 +137,7 @@ def test_what_is_said_of_a_defect_may_be_defective_too(tmp_path: Path, monkeypat
         made.caught("another place", ZeroDivisionError())
 
 
-@pytest.mark.skipif(os.name == "nt", reason="a console is read in another way")
+@pytest.mark.pty
 async def test_the_thread_of_the_keys_outlives_a_stop_that_it_cannot_write() -> None:
     reading, typing = os.pipe()
     taken: list[bytes] = []

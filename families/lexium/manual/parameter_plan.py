@@ -12,19 +12,15 @@ from math import ceil
 
 from multidrop.base.errors import Diagnostic
 from multidrop.dialects.values import (
-    COMMUNICATION,
     Change,
-    Permission,
-    Plan,
     Readings,
     Value,
     number,
-    reference_lost,
     same,
 )
 from multidrop.families.lexium.manual import parameters as manual
 from multidrop.families.lexium.manual.mnemonic import CLOSED_LOOP, EXPANDED, MDRIVE_PLUS
-from multidrop.families.lexium.manual.parameters import CLOCKS, COUNTED, SHARED, TORQUE, TRIPS, WIRE, writable
+from multidrop.families.lexium.manual.parameters import CLOCKS, COUNTED, SHARED, TORQUE, TRIPS, writable
 
 IN_UNITS = COUNTED - {"MS"} | {"BL", "LS0", "LS1", "TP", "TR"}
 """Settings in the unit of motion: steps or encoder counts."""
@@ -291,24 +287,21 @@ STEPS_PER_TURN = 200
 """Full steps."""
 
 
-def plan(product: str, present: Readings, wanted: Mapping[str, Value], allowed: Permission) -> Plan:
-    """Plan the steps. Raises Diagnostic for values that the drive refuses."""
-    given = {name.upper(): value for name, value in wanted.items()}
-    changed = {name: value for name, value in given.items() if not same(value, present.values.get(name))}
-    now: Mapping[str, Value | None] = {**present.values}
-    reasons = {name: impossible(name, value, now, present.labels) for name, value in changed.items()}
-    cannot = {name: reason for name, reason in reasons.items() if reason}
-    asked = {name: value for name, value in changed.items() if name not in cannot and name not in allowed.named}
-    reasons = {name: risk(name, value, now) for name, value in asked.items()}
-    withheld = {name: why for name, why in reasons.items() if why and not (name in WIRE and allowed.communication)}
-    goal = _goal(product, present, given, withheld, cannot)
-    steps = Steps(product, present.values, goal)
+def steps(
+    product: str,
+    present: Readings,
+    wanted: Mapping[str, Value],
+    withheld: Mapping[str, str],
+    impossible: dict[str, str],
+) -> list[Change]:
+    """Order the steps, and add to `impossible`. Raises Diagnostic for values that the drive refuses."""
+    goal = _goal(product, present, wanted, withheld, impossible)
+    made = Steps(product, present.values, goal)
     for order in (_leave_counts, _speeds, _resolution, _enter_counts, _velocities, _pairs, _points):
-        order(steps)
-    steps.reach(*(name for name in goal if name not in (*LAST, *WIRE_ORDER)))
-    steps.reach(*LAST, *WIRE_ORDER)
-    remarks = reference_lost(steps.changes, SCALE)
-    return Plan(tuple(steps.changes), tuple(withheld.items()), tuple(cannot.items()), remarks)
+        order(made)
+    made.reach(*(name for name in goal if name not in (*LAST, *WIRE_ORDER)))
+    made.reach(*LAST, *WIRE_ORDER)
+    return made.changes
 
 
 def _goal(
@@ -461,8 +454,6 @@ def risk(name: str, value: Value, now: Mapping[str, Value | None]) -> str:
     `now` has the drive's present values.
     """
     torque = now.get("AS") == TORQUE
-    if name in WIRE:
-        return COMMUNICATION
     if name in manual.UNIT:
         return "it belongs to the motor unit"
     if name == "LK":

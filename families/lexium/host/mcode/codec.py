@@ -13,7 +13,8 @@ from typing import ClassVar
 
 from multidrop.base.errors import Inexpressible
 from multidrop.dialects.codec import Codec, Decoded, End, Kind, Reply, Request, Started, StopPiece
-from multidrop.families.lexium.host.mcode import classify, framing
+from multidrop.families.lexium.host import classify
+from multidrop.families.lexium.host.mcode import framing
 from multidrop.families.lexium.host.mcode.quiet import SHORT, Received
 from multidrop.families.lexium.host.mcode.reply_lines import ENDLESS, ReplyLines, divided
 from multidrop.families.lexium.host.mcode.reply_parser import ReplyParser

@@ -12,6 +12,7 @@ local variable without deleting other variables. The host refuses that before it
 
 from __future__ import annotations
 
+from abc import ABC
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 
@@ -22,7 +23,8 @@ from multidrop.dialects.codec import End, Kind, Procedure, Request
 from multidrop.dialects.family import Progress
 from multidrop.dialects.program_files import LOCKED, Held
 from multidrop.dialects.state import who
-from multidrop.families.lexium.host.mcode import classify
+from multidrop.families.lexium.host import classify
+from multidrop.families.lexium.host.errors import described
 from multidrop.families.lexium.host.mcode.before_request import before_request
 from multidrop.families.lexium.host.mcode.exchange import (
     REPEATS,
@@ -31,21 +33,26 @@ from multidrop.families.lexium.host.mcode.exchange import (
     read_error,
     take_out,
 )
-from multidrop.families.lexium.host.mcode.operations import echo_everything, immediate, put_back, restore_echo
+from multidrop.families.lexium.host.mcode.operations import (
+    MCodeOperations,
+    echo_everything,
+    put_back,
+    restore_echo,
+)
 from multidrop.families.lexium.host.mcode.program_readout import (
     GLOBAL,
     LABEL,
     LOCAL,
+    MCodeReadout,
     Program,
     declared,
     immediate_lines,
     names_of,
     programs,
     programs_of,
-    read,
     size,
 )
-from multidrop.families.lexium.host.mcode.state import MCodeState, described
+from multidrop.families.lexium.host.mcode.state import MCodeState
 from multidrop.families.lexium.manual.program_checker import slips
 from multidrop.families.lexium.manual.program_file import ProgramLine
 
@@ -80,7 +87,7 @@ def prepare(state: MCodeState, lines: Sequence[SourceLine], held: Held) -> Proce
     variables = [name for name, called in names.items() if called.kind == GLOBAL]
     for slip in slips([line for line in lines if isinstance(line, ProgramLine)], variables):
         raise Refused(f"line {slip.line}: {slip.what} (nothing was sent)")
-    yield from immediate(state, state.codec.request(state.address, "CP"))
+    yield from MCodeOperations(state).immediate(state.codec.request(state.address, "CP"))
     state.note(f"{who(state)}: {_cleared(made, [name for name in names if names[name].kind == LABEL], lines)}")
     again: list[ProgramLine] = []  # the programs that stay, each line at its address
     for program in programs([line for each in made.kept for line in each.lines], state.product, fine=True):
@@ -206,58 +213,6 @@ class _Memory:
         return held if self.ended == self.programs else f"{held}: the program in {who(state)} is incomplete"
 
 
-def download(
-    state: MCodeState, lines: Sequence[SourceLine], held: Held | None, progress: Progress
-) -> Procedure[Sequence[SourceLine]]:
-    """Send the lines of a program file. Raises Refused or NoAnswer with the line's number and what is stored.
-
-    `held`: what was just read from the drive; None: the host reads it now. Always leaves program mode. Returns the
-    lines that it sent: programs of the drive that stay (lines of number 0), and the file.
-    """
-    for line in lines:
-        try:
-            state.codec.request(state.address, line.text, Kind.PROGRAM)
-        except Inexpressible as error:
-            raise Inexpressible(f"{_where(line)}: {error}") from error
-    if state.programming:
-        raise Refused(f"{who(state)} is in program mode: leave it with PG first")
-    if not lines:
-        return ()
-    yield from before_request(state, state.codec.request(state.address, lines[0].text))
-    if held is None:
-        concerned = any(declared(line.text) or classify.enters_program(line.text) for line in lines)
-        held = (yield from read(state, lines, progress)) if concerned else Held()
-    lines = yield from prepare(state, lines, held)
-    memory, fate = _Memory(sum(classify.enters_program(line.text) for line in lines)), ""
-    try:
-        for done, line in enumerate(lines):
-            progress(done, len(lines))
-            fate = "cut off"
-            try:
-                yield from _one(state, line, memory)
-            except DriveError as error:
-                if isinstance(error, Stopped):  # its caller may have gone
-                    _note_cut_off(state, memory)
-                fate, error.args = "told", (f"{_where(line)}: {error}; {memory.told(state)}",)
-                raise
-        progress(len(lines), len(lines))
-        fate = "done"
-        return lines
-    finally:
-        if fate == "cut off":
-            _note_cut_off(state, memory)
-        # Leave program mode and restore the echo mode.
-        done_all = fate == "done"
-        try:
-            if state.programming:
-                yield from take_out(state, "taken out of program mode; the program in it is incomplete")
-            yield from restore_echo(state) if done_all else put_back(state)
-        except DriveError as error:
-            if done_all:
-                raise
-            state.note(str(error))  # the download's own failure is the one to raise
-
-
 def _note_cut_off(state: MCodeState, memory: _Memory) -> None:
     state.note(f"{who(state)}: the download was cut off: {memory.told(state)}")
 
@@ -295,7 +250,7 @@ def _one(state: MCodeState, line: SourceLine, memory: _Memory) -> Procedure[None
             raise NoAnswer(f"{who(state)}: no reply to '{request.text}' ({reply.end.value})")
         state.entered_program_mode(int(reply.prompt))
     else:
-        yield from immediate(state, request)
+        yield from MCodeOperations(state).immediate(request)
 
 
 def _needs_own_echo(text: str) -> bool:
@@ -344,3 +299,59 @@ def _again_at(state: MCodeState, request: Request) -> Procedure[None]:
     reply = yield state.codec.request(state.address, f"PG {address}")
     if not ends_in_program_mode(reply):
         raise NoAnswer(f"{who(state)} did not go back into program mode at {address}")
+
+
+class MCodeDownload(MCodeReadout, ABC):
+    """The program in an MCode drive: how a file is sent to it."""
+
+    def download(
+        self, lines: Sequence[SourceLine], held: Held | None, progress: Progress
+    ) -> Procedure[Sequence[SourceLine]]:
+        """Send the lines of a program file. Raises Refused or NoAnswer with the line's number and what is stored.
+
+        `held`: what was just read from the drive; None: the host reads it now. Always leaves program mode. Returns the
+        lines that it sent: programs of the drive that stay (lines of number 0), and the file.
+        """
+        state = self.state
+        for line in lines:
+            try:
+                state.codec.request(state.address, line.text, Kind.PROGRAM)
+            except Inexpressible as error:
+                raise Inexpressible(f"{_where(line)}: {error}") from error
+        if state.programming:
+            raise Refused(f"{who(state)} is in program mode: leave it with PG first")
+        if not lines:
+            return ()
+        yield from before_request(state, state.codec.request(state.address, lines[0].text))
+        if held is None:
+            concerned = any(declared(line.text) or classify.enters_program(line.text) for line in lines)
+            held = (yield from self.read(lines, progress)) if concerned else Held()
+        lines = yield from prepare(state, lines, held)
+        memory, fate = _Memory(sum(classify.enters_program(line.text) for line in lines)), ""
+        try:
+            for done, line in enumerate(lines):
+                progress(done, len(lines))
+                fate = "cut off"
+                try:
+                    yield from _one(state, line, memory)
+                except DriveError as error:
+                    if isinstance(error, Stopped):  # its caller may have gone
+                        _note_cut_off(state, memory)
+                    fate, error.args = "told", (f"{_where(line)}: {error}; {memory.told(state)}",)
+                    raise
+            progress(len(lines), len(lines))
+            fate = "done"
+            return lines
+        finally:
+            if fate == "cut off":
+                _note_cut_off(state, memory)
+            # Leave program mode and restore the echo mode.
+            done_all = fate == "done"
+            try:
+                if state.programming:
+                    yield from take_out(state, "taken out of program mode; the program in it is incomplete")
+                yield from restore_echo(state) if done_all else put_back(state)
+            except DriveError as error:
+                if done_all:
+                    raise
+                state.note(str(error))  # the download's own failure is the one to raise

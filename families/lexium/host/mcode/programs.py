@@ -12,13 +12,13 @@ from multidrop.base.files import SourceLine
 from multidrop.base.text import counted, real
 from multidrop.dialects.certifying import Certifying, Occupied
 from multidrop.dialects.codec import Procedure
-from multidrop.dialects.family import Printed, Programs, Progress
 from multidrop.dialects.program_files import Difference, Held, Stored, first_difference
 from multidrop.dialects.state import who
-from multidrop.families.lexium.host.mcode import classify, operations, program_readout
+from multidrop.families.lexium.host import classify
+from multidrop.families.lexium.host.mcode import program_readout
 from multidrop.families.lexium.host.mcode.before_request import value_of
-from multidrop.families.lexium.host.mcode.download import clears_itself, download
-from multidrop.families.lexium.host.mcode.operations import immediate
+from multidrop.families.lexium.host.mcode.download import MCodeDownload, clears_itself
+from multidrop.families.lexium.host.mcode.operations import MCodeOperations
 from multidrop.families.lexium.host.mcode.program_readout import FileProgram
 from multidrop.families.lexium.host.mcode.state import MCodeState
 from multidrop.families.lexium.manual import guards
@@ -31,26 +31,6 @@ HOLDING = ("variable", "flag")
 """The kinds of words that hold a value."""
 STEADY = {"S", "CP", "PG"}
 """Words of a file that leave nothing to compare beside the programs."""
-
-
-def differences(
-    state: MCodeState, lines: Sequence[SourceLine], held: Held, before: Held | None = None
-) -> tuple[Difference, ...]:
-    """Return where the programs of a file differ from those that a drive holds; other programs do not count.
-
-    `before`: what the drive held before the file was sent. A line of that after a program is another program's.
-    """
-    names = program_readout.names_of(held)
-    found = program_readout.programs_of(lines)
-    starts = {start for each in found if (start := each.start(names)) is not None}
-    known = {*names, *(each[1] for line in lines if (each := program_readout.declared(line.text)) is not None)}
-    made: list[Difference] = []
-    for program in found:
-        start = program.start(names)
-        own = program if start is None else _not_replaced(program, start, starts, state.product)
-        made += _compared(own.lines, _there(own, start, starts, held, state.product), known)
-    old = set(before.lines) if before is not None else set()
-    return tuple(each for each in made if each.number or (each.at, each.there) not in old)
 
 
 def _not_replaced(program: FileProgram, start: int, starts: set[int], product: str) -> FileProgram:
@@ -102,18 +82,6 @@ def _compared(here: Sequence[SourceLine], there: Sequence[Stored], names: set[st
             yield Difference(number, text, at, listed)
 
 
-def to_send(state: MCodeState, lines: Sequence[SourceLine], held: Held) -> Procedure[str]:
-    """Return why a file must be sent; empty where the drive holds its programs, variables and settings already."""
-    if why := first_difference(differences(state, lines, held)):
-        return why
-    if clears_itself(lines) and program_readout.size_of_file(lines) != len(held.lines):
-        return "the drive holds other programs, which the file clears"
-    for line in program_readout.immediate_lines(lines):
-        if why := (yield from _unlike(state, line, held)):
-            return why
-    return ""
-
-
 def _unlike(state: MCodeState, line: SourceLine, held: Held) -> Procedure[str]:
     """Return why a line outside of programs must be sent; empty where the drive has its value."""
     names = program_readout.names_of(held)
@@ -161,14 +129,14 @@ def _literal(argument: Argument | None) -> float | None:
 
 def _read_setting(state: MCodeState, name: str, values: Sequence[float | None]) -> Procedure[list[float | None]]:
     """Read the present values of a setting; of a setting with several rows the row that begins alike."""
-    printed = yield from immediate(state, state.codec.request(state.address, f"PR {name}"))
+    printed = yield from MCodeOperations(state).immediate(state.codec.request(state.address, f"PR {name}"))
     rows = [[real(each) for each in line.rpartition("=")[2].split(",")] for line in printed if line.strip()]
     if len(rows) == 1:
         return rows[0]
     return next((row for row in rows if row[:1] == list(values[:1])), [])
 
 
-class MCodePrograms(Programs):
+class MCodePrograms(MCodeDownload):
     """The program in an MCode drive."""
 
     state: MCodeState
@@ -178,91 +146,42 @@ class MCodePrograms(Programs):
     clearing = "CP"
     begins = ("PG", "FD")
 
-    def listing(self, place: str) -> Printed:
-        return operations.listing(self.state, place)
+    def differences(self, lines: Sequence[SourceLine], held: Held, before: Held | None = None) -> Sequence[Difference]:
+        """Return where the programs of a file differ from those that a drive holds; other programs do not count.
 
-    def readable(self, held: Held) -> Sequence[str]:
-        return program_readout.readable(held)
-
-    def read(self, lines: Sequence[SourceLine], progress: Progress) -> Procedure[Held]:
-        return program_readout.read(self.state, lines, progress)
-
-    def file(self, held: Held, raw: bool) -> Sequence[str]:
-        return program_readout.file_of(self.state, held, raw)
-
-    def executed(self, lines: Sequence[SourceLine]) -> Sequence[SourceLine]:
-        return program_readout.immediate_lines(lines)
-
-    def size(self, lines: Sequence[SourceLine]) -> int:
-        return program_readout.size_of_file(lines)
-
-    def end(self) -> Procedure[bool]:
-        return program_readout.end_program(self.state)
-
-    def download(
-        self, lines: Sequence[SourceLine], held: Held | None, progress: Progress
-    ) -> Procedure[Sequence[SourceLine]]:
-        return download(self.state, lines, held, progress)
-
-    def differences(self, lines: Sequence[SourceLine], held: Held, before: Held | None) -> Sequence[Difference]:
-        return differences(self.state, lines, held, before)
+        `before`: what the drive held before the file was sent. A line of that after a program is another program's.
+        """
+        names = program_readout.names_of(held)
+        found = program_readout.programs_of(lines)
+        starts = {start for each in found if (start := each.start(names)) is not None}
+        known = {*names, *(each[1] for line in lines if (each := program_readout.declared(line.text)) is not None)}
+        made: list[Difference] = []
+        for program in found:
+            start = program.start(names)
+            own = program if start is None else _not_replaced(program, start, starts, self.state.product)
+            made += _compared(own.lines, _there(own, start, starts, held, self.state.product), known)
+        old = set(before.lines) if before is not None else set()
+        return tuple(each for each in made if each.number or (each.at, each.there) not in old)
 
     def to_send(self, lines: Sequence[SourceLine], held: Held) -> Procedure[str]:
-        return to_send(self.state, lines, held)
-
-    def start(self, lines: Sequence[SourceLine], label: str) -> str:
-        return program_readout.start_line(lines, label)
-
-    def refreshed(self, text: str, held: Held) -> Sequence[str]:
-        return program_readout.refreshed(text, held)
-
-    def annotated(self, text: str, held: Held) -> Sequence[str]:
-        return program_readout.annotated(text, held)
+        """Return why a file must be sent; empty where the drive holds its programs, variables and settings already."""
+        if why := first_difference(self.differences(lines, held)):
+            return why
+        if clears_itself(lines) and program_readout.size_of_file(lines) != len(held.lines):
+            return "the drive holds other programs, which the file clears"
+        for line in program_readout.immediate_lines(lines):
+            if why := (yield from _unlike(self.state, line, held)):
+                return why
+        return ""
 
     def acts(self, line: str) -> bool:
         return guards.acts(line)
-
-    def names(self) -> Procedure[Held]:
-        return program_readout.read_names(self.state)
-
-    def offered(self, held: Held, line: str) -> Sequence[tuple[str, str]]:
-        return program_readout.offered(held, line)
 
 
 # The questions of a certificate.
 #
 # An immediate error runs a resident OE subroutine, and reading ER clears it. So the program is listed first, and LK is
 # read before that: a drive that is locked refuses L with an error. (MCode reference 5.1.40, 5.1.75, 5.1.94.)
-
-
-def _traits(state: MCodeState) -> set[str]:
-    """The firmware, the port, and how the drive is set, as far as questions depend on it."""
-    found = {
-        "mdrive" if state.product in EXPANDED | {"MDI", "MDIE"} else "lexium",
-        "ethernet" if ETHERNET.match(state.product) else "serial",
-    }
-    found |= {"base"} if state.product == "MDI" else set()
-    found |= {"hmt"} if (row := lookup("AF", state.product)) is not None and state.product in row.products else set()
-    return found | {"party" if state.codec.party else "alone"}
-
-
-def _occupied(state: MCodeState) -> Procedure[Occupied]:
-    """Find out whether a program is stored. Raises Refused where an error stands."""
-    error, locked = (yield from value_of(state, 'EF," ",LK', "[01] [01]")).split()
-    if error == "1":
-        raise Refused(f"{who(state)} has an error (EF=1) that the questions would clear: read it with PR ER, then ask")
-    if locked == "1":
-        return Occupied(errors=f"its program is locked (LK=1), so it cannot be listed; {_SUBROUTINE}")
-    lines = yield from operations.listing(state, "")
-    return Occupied(errors=f"a program is stored ({counted(len(lines), 'line')}); {_SUBROUTINE}" if lines else "")
-
-
-def _masked(address: str, raw: bytes) -> str:
-    """Replace the drive's name, and check bytes, which depend on it."""
-    text, name = raw.decode("latin-1"), re.escape(address)
-    if name:
-        text = re.sub(rf'(?m)^{name}(?=[A-Z])|(?<="){name}(?=")|(?<=~){name}', "NAME", text)
-    return re.sub("[\x80-\xff]", "<check>", text)
 
 
 _SUBROUTINE = "an error would run its subroutine for errors (OE)"
@@ -278,10 +197,34 @@ class MCodeCertifying(Certifying):
     writes = "{}={}"
 
     def traits(self) -> set[str]:
-        return _traits(self.state)
+        """The firmware, the port, and how the drive is set, as far as questions depend on it."""
+        state = self.state
+        found = {
+            "mdrive" if state.product in EXPANDED | {"MDI", "MDIE"} else "lexium",
+            "ethernet" if ETHERNET.match(state.product) else "serial",
+        }
+        found |= {"base"} if state.product == "MDI" else set()
+        found |= (
+            {"hmt"} if (row := lookup("AF", state.product)) is not None and state.product in row.products else set()
+        )
+        return found | {"party" if state.codec.party else "alone"}
 
     def occupied(self) -> Procedure[Occupied]:
-        return _occupied(self.state)
+        """Find out whether a program is stored. Raises Refused where an error stands."""
+        state = self.state
+        error, locked = (yield from value_of(state, 'EF," ",LK', "[01] [01]")).split()
+        if error == "1":
+            raise Refused(
+                f"{who(state)} has an error (EF=1) that the questions would clear: read it with PR ER, then ask"
+            )
+        if locked == "1":
+            return Occupied(errors=f"its program is locked (LK=1), so it cannot be listed; {_SUBROUTINE}")
+        lines = yield from MCodeOperations(state).listing("")
+        return Occupied(errors=f"a program is stored ({counted(len(lines), 'line')}); {_SUBROUTINE}" if lines else "")
 
     def masked(self, raw: bytes) -> str:
-        return _masked(self.state.address, raw)
+        """Replace the drive's name, and check bytes, which depend on it."""
+        text, name = raw.decode("latin-1"), re.escape(self.state.address)
+        if name:
+            text = re.sub(rf'(?m)^{name}(?=[A-Z])|(?<="){name}(?=")|(?<=~){name}', "NAME", text)
+        return re.sub("[\x80-\xff]", "<check>", text)

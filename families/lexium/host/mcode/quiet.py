@@ -18,7 +18,8 @@ from functools import cached_property, lru_cache
 from typing import NamedTuple
 
 from multidrop.dialects.codec import Kind, Request
-from multidrop.families.lexium.host.mcode import classify, framing
+from multidrop.families.lexium.host import classify
+from multidrop.families.lexium.host.mcode import framing
 
 SHORT, PATIENT, FLASH = 0.02, 0.15, 3.0
 LIST_QUIET = 0.25

@@ -6,7 +6,7 @@ import re
 from collections.abc import Sequence
 
 from multidrop.dialects.codec import Decoded, End, Kind, Reply, Request
-from multidrop.families.lexium.host.mcode import classify
+from multidrop.families.lexium.host import classify
 from multidrop.families.lexium.host.mcode.framing import (
     SIGN_ON,
     UNPRINTED,

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from multidrop.dialects.codec import Decoded, End, Kind, Request
-from multidrop.families.lexium.host.mcode import classify
+from multidrop.families.lexium.host import classify
 from multidrop.families.lexium.host.mcode.framing import ADDRESS_PROMPT, Piece, after_echo, pieces, printable, unsealed
 from multidrop.families.lexium.host.mcode.reply_lines import ENDLESS, ReplyLines
 

@@ -77,7 +77,7 @@ def download(state, text, shown=None, held=None):
 def searched(found, **reach):
     """A search whose finds are kept; what it shows, and the number of its steps."""
     steps = list[None]()
-    outcome = yield from scan.search(Reach(**reach), found.append, lambda: steps.append(None))
+    outcome = yield from scan.SCAN.search(Reach(**reach), found.append, lambda: steps.append(None))
     return outcome, len(steps)
 
 

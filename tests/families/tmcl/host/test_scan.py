@@ -46,7 +46,9 @@ class Bus:
 
 def searched(bus, **reach):
     found, steps = [], []
-    runner = ProcedureRunner(scan.search(Reach(**{"everything": True, **reach}), found.append, lambda: steps.append(0)))
+    runner = ProcedureRunner(
+        scan.SCAN.search(Reach(**{"everything": True, **reach}), found.append, lambda: steps.append(0))
+    )
     while runner.request is not None:
         runner.answer(bus(runner.request))
     return runner.result, [(state.address, state.product, state.motors) for state in found], len(steps)
