@@ -73,7 +73,7 @@ LACKS = {
     "/trace G1": "A: programs of its family cannot be observed",
     "/params backup {a.toml} A": "A: no settings of such drives are known; nothing was sent",
     "/params save A": "A: such drives keep no settings, as far as is known; nothing was sent",
-    "/register A 5": "A: no registers; ",
+    "/register 5": "A: no registers; ",
     "/snapshot {s.toml}": "A: no settings of such drives are known; nothing was sent",
     "/help SPEED": "/help: no verb or command SPEED",
     "/units A 5 mm/turn": "/units: the scale 5 mm/turn is by the motor's turn: nothing tells how it counts; ",

@@ -11,9 +11,9 @@ from tests.support.front_door import Command
 
 @for_each("words, given", [
     (["publish", "a", "b", "--to", "mqtt://h/p"],
-     (["a", "b"], {"to": ["mqtt://h/p"], "rate": "2", "home_assistant": False, "reconnect": True})),
+     (("a", "b"), {"to": ("mqtt://h/p",), "rate": "2", "home_assistant": False, "reconnect": True})),
     (["publish", "a", "--to", "mqtt://h/p", "--rate", "5", "--home-assistant", "--no-reconnect"],
-     (["a"], {"to": ["mqtt://h/p"], "rate": "5", "home_assistant": True, "reconnect": False})),
+     (("a",), {"to": ("mqtt://h/p",), "rate": "5", "home_assistant": True, "reconnect": False})),
 ])  # fmt: skip
 def test_values_are_published_as_asked(multidrop: Command, words: list[str], given: tuple[Any, ...]) -> None:
     with mock.patch("multidrop.features.publishing.command.run", return_value=9) as served:

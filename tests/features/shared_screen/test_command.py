@@ -44,7 +44,7 @@ def test_a_screen_is_shared_while_it_runs_where_that_is_asked_for(
     monkeypatch.setattr("multidrop.tui.launch.run", screen)
     assert at_terminal(tmp_path, "tui", "a", *["--share"] * shared) == Done(7, "", "")
     [(urls, reconnect, raw, _, around)] = screen.calls
-    assert (urls, reconnect, raw) == (["a"], True, False)
+    assert (urls, reconnect, raw) == (("a",), True, False)
     app = SimpleNamespace(session=SimpleNamespace(settings=SimpleNamespace(state=tmp_path)))
     with around(app):
         assert said == [(app, tmp_path / "screens")] * shared
