@@ -11,9 +11,10 @@ from multidrop.base.files import split_lines
 from multidrop.dialects.program_files import Block, Offer, Span, UserName, Word, replaced
 from multidrop.families.lexium.manual import help
 from multidrop.families.lexium.manual.grammar import NAME_FORM, Token, divided, is_name, statement_tokens, tokens
+from multidrop.families.lexium.manual.groups import EVERY_PLACE, TURNING
 from multidrop.families.lexium.manual.mnemonic import EVERY, Mnemonic
-from multidrop.families.lexium.manual.program_file import LONGEST, MOVES, ProgramLine, bare, remark_at, scan
-from multidrop.families.lexium.manual.program_flow import AT_POWER_UP, PLACES
+from multidrop.families.lexium.manual.program_file import LONGEST, ProgramLine, bare, remark_at, scan
+from multidrop.families.lexium.manual.program_flow import AT_POWER_UP
 from multidrop.families.lexium.manual.table import lookup
 
 STATEMENT, NEW, LABEL, PRINTED, VALUE = "statement", "new", "label", "printed", "value"
@@ -26,8 +27,6 @@ LABELS_AT: Mapping[str, tuple[bool, ...]] = {
     VALUE: (False,),
 }
 """The kinds of names at each place, in order: True for labels, False for variables."""
-_TARGETS: Mapping[str, int] = {**PLACES, "EX": 0}
-"""Words that take a label, and the number of commas before it."""
 
 
 def expected(before: str) -> str:
@@ -38,7 +37,7 @@ def expected(before: str) -> str:
     head, commas = found[0].text.upper(), sum(each.kind == "comma" for each in found)
     if head in ("LB", "VA"):
         return VALUE if head == "VA" and len(found) > 2 else NEW
-    if commas == _TARGETS.get(head) and found[-1].text in (found[0].text, "=", ","):
+    if commas == EVERY_PLACE.get(head) and found[-1].text in (found[0].text, "=", ","):
         return LABEL
     return PRINTED if head == "PR" else VALUE
 
@@ -192,7 +191,7 @@ def offers(before: str, names: Iterable[UserName], product: str) -> list[Offer]:
         if each.word.startswith(folded) and (each.kind == "label") in LABELS_AT[place]
     ]
     rows = [] if place == LABEL else [row for row in help.offered(word, product) if _fits(row, place)]
-    return [*own, *(Offer(row.name, row.meaning, "starts" if row.name in MOVES else "word") for row in rows)]
+    return [*own, *(Offer(row.name, row.meaning, "starts" if row.name in TURNING else "word") for row in rows)]
 
 
 def _fits(row: Mnemonic, place: str) -> bool:

@@ -23,10 +23,27 @@ from multidrop.dialects.values import (
     same,
 )
 from multidrop.families.lexium.manual import parameters as manual
-from multidrop.families.lexium.manual.mnemonic import CLOSED_LOOP, EXPANDED, MDRIVE_PLUS
-from multidrop.families.lexium.manual.parameters import CLOCKS, COUNTED, SHARED, TORQUE, TRIPS, WIRE, writable
+from multidrop.families.lexium.manual.groups import (
+    BANKED,
+    COUNTED,
+    LISTS,
+    REMOVABLE,
+    RESTORED_LAST,
+    SCALES,
+    TRIPS,
+    UNIT,
+    WIRE,
+    those,
+)
+from multidrop.families.lexium.manual.mnemonic import CLOSED_LOOP, EXPANDED, MDRIVE_PLUS, Alone, Kept
+from multidrop.families.lexium.manual.parameters import CLOCKS, SHARED, TORQUE, writable
+from multidrop.families.lexium.manual.table import lookup
 
-IN_UNITS = COUNTED - {"MS"} | {"BL", "LS0", "LS1", "TP", "TR"}
+IN_UNITS = frozenset(
+    each
+    for word in those(lambda row: row.unit_encoder != "" and row.kept is Kept.SAVED)
+    for each in ([f"{word}{n}" for n in LISTS[word]] if word in LISTS else [word])
+)
 """Settings in the unit of motion: steps or encoder counts."""
 FINEST = 256
 """The finest MS: it allows every velocity."""
@@ -34,8 +51,6 @@ PER_MICROSTEP = 10000
 """The highest velocity of a Lexium for each microstep of MS, steps/s."""
 LEAST_WITH_HMT = 10
 LONGEST_DELAY = 65535
-REMOVABLE = frozenset({"TA", "TC", "TM"})
-"""Trips that 0 removes."""
 _INPUT, _OUTPUT = frozenset({0, 1, 2, 3, 4, 5, 6, 7, 8, 11}), frozenset({16, 17, 18, 19, 20, 23})
 _CLOCK, _HMT = frozenset({13, 14, 15}), frozenset({21, 24, 25})
 _LEXIUM_TYPES = {
@@ -233,11 +248,11 @@ class Steps:
         self.changes.append(Change(name, before, value, manual.line(name, value, new), temporary))
         self.now[name] = value
         if name == "MS":
-            self.forget(COUNTED - {"MS"})
+            self.forget(BANKED)
         if self.counting != counted:
             # Follow a change of the unit of motion: the other values come into force.
             locked = manual.locks_resolution(self.product)
-            self.forget(COUNTED if locked else COUNTED - {"MS"})
+            self.forget(COUNTED if locked else BANKED)
             if locked and self.counting:
                 self.now["MS"] = FINEST
         if name == "AS" and before == TORQUE:
@@ -280,11 +295,6 @@ class Steps:
             self.now[PAIRS[name]] = (0, *other[1:])
 
 
-LAST = ("DE", "CB", "MU", "TD", "TQ", "JE", "FL", "CM", "PM", "AS", "EE")
-"""Settings that can turn the motor, and those that DE or hMT restrict, in this order."""
-WIRE_ORDER = ("CE", "ES", "DG", "QD", "LK", "EM", "DN", "CK", "PY", "BD")
-SCALE = frozenset({"MS", "EE", "AS", "SA", "EL", "RD"})
-"""Settings that decide what a unit of position is."""
 MDRIVE_COUNTS = 2048
 """Encoder counts in a turn of an MDrivePlus; EE=1 needs a VI of one count or more (error 90)."""
 STEPS_PER_TURN = 200
@@ -305,9 +315,9 @@ def plan(product: str, present: Readings, wanted: Mapping[str, Value], allowed: 
     steps = Steps(product, present.values, goal)
     for order in (_leave_counts, _speeds, _resolution, _enter_counts, _velocities, _pairs, _points):
         order(steps)
-    steps.reach(*(name for name in goal if name not in (*LAST, *WIRE_ORDER)))
-    steps.reach(*LAST, *WIRE_ORDER)
-    remarks = reference_lost(steps.changes, SCALE)
+    steps.reach(*(name for name in goal if name not in RESTORED_LAST))
+    steps.reach(*RESTORED_LAST)
+    remarks = reference_lost(steps.changes, SCALES)
     return Plan(tuple(steps.changes), tuple(withheld.items()), tuple(cannot.items()), remarks)
 
 
@@ -330,7 +340,7 @@ def _goal(
     kept: Mapping[str, Value] = {name: value for name, value in now.items() if name not in COUNTED}
     if counts == manual.counting(now):
         ratio = number(goal.get("MS", now.get("MS"))) / (number(now.get("MS")) or 1)
-        scaled = {name: round(number(value) * ratio) for name, value in now.items() if name in COUNTED - {"MS"}}
+        scaled = {name: round(number(value) * ratio) for name, value in now.items() if name in BANKED}
         kept = {**now, **scaled}
     check_together(product, {**kept, **goal}, counts, changed)
     return goal
@@ -446,13 +456,13 @@ def _points(steps: Steps) -> None:
         steps.reach(name, PAIRS.get(name, name))
 
 
-SWITCHES = {
-    "JE": "inputs of the jog types turn the motor then",
-    "FL": "the motor follows the clock inputs then",
-    "CM": "the motor follows the clock then",
-    "PM": "the drive then moves back to its position by itself",
+TURNS = {
+    Alone.JOG: "inputs of the jog types turn the motor then",
+    Alone.CLOCK_INPUTS: "the motor follows the clock inputs then",
+    Alone.CLOCK: "the motor follows the clock then",
+    Alone.CORRECTION: "the drive then moves back to its position by itself",
 }
-"""Flags that can move the motor when they are set."""
+"""What moves the motor by itself once a flag is set."""
 
 
 def risk(name: str, value: Value, now: Mapping[str, Value | None]) -> str:
@@ -463,7 +473,7 @@ def risk(name: str, value: Value, now: Mapping[str, Value | None]) -> str:
     torque = now.get("AS") == TORQUE
     if name in WIRE:
         return COMMUNICATION
-    if name in manual.UNIT:
+    if name in UNIT:
         return "it belongs to the motor unit"
     if name == "LK":
         return "only CP or FD opens a lock again" if value else "it opens the program"
@@ -471,17 +481,18 @@ def risk(name: str, value: Value, now: Mapping[str, Value | None]) -> str:
         return "it switches the motor's current"
     if name == "AS":
         return "it can turn the motor"
-    if name in SWITCHES and value:
-        return SWITCHES[name]
+    row = lookup(name)
+    if row is not None and row.alone in TURNS and value:
+        return TURNS[row.alone]
     if name in ("TD", "TQ", "TS") and torque:
         return "in torque mode (AS=3) it turns the motor"
     if name == "MU" and now.get("AS"):
         return "the drive may make up lost steps at once"
     if name == "EE" and now.get("PM"):
-        return SWITCHES["PM"]
+        return TURNS[Alone.CORRECTION]
     if name in TRIPS and isinstance(value, tuple) and isinstance(value[1], int) and value[1]:
         return "it calls an address, which may hold another program's line"
-    point = name.startswith(tuple(manual.LISTS)) or manual.POINT.fullmatch(name) is not None
+    point = name.startswith(tuple(LISTS)) or manual.POINT.fullmatch(name) is not None
     if not point or name.startswith(("LS", "OS")) or not isinstance(value, tuple):
         return ""
     kind = value[0]
@@ -490,6 +501,6 @@ def risk(name: str, value: Value, now: Mapping[str, Value | None]) -> str:
     if kind == manual.RESET:
         return "the input restarts the drive"
     if kind in (manual.JOG_PLUS, manual.JOG_MINUS) and now.get("JE"):
-        return SWITCHES["JE"]
+        return TURNS[Alone.JOG]
     follows = now.get("FL") or now.get("CM")
     return "the motor follows the clock inputs" if kind in CLOCKS and follows else ""

@@ -22,9 +22,10 @@ from multidrop.families.lexium.manual.grammar import (
     parsed,
     tokens,
 )
+from multidrop.families.lexium.manual.groups import PRINTS_LINES
 from multidrop.families.lexium.manual.mnemonic import Mnemonic
 from multidrop.families.lexium.manual.statements import device_name
-from multidrop.families.lexium.manual.table import PRINTS_LINES, lookup
+from multidrop.families.lexium.manual.table import lookup
 
 WORD = re.compile(r"\s*([A-Za-z_]+)\s*=?\s*(.*)", re.S)
 BLANK = re.compile(r'\s*PR[\s,"]*;?', re.I)

@@ -53,6 +53,7 @@ from multidrop.families.lexium.host.modbus.operations import (
 )
 from multidrop.families.lexium.manual import parameter_plan, points
 from multidrop.families.lexium.manual import parameters as manual
+from multidrop.families.lexium.manual.groups import LISTS
 from multidrop.families.lexium.manual.mnemonic import EVERY
 from multidrop.families.lexium.manual.modbus.registers import AT, IDENTITY, REGISTERS, SETUPS
 from multidrop.families.lexium.manual.parameters import reading_of
@@ -190,7 +191,7 @@ def _points(state: ModbusState) -> Procedure[Facts]:
 
 
 def _setups(state: ModbusState, word: str) -> Procedure[Facts]:
-    return _rows(word, manual.LISTS[word], (yield from printed(state, word, Priority.POLL)))
+    return _rows(word, LISTS[word], (yield from printed(state, word, Priority.POLL)))
 
 
 def _rows(word: str, numbers: Sequence[int], text: str) -> Mapping[str, Value]:

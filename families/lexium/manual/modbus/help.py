@@ -7,6 +7,7 @@ The map decides what a register takes; the drive itself may take less. A registe
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 
 from multidrop.base.errors import Diagnostic
 from multidrop.families.lexium.manual import help as mcode
@@ -22,7 +23,7 @@ from multidrop.families.lexium.manual.modbus.registers import (
     SETUPS,
     Register,
 )
-from multidrop.families.lexium.manual.table import lookup, words
+from multidrop.families.lexium.manual.table import MNEMONICS, lookup, words
 
 LAST = max(AT)
 _ADDRESS = re.compile(r"0[xX]([0-9A-Fa-f]{1,4})")
@@ -105,16 +106,15 @@ def _place_of(register: Register, address: int) -> str:
 
 
 def _user_variable(name: str) -> Mnemonic:
-    return Mnemonic(
-        name,
-        f"User variable {name[1:]}",
-        "a variable of a program in the drive",
-        "",
-        f"{name}=<integer>, PR {name}",
-        "RW",
-        "variable",
-        low=INT_LOW,
-        high=INT_HIGH,
+    """A number of the user's own, as R1 is."""
+    return replace(
+        MNEMONICS["R1"],
+        name=name,
+        title=f"User variable {name[1:]}",
+        meaning="a variable of a program in the drive",
+        section="",
+        syntax=f"{name}=<integer>, PR {name}",
+        default=None,
     )
 
 
