@@ -20,7 +20,6 @@ from multidrop.families.lexium.manual.mnemonic import (
     Named,
     Position,
     Prints,
-    Quantity,
     Use,
     Waiting,
     Wire,
@@ -119,12 +118,10 @@ GUARDED: Mapping[str, Mnemonic] = {row.name: row for row in ROWS if row.guard}
 
 # Positions
 
-SCALES = those(lambda row: row.position is Position.SCALES)
-"""Settings that decide what a unit of position is: its length and its sign."""
+SCALES = tuple(row.name for row in sorted(ROWS, key=lambda row: row.turn) if row.position is Position.SCALES)
+"""Settings that give a count its length and its sign, in the order in which they are asked for."""
 RECOUNTING = those(lambda row: row.position is not Position.NOTHING)
 """Words that change what positions count: a counter, the length of a count, or its sign."""
-QUANTITIES: Mapping[str, Quantity] = {row.name: row.quantity for row in ROWS if row.quantity is not Quantity.NONE}
-"""Words with a number in the unit of motion, and what it measures."""
 
 # Motion
 

@@ -294,6 +294,9 @@ class Mnemonic:
     """
     quantity: Quantity
     position: Position
+    turn: int
+    """Its turn among the settings that give a count its length and its sign, when these are asked for; 0: it is none.
+    """
     starts: bool
     """Whether it can start motion or a program when executed at once; for a value, when written."""
     motion: Motion

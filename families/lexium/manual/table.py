@@ -83,6 +83,7 @@ def record(row: Mapping[str, str], everywhere: frozenset[str]) -> Mnemonic:
         raise ValueError(f"the row of {row['name']} says nothing of: {', '.join(empty)}")
     lexium = everywhere is LEXIUM
     leads, _, place = row["leads"].partition(" ")
+    position, _, turn = row["position"].partition(" ")
     return Mnemonic(
         name=row["name"],
         title=row["title"],
@@ -119,7 +120,8 @@ def record(row: Mapping[str, str], everywhere: frozenset[str]) -> Mnemonic:
         wire=Wire(row["wire"]),
         read_back=0 if row["read_back"] == "exact" else _whole(row["read_back"]),
         quantity=Quantity(row["quantity"]),
-        position=Position(row["position"]),
+        position=Position(position),
+        turn=int(turn or 0),
         starts=_FLAGS[row["starts"]],
         motion=Motion(row["motion"]),
         turns_at=_whole(row["turns_at"]),

@@ -15,6 +15,7 @@ from multidrop.base.errors import Inexpressible
 from multidrop.dialects.codec import Codec, Decoded, End, Kind, Reply, Request, Started, StopPiece
 from multidrop.families.lexium.host.mcode import classify, framing
 from multidrop.families.lexium.host.mcode.reply_parser import ENDLESS, ReplyLines, ReplyParser, divided
+from multidrop.families.lexium.manual.groups import SLOW
 from multidrop.families.lexium.manual.program_file import LONGEST, commented, spaced, unsendable
 from multidrop.families.lexium.manual.statements import UNNAMED
 
@@ -308,7 +309,7 @@ class MCode(Codec):
         if checksum and framing.NAK in buffer:
             return PATIENT
         if request.kind in SILENT:
-            if classify.word_of(request.text)[0] in classify.SLOW:
+            if classify.word_of(request.text)[0] in SLOW:
                 return FLASH
             return SHORT if em == 2 else PATIENT
         if request.kind is Kind.SETTING and _is_echo_mode(request.text):

@@ -55,7 +55,7 @@ from multidrop.families.lexium.host.mcode.settings import (
 from multidrop.families.lexium.host.mcode.state import MCodeState, refuse_in_program
 from multidrop.families.lexium.manual import parameter_plan, points
 from multidrop.families.lexium.manual import parameters as manual
-from multidrop.families.lexium.manual.mnemonic import EVERY, EXPANDED
+from multidrop.families.lexium.manual.mnemonic import EVERY, EXPANDED, LEXIUM, MDRIVE_PLUS
 from multidrop.families.lexium.manual.parameters import Form, form_of
 from multidrop.families.lexium.manual.points import EXPANDED_INPUTS, INPUTS
 from multidrop.families.lexium.manual.statements import UNNAMED
@@ -70,11 +70,8 @@ from multidrop.families.lexium.manual.table import lookup, words
 
 STATE = ("EF", "BY", "MV", "VC", "MP", "DE", "ST", "P", "IN", "I5", "AF")
 """What changes by itself, or by a program; the flags first, which need no separator."""
-SETTINGS = ("EE", "AS", "RC", "HC", "VI", "VM", "A", "D")
 SETTLED = "IS1"
 """Among the facts once the set-ups were read."""
-UNSURE = frozenset({"EE", "AS", "AF", "I5", "ST"})
-"""Words that not every Lexium has."""
 REFUSAL = "refuses to print its conditions"
 
 
@@ -84,7 +81,7 @@ def parts(state: MCodeState, facts: Facts) -> Sequence[Part]:
         return ()
     found = [
         Part("state", partial(_state, state, before=facts)),
-        Part("settings", partial(_values, state, names=SETTINGS), slow=True),
+        Part("settings", partial(_values, state, names=points.SETTINGS), slow=True),
     ]
     if facts.get("BY") and SETTLED in facts:
         return found  # a list has no signature, and a program prints lines, too
@@ -112,7 +109,9 @@ def _values(state: MCodeState, names: Sequence[str]) -> Procedure[Facts]:
     """
     table, known = words(state.product), state.product in EVERY
     batch = [table[name] for name in names if name in table]
-    batch = [row for row in batch if (state.product in row.products if known else row.name not in UNSURE)]
+    batch = [
+        row for row in batch if (state.product in row.products if known else row.products in (LEXIUM, MDRIVE_PLUS))
+    ]
     items, forms = items_and_forms(batch)
     answer = "".join(f"(?:{form})" for form in forms)
     yield from before_request(state, replace(question(state, items, answer), priority=Priority.POLL))

@@ -35,7 +35,6 @@ from multidrop.dialects.values import (
     same,
 )
 from multidrop.families.lexium.host.mcode import units
-from multidrop.families.lexium.host.mcode.classify import WHOLE
 from multidrop.families.lexium.host.mcode.motions import cause
 from multidrop.families.lexium.host.mcode.settings import rows_of_list
 from multidrop.families.lexium.host.mcode.values import SNAPSHOT_WORDS, snapshot_of
@@ -53,7 +52,7 @@ from multidrop.families.lexium.host.modbus.operations import (
 )
 from multidrop.families.lexium.manual import parameter_plan, points
 from multidrop.families.lexium.manual import parameters as manual
-from multidrop.families.lexium.manual.groups import LISTS
+from multidrop.families.lexium.manual.groups import LISTS, RESTORING, SCALES
 from multidrop.families.lexium.manual.mnemonic import EVERY
 from multidrop.families.lexium.manual.modbus.registers import AT, IDENTITY, REGISTERS, SETUPS
 from multidrop.families.lexium.manual.parameters import reading_of
@@ -150,7 +149,6 @@ class ModbusParameters(Parameters):
 FLAGS = ("EF", "BY", "MV", "DE")
 SIGNS = ("ST", "AF")
 """What shows the cause of an error, on drives that have it."""
-SETTINGS = ("EE", "AS", "RC", "HC", "VI", "VM", "A", "D")
 INPUTS = 4
 
 
@@ -158,7 +156,7 @@ def parts(state: ModbusState, facts: Facts) -> Sequence[Part]:
     table = words(state.product)
     signs = [n for n in SIGNS if state.product in EVERY and state.product in table[n].products]
     found = [Part("state", partial(_state, state, names=(*FLAGS, *signs), before=facts))]
-    has = [n for n in SETTINGS if state.product not in EVERY or state.product in table[n].products]
+    has = [n for n in points.SETTINGS if state.product not in EVERY or state.product in table[n].products]
     found += [Part(name, partial(_registers, state, names=(name,)), slow=True) for name in has]
     lists = manual.lists(state.product, state.version)
     found += [Part(word, partial(_setups, state, word=word), slow=True) for word in ("IS", "OS") if word in lists]
@@ -294,4 +292,4 @@ class ModbusUnits(units.LexiumUnits):
             return False
         first, count = int.from_bytes(request.body[1:3]), int.from_bytes(request.body[3:5])
         written = (AT.get(address) for address in range(first, first + count))
-        return any(row.name in (*units.RESTS, *WHOLE) for row in written if row is not None)
+        return any(row.name in (*SCALES, *RESTORING) for row in written if row is not None)
