@@ -22,27 +22,16 @@ from multidrop.dialects.values import (
     reference_lost,
     same,
 )
+from multidrop.families.lexium.manual import groups
 from multidrop.families.lexium.manual import parameters as manual
-from multidrop.families.lexium.manual.groups import (
-    BANKED,
-    COUNTED,
-    LISTS,
-    REMOVABLE,
-    RESTORED_LAST,
-    SCALES,
-    TRIPS,
-    UNIT,
-    WIRE,
-    those,
-)
 from multidrop.families.lexium.manual.mnemonic import CLOSED_LOOP, EXPANDED, MDRIVE_PLUS, Alone, Kept
 from multidrop.families.lexium.manual.parameters import CLOCKS, SHARED, TORQUE, writable
 from multidrop.families.lexium.manual.table import lookup
 
 IN_UNITS = frozenset(
     each
-    for word in those(lambda row: row.unit_encoder != "" and row.kept is Kept.SAVED)
-    for each in ([f"{word}{n}" for n in LISTS[word]] if word in LISTS else [word])
+    for word in groups.those(lambda row: row.unit_encoder != "" and row.kept is Kept.SAVED)
+    for each in ([f"{word}{n}" for n in groups.LISTS[word]] if word in groups.LISTS else [word])
 )
 """Settings in the unit of motion: steps or encoder counts."""
 FINEST = 256
@@ -90,7 +79,7 @@ def impossible(name: str, value: Value, now: Mapping[str, Value | None], labels:
         return "torque mode (AS=3) fixes it"
     if not writable(value):
         return "a line cannot hold its digits"
-    if name not in TRIPS or (value == 0 and name in REMOVABLE):
+    if name not in groups.TRIPS or (value == 0 and name in groups.REMOVABLE):
         return ""
     if value == 0:
         return "a drive cannot forget a trip; FD does"
@@ -248,11 +237,11 @@ class Steps:
         self.changes.append(Change(name, before, value, manual.line(name, value, new), temporary))
         self.now[name] = value
         if name == "MS":
-            self.forget(BANKED)
+            self.forget(groups.BANKED)
         if self.counting != counted:
             # Follow a change of the unit of motion: the other values come into force.
             locked = manual.locks_resolution(self.product)
-            self.forget(COUNTED if locked else BANKED)
+            self.forget(groups.COUNTED if locked else groups.BANKED)
             if locked and self.counting:
                 self.now["MS"] = FINEST
         if name == "AS" and before == TORQUE:
@@ -310,14 +299,16 @@ def plan(product: str, present: Readings, wanted: Mapping[str, Value], allowed: 
     cannot = {name: reason for name, reason in reasons.items() if reason}
     asked = {name: value for name, value in changed.items() if name not in cannot and name not in allowed.named}
     reasons = {name: risk(name, value, now) for name, value in asked.items()}
-    withheld = {name: why for name, why in reasons.items() if why and not (name in WIRE and allowed.communication)}
+    withheld = {
+        name: why for name, why in reasons.items() if why and not (name in groups.WIRE and allowed.communication)
+    }
     goal = _goal(product, present, given, withheld, cannot)
     steps = Steps(product, present.values, goal)
     for order in (_leave_counts, _speeds, _resolution, _enter_counts, _velocities, _pairs, _points):
         order(steps)
-    steps.reach(*(name for name in goal if name not in RESTORED_LAST))
-    steps.reach(*RESTORED_LAST)
-    remarks = reference_lost(steps.changes, SCALES)
+    steps.reach(*(name for name in goal if name not in groups.RESTORED_LAST))
+    steps.reach(*groups.RESTORED_LAST)
+    remarks = reference_lost(steps.changes, groups.SCALES)
     return Plan(tuple(steps.changes), tuple(withheld.items()), tuple(cannot.items()), remarks)
 
 
@@ -337,10 +328,10 @@ def _goal(
     changed = {name: value for name, value in goal.items() if not same(value, now.get(name))}
     goal |= {name: manual.checked(name, value, product, counts, present.labels) for name, value in changed.items()}
     # Settings that are not wanted keep their values: but MS scales some, and a change of the unit hides them.
-    kept: Mapping[str, Value] = {name: value for name, value in now.items() if name not in COUNTED}
+    kept: Mapping[str, Value] = {name: value for name, value in now.items() if name not in groups.COUNTED}
     if counts == manual.counting(now):
         ratio = number(goal.get("MS", now.get("MS"))) / (number(now.get("MS")) or 1)
-        scaled = {name: round(number(value) * ratio) for name, value in now.items() if name in BANKED}
+        scaled = {name: round(number(value) * ratio) for name, value in now.items() if name in groups.BANKED}
         kept = {**now, **scaled}
     check_together(product, {**kept, **goal}, counts, changed)
     return goal
@@ -386,7 +377,7 @@ def _speeds(steps: Steps) -> None:
     if steps.differs("MF"):
         needed, fastest = int(number(steps.goal["MF"])), steps.number("VM")
         if fastest is None or fastest < needed:
-            steps.keep(COUNTED)
+            steps.keep(groups.COUNTED)
             _allow(steps, needed)
             slowest = steps.number("VI")
             if slowest is None or slowest >= needed:
@@ -399,7 +390,7 @@ def _allow(steps: Steps, speed: float) -> None:
     """Make MS fine enough for a velocity in steps."""
     resolution = steps.number("MS")
     if steps.product not in MDRIVE_PLUS and (resolution is None or resolution * PER_MICROSTEP < speed):
-        steps.keep(COUNTED)
+        steps.keep(groups.COUNTED)
         steps.send("MS", FINEST, temporary=True)
 
 
@@ -471,9 +462,9 @@ def risk(name: str, value: Value, now: Mapping[str, Value | None]) -> str:
     `now` has the drive's present values.
     """
     torque = now.get("AS") == TORQUE
-    if name in WIRE:
+    if name in groups.WIRE:
         return COMMUNICATION
-    if name in UNIT:
+    if name in groups.UNIT:
         return "it belongs to the motor unit"
     if name == "LK":
         return "only CP or FD opens a lock again" if value else "it opens the program"
@@ -490,9 +481,9 @@ def risk(name: str, value: Value, now: Mapping[str, Value | None]) -> str:
         return "the drive may make up lost steps at once"
     if name == "EE" and now.get("PM"):
         return TURNS[Alone.CORRECTION]
-    if name in TRIPS and isinstance(value, tuple) and isinstance(value[1], int) and value[1]:
+    if name in groups.TRIPS and isinstance(value, tuple) and isinstance(value[1], int) and value[1]:
         return "it calls an address, which may hold another program's line"
-    point = name.startswith(tuple(LISTS)) or manual.POINT.fullmatch(name) is not None
+    point = name.startswith(tuple(groups.LISTS)) or manual.POINT.fullmatch(name) is not None
     if not point or name.startswith(("LS", "OS")) or not isinstance(value, tuple):
         return ""
     kind = value[0]

@@ -23,7 +23,7 @@ from multidrop.families.lexium.host.modbus.mapping import Reading
 from multidrop.families.lexium.manual import grammar
 from multidrop.families.lexium.manual.errors import BY_ITSELF
 from multidrop.families.lexium.manual.modbus.help import shown as shown_limits
-from multidrop.families.lexium.manual.modbus.registers import ALTERNATIVE, AT, REGISTERS, ROWS, SETUPS, Register
+from multidrop.families.lexium.manual.modbus.registers import ALTERNATIVE, AT, REGISTERS, ROWS, SETUPS
 from multidrop.families.lexium.manual.points import STATUS, in_words
 from multidrop.families.lexium.manual.program_file import commented, spaced
 
@@ -333,11 +333,10 @@ def write_registers(state: ModbusState, address: int, values: Sequence[int]) -> 
     if len(values) == 1 and row is not None and row.address == address:
         pdu = mapping.write(row, values[0])
     else:
-        plain = Register("", address, 1, 2, "RW", "")
         if not 1 <= len(values) <= MOST:
             raise Inexpressible(f"a request carries 1 or {MOST} registers, not {len(values)}")
         if wrong := [value for value in values if not -0x8000 <= value <= 0xFFFF]:
-            raise Inexpressible(f"{wrong[0]} does not fit into a register at 0x{plain.address:04X}")
+            raise Inexpressible(f"{wrong[0]} does not fit into a register at 0x{address:04X}")
         pdu = pdu_codec().write_registers(address, [value & 0xFFFF for value in values])
     text = ",".join(map(str, values))
     yield from carried_out(state, f"/register 0x{address:04X} ={text}", pdu)

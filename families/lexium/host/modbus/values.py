@@ -58,8 +58,6 @@ from multidrop.families.lexium.manual.modbus.registers import AT, IDENTITY, REGI
 from multidrop.families.lexium.manual.parameters import reading_of
 from multidrop.families.lexium.manual.table import words
 
-OTHER_FORM = frozenset({"TS", "TA"})
-"""Registers whose values are not those of the word."""
 NO_REGISTER = "no Modbus register; MCode/TCP (tcp://HOST:503) reads it"
 DECLARED = tuple((f"V{n}", "reading it is an error unless a program declares it") for n in range(1, 9))
 
@@ -67,7 +65,7 @@ DECLARED = tuple((f"V{n}", "reading it is an error unless a program declares it"
 def read_settings(state: ModbusState, progress: Progress) -> Procedure[Readings]:
     """Read every setting that a register has. Raises NoAnswer; nothing is changed or cleared."""
     settings = [each.name for each in manual.settings(state.product, state.version, state.part)]
-    names = [name for name in settings if name in REGISTERS and name not in OTHER_FORM]
+    names = [name for name in settings if name in REGISTERS and "values" not in REGISTERS[name].differs]
     lists = {word: rows for word, rows in manual.lists(state.product, state.version).items() if word != "LS"}
     found: dict[str, Value] = {}
     unread = [*manual.unread(state.product), *DECLARED]
@@ -106,7 +104,7 @@ def _why_not(name: str, value: Value) -> str:
     if re.fullmatch(r"[IO]S\d", name):
         return ""
     row = REGISTERS.get(name)
-    if row is None or name in OTHER_FORM:
+    if row is None or "values" in row.differs:
         return NO_REGISTER.replace("reads", "writes")
     if isinstance(value, (int, float)) and not row.allows(int(number(value))):
         return f"its register takes {row.limits}; MCode/TCP (tcp://HOST:503) may take it"

@@ -156,6 +156,9 @@ def test_no_text_breaks_the_search(text):
         assert named(state, text) in {*NAMES, ""}
 
 
-@given(word=st.sampled_from(sorted(word for word, row in groups.GUARDED.items() if not row.valued)), tail=st.from_regex(r"[ =,]*('.*)?", fullmatch=True))
+@given(
+    word=st.sampled_from(sorted(word for word, row in groups.GUARDED.items() if not row.valued)),
+    tail=st.from_regex(r"[ =,]*('.*)?", fullmatch=True),
+)
 def test_nothing_after_an_instruction_hides_it(word, tail):
     assert named(PARTY, word + tail) == word

@@ -6,8 +6,8 @@ import re
 import pytest
 
 from multidrop.families.lexium.manual import errors
-from multidrop.families.lexium.manual.mnemonic import LEXIUM, MDRIVE_PLUS, Mnemonic
 from multidrop.families.lexium.manual.groups import PRINTS_LINES
+from multidrop.families.lexium.manual.mnemonic import LEXIUM, MDRIVE_PLUS, Mnemonic
 from multidrop.families.lexium.manual.table import MDRIVE, MNEMONICS, lookup, words
 from tests.support.cases import for_each
 from tests.support.paths import FACTS
