@@ -1,8 +1,8 @@
 """The numbers of the tables, compared with a second transcription of the manuals that was made independently of them.
 
-`facts/` has names, ranges, units and defaults only, `-` where the manual gives none. Two people who copy a number make
-the same mistake seldom, so a difference here is an error in one of them: look it up in the manual, and correct the wrong
-one. Where a manual contradicts itself, both follow the rulings (docs/rulings).
+`facts/` has names, ranges, units and defaults only, `-` where the manual gives none. A difference is an error in one of
+the two: look the number up in the manual, and correct the wrong one. Where a manual contradicts itself, both follow the
+rulings (docs/rulings).
 """
 
 import csv
