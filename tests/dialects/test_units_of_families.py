@@ -4,7 +4,7 @@ import pytest
 
 from multidrop.dialects.families import FAMILIES
 from multidrop.dialects.units import Takes
-from multidrop.families.lexium.host.mcode.units import counted, rests_on
+from multidrop.families.lexium.host.units import counted, rests_on
 from multidrop.families.lexium.manual.mnemonic import EVERY
 from multidrop.families.tmcl.host.codec import Tmcl, TmclState
 

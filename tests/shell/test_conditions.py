@@ -11,7 +11,7 @@ import pytest
 from multidrop.dialects.families import FAMILIES
 from multidrop.dialects.values import UNREAD, Conditions
 from multidrop.drives.events import Conditioned, Unsolicited
-from multidrop.families.lexium.host.mcode.motions import cause
+from multidrop.families.lexium.host.motions import cause
 from multidrop.families.lexium.manual.points import CAUSE
 from multidrop.shell.events import OnBus
 from tests.support.cell_session import ETHERNET, CellSession, bus, party, pmx

@@ -8,7 +8,7 @@ import pytest
 
 from multidrop.base.errors import Diagnostic, DriveError, Inexpressible
 from multidrop.families.lexium.host.modbus.codec import Modbus, ModbusState
-from multidrop.families.lexium.host.modbus.operations import perform
+from multidrop.families.lexium.host.modbus.operations import ModbusOperations
 from multidrop.families.lexium.manual import program_checker, program_file
 from multidrop.families.lexium.manual.grammar import LineError, check_groups
 from multidrop.families.pmx.manual import program_file as pmx_file
@@ -115,7 +115,7 @@ def test_no_command_of_the_controller_separates_numbers() -> None:
 
 def test_nothing_leaves_over_modbus() -> None:
     with pytest.raises(Inexpressible, match="200,000 would be read as 200; write 200000; nothing was sent"):
-        next(perform(ModbusState(Modbus()), "MA 200,000"))
+        next(ModbusOperations(ModbusState(Modbus())).perform("MA 200,000"))
 
 
 def test_a_line_of_a_program_is_an_error_with_its_place() -> None:

@@ -10,7 +10,7 @@ import pytest
 from multidrop.dialects.motions import MoveKind
 from multidrop.families.lexium.simulator.device import MCodeDevice
 from multidrop.families.tmcl.host.codec import Tmcl, TmclState
-from multidrop.families.tmcl.host.motions import effect
+from multidrop.families.tmcl.host.motions import TmclMotions
 from multidrop.shell.session import Session
 from tests.shell.test_outcomes import at_limit, noted, on, ran, value
 from tests.shell.test_outcomes_pmx_tmcl import SWITCHES, controller, module
@@ -61,9 +61,9 @@ async def test_a_joystick_at_a_limit_fails_the_script_that_enabled_it(tmp_path: 
 
 def test_a_move_of_several_motors_is_one_motion_of_each() -> None:
     state = TmclState(Tmcl(), "1", motors=3)
-    moves = effect(state, "MVP COORD, 133, 2").begins
+    moves = TmclMotions(state).effect("MVP COORD, 133, 2").begins
     assert [(each.axis, each.kind) for each in moves] == [("0", MoveKind.POSITION), ("2", MoveKind.POSITION)]
-    assert [each.axis for each in effect(state, "MVP COORD, 1, 2").begins] == ["1"]
+    assert [each.axis for each in TmclMotions(state).effect("MVP COORD, 1, 2").begins] == ["1"]
 
 
 # Motion that the drive ends by itself

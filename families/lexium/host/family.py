@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from multidrop.dialects.family import Family
+from multidrop.families.lexium.host import classify
 from multidrop.families.lexium.manual import guards, points
 from multidrop.families.lexium.manual.guards import CYBER_SECURITY
 
@@ -39,3 +40,7 @@ class LexiumFamily(Family):
     @classmethod
     def assign(cls, word: str, value: str) -> str | None:
         return points.assign(word, value)
+
+    @classmethod
+    def vouched(cls, text: str, product: str) -> bool:
+        return classify.vouched(text, product)

@@ -10,8 +10,9 @@ import re
 from collections.abc import Mapping
 from typing import ClassVar
 
+from multidrop.base.errors import Inexpressible, NoAnswer
 from multidrop.dialects.certifying import Certifying
-from multidrop.dialects.codec import Codec, Priority, Procedure
+from multidrop.dialects.codec import Codec, Procedure
 from multidrop.dialects.debugging import Debugging
 from multidrop.dialects.family import (
     ADDRESSES,
@@ -20,33 +21,21 @@ from multidrop.dialects.family import (
     Guard,
     Hints,
     Language,
-    Motion,
-    Printed,
     Programs,
-    Referencing,
     to_all,
 )
 from multidrop.dialects.motions import Motions
 from multidrop.dialects.scanning import Scan
-from multidrop.dialects.state import DriveState
+from multidrop.dialects.state import DriveState, who
 from multidrop.dialects.units import Units
 from multidrop.dialects.values import Values
-from multidrop.families.pmx.host import operations
-from multidrop.families.pmx.host.codec import STOP_BYTES, Pmx, PmxState
-from multidrop.families.pmx.host.operations import identify
+from multidrop.families.pmx.host.codec import FACTORY, STOP_BYTES, Pmx, PmxState
+from multidrop.families.pmx.host.operations import SEARCH, PmxCertifying, PmxOperations, find
 from multidrop.families.pmx.manual import help
 from multidrop.families.pmx.manual.table import head, lookup, reads, starts_motion
 
 FIRST = "X"
 """The first axis."""
-
-
-def move(axis: str, steps: int | str) -> tuple[str, ...]:
-    return "INC", f"{axis.upper() or FIRST}{steps}"
-
-
-def move_to(axis: str, position: int | str) -> tuple[str, ...]:
-    return "ABS", f"{axis.upper() or FIRST}{position}"
 
 
 GUARDS: Mapping[str, str] = {
@@ -62,36 +51,7 @@ _NUMBER = re.compile(r"\A\s*@\d{2}", re.ASCII)
 _ADDRESSED = re.compile(r"\s*@?(\d{2})\s*(?=[A-Za-z])", re.ASCII)
 
 
-def guarded(text: str, address: str) -> Guard | None:
-    """Find the guard of a command for a controller; None: the command needs no agreement."""
-    line = text.strip()
-    word, value = word_of(line), line.partition("=")[2].strip()
-    if word == "STORE" or (word in GUARDS and value):
-        return Guard(word, f"'{line}' {GUARDS[word]}")
-    quiet = value in QUIET.get(word, ())
-    return to_all(line) if address in ADDRESSES and starts_motion(line) and not quiet else None
-
-
-def only_ends(text: str) -> bool:
-    """Whether a command of motion can only end it: that ends a program (SR)."""
-    return word_of(text.strip()) == "SR" and text.partition("=")[2].strip() in QUIET["SR"]
-
-
-def addressed(text: str, product: str) -> tuple[str, str] | None:
-    """Split a line into a device number and a command (`01PX`, as on the wire, with its @ or without)."""
-    found = _ADDRESSED.match(text)
-    rest = text[found.end() :] if found is not None else ""
-    return (found[1], rest) if found is not None and lookup(rest.upper()) is not None else None
-
-
-def word_of(text: str) -> str:
-    """The name of a command without its axis or number, and without a device number before it, in capitals."""
-    command = _NUMBER.sub("", text)
-    row = lookup(command)
-    return row.name if row is not None else head(command)
-
-
-class PmxFamily(Family):
+class PmxFamily(PmxOperations, Family):
     """A Performax controller on a serial line or through a gateway."""
 
     state: PmxState
@@ -110,46 +70,58 @@ class PmxFamily(Family):
 
     @classmethod
     def identify(cls, hints: Hints) -> Procedure[list[DriveState]]:
-        return [*(yield from identify(hints))]
+        """Find the controllers on a line, in the order of `hints.drives`. Raises NoAnswer where none replies.
+
+        Without numbers, try the factory's number, then none, as on a gateway.
+        """
+        if hints.checksum is not None or hints.em is not None:
+            raise Inexpressible("checksum= and em= are for MCode; this controller has neither")
+        if not hints.addressed:
+            alone = yield from find(PmxState(Pmx(addressed=False)))
+            if alone is None:
+                raise NoAnswer("no controller replies without an address")
+            return [alone]
+        if wrong := [name for name in hints.drives if not re.fullmatch(r"\d\d", name, re.ASCII)]:
+            raise Inexpressible(f"no device number '{wrong[0]}'; valid: 00 to 99, as in drives=00,01")
+        named = tuple(name for name in hints.tried if re.fullmatch(r"\d\d", name, re.ASCII))
+        found: list[DriveState] = []
+        for name in hints.drives or named or (FACTORY,):
+            state = PmxState(Pmx(), name)
+            if (yield from find(state)) is None:
+                state.note(f"{who(state)} does not reply")
+            found.append(state)
+        if any(state.product for state in found):
+            return found
+        if not hints.drives:
+            alone = yield from find(PmxState(Pmx(addressed=False)))
+            if alone is not None:
+                return [alone]
+        tried = ", ".join(state.address for state in found)
+        raise NoAnswer(f"no controller replies at {tried}; drives=00,01,... names others; {SEARCH}")
 
     def guard(self, text: str) -> Guard | None:
-        return guarded(text, self.state.address)
+        line = text.strip()
+        word, value = self.word_of(line), line.partition("=")[2].strip()
+        if word == "STORE" or (word in GUARDS and value):
+            return Guard(word, f"'{line}' {GUARDS[word]}")
+        quiet = value in QUIET.get(word, ())
+        return to_all(line) if self.state.address in ADDRESSES and starts_motion(line) and not quiet else None
 
     @classmethod
     def word_of(cls, text: str) -> str:
-        return word_of(text)
+        """The name of a command without its axis or number, and without a device number before it, in capitals."""
+        command = _NUMBER.sub("", text)
+        row = lookup(command)
+        return row.name if row is not None else head(command)
 
     @classmethod
     def only_ends(cls, text: str) -> bool:
-        return only_ends(text)
+        """Whether a command of motion can only end it: that ends a program (SR)."""
+        return cls.word_of(text.strip()) == "SR" and text.partition("=")[2].strip() in QUIET["SR"]
 
     @classmethod
     def only_reads(cls, text: str) -> bool:
         return reads(text)
-
-    def perform(self, text: str) -> Printed:
-        return operations.perform(self.state, text)
-
-    def check(self, text: str) -> None:
-        operations.check(self.state, text)
-
-    def motion(self, priority: Priority) -> Procedure[tuple[Motion, ...]]:
-        return operations.motion(self.state, priority)
-
-    def moving(self) -> Procedure[bool]:
-        return operations.moving(self.state)
-
-    def busy(self) -> Procedure[bool]:
-        return operations.busy(self.state)
-
-    def status(self) -> Printed:
-        return operations.status(self.state)
-
-    def referencing(self, text: str) -> Referencing | None:
-        return operations.referencing(self.state, text)
-
-    def homed(self) -> Procedure[bool]:
-        return operations.homed(self.state)
 
     @classmethod
     def question(cls, word: str) -> str | None:
@@ -157,11 +129,11 @@ class PmxFamily(Family):
 
     @classmethod
     def move(cls, axis: str, distance: int | str) -> tuple[str, ...]:
-        return move(axis, distance)
+        return "INC", f"{axis.upper() or FIRST}{distance}"
 
     @classmethod
     def move_to(cls, axis: str, position: int | str) -> tuple[str, ...]:
-        return move_to(axis, position)
+        return "ABS", f"{axis.upper() or FIRST}{position}"
 
     @classmethod
     def assign(cls, word: str, value: str) -> str | None:
@@ -175,7 +147,7 @@ class PmxFamily(Family):
 
     @classmethod
     def scan(cls) -> Scan:
-        from multidrop.families.pmx.host.operations import SCAN
+        from multidrop.families.pmx.host.scan import SCAN
 
         return SCAN
 
@@ -187,8 +159,6 @@ class PmxFamily(Family):
 
     @property
     def certifying(self) -> Certifying:
-        from multidrop.families.pmx.host.operations import PmxCertifying
-
         return PmxCertifying(self.state)
 
     @property
@@ -211,4 +181,7 @@ class PmxFamily(Family):
 
     @classmethod
     def addressed(cls, text: str, product: str) -> tuple[str, str] | None:
-        return addressed(text, product)
+        """Split a line into a device number and a command (`01PX`, as on the wire, with its @ or without)."""
+        found = _ADDRESSED.match(text)
+        rest = text[found.end() :] if found is not None else ""
+        return (found[1], rest) if found is not None and lookup(rest.upper()) is not None else None

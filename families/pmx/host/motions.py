@@ -49,14 +49,6 @@ RUNNING, FAILED_PROGRAM = 1, 4
 # What a line does
 
 
-def effect(state: PmxState, text: str) -> Effect:
-    """What a typed command does to the motions of its controller. Raises Inexpressible for what no frame can carry."""
-    found = _effect(text.strip())
-    if found.begins and state.address not in ADDRESSES:
-        state.codec.encode(state.codec.request(state.address, text))  # before anything is asked for it
-    return found
-
-
 def _effect(line: str) -> Effect:
     if (found := PLACE.fullmatch(line)) is not None:
         targets = zip("xyxy", found.groups(), strict=True)
@@ -93,77 +85,10 @@ def _axes(named: str) -> frozenset[str]:
 # Before a motion
 
 
-def signs(state: PmxState) -> Procedure[Signs]:
-    """Read what shows a failure, and where distances count from: MM=0 makes every target a position."""
-    found = {"MM": (yield from number(state, "MM")), "EO": (yield from number(state, "EO"))}
-    for axis in table.AXES:
-        words = ("MST", "SLS", "P") if found["MM"] == DISTANCES else ("MST", "SLS")
-        for word in words:
-            found[f"{word}{axis}"] = yield from number(state, f"{word}{axis}")
-    for program in PROGRAMS:
-        found[f"SASTAT{program}"] = yield from number(state, f"SASTAT{program}")
-    return found
-
-
-def old(state: PmxState, found: Signs, own: bool) -> Procedure[Signs]:
-    """Report latched errors to who waits for another's motion; before an own one the controller refuses the move."""
-    for axis in table.AXES if not own else ():
-        words = table.trouble_words(found[f"MST{axis}"] & table.LIMIT_ERROR)
-        if found[f"SLS{axis}"] in table.LOOP_ERRORS:
-            words = ", ".join(filter(None, (words, f"StepNLoop {table.loop_words(found[f'SLS{axis}'])}")))
-        if words:
-            state.note(f"{who(state)}: {axis} has an error from before: {words}; CLR{axis} clears it")
-    return found
-    yield  # nothing is asked
-
-
-def place(found: Signs, axis: str) -> int | None:
-    """Where the distance of a move counts from: from 0 with ABS, from the axis at rest with INC; None: not read."""
-    if (mode := found.get("MM")) != DISTANCES:
-        return None if mode is None else 0
-    return None if found[f"MST{axis.upper()}"] & table.MOVING else found[f"P{axis.upper()}"]
-
-
-def runs(found: Signs) -> bool:
-    """Whether a program runs."""
-    return any(found.get(f"SASTAT{program}") == RUNNING for program in PROGRAMS)
+# nothing is asked
 
 
 # At its end
-
-
-def judge(state: PmxState, axis: str, evidence: Evidence) -> Procedure[Ending | None]:
-    """Judge the motion of an axis at rest."""
-    name, before = axis.upper(), evidence.before
-    status = yield from number(state, f"MST{name}")
-    loop = yield from number(state, f"SLS{name}")
-    if loop in LOOP_BUSY or status & table.MOVING:
-        return None
-    ending = Ending(Outcome.REACHED, axis, (yield from number(state, f"P{name}")))
-    new = status & ~before.get(f"MST{name}", -1)
-    for bit, way in LATCHED.items():
-        if new & bit:
-            return replace(ending, outcome=Outcome.LIMIT, reason=f"{way} limit; CLR{name} clears the error")
-    if loop in table.LOOP_ERRORS and before.get(f"SLS{name}", loop) != loop:
-        return _loop_failed(ending, loop, name)
-    output = 1 << table.AXES.index(name)
-    drivers = yield from number(state, "EO")
-    if (before.get("EO", drivers) ^ drivers) & output:
-        return replace(ending, outcome=Outcome.POWER, reason="its motor driver was switched on or off (EO)")
-    if evidence.move is None:
-        return ending
-    if evidence.move.kind is MoveKind.PROGRAM:
-        return (yield from _program_ended(state, ending, before))
-    move = evidence.move
-    short = not evidence.program and (move.endless or (yield from _is_short(state, ending, move, loop)))
-    met = next((way for bit, way in SWITCHES.items() if status & bit), "")
-    no_target = move.target is None and move.kind is not MoveKind.POSITION
-    unexplained = (short or no_target) and not (evidence.stopped or evidence.program)
-    if met and unexplained and (yield from number(state, "IERR")):  # else it would be latched
-        return replace(ending, outcome=Outcome.LIMIT, reason=f"{met} limit switch is on (IERR=1 keeps no error)")
-    if short and not evidence.stopped and (yield from _program_runs(state)):
-        return ending
-    return replace(ending, outcome=Outcome.STOPPED) if short else ending
 
 
 def _program_runs(state: PmxState) -> Procedure[bool]:
@@ -207,19 +132,76 @@ class PmxMotions(Motions):
     state: PmxState
 
     def effect(self, text: str) -> Effect:
-        return effect(self.state, text)
+        """What a typed command does to the motions. Raises Inexpressible for what no frame can carry."""
+        state = self.state
+        found = _effect(text.strip())
+        if found.begins and state.address not in ADDRESSES:
+            state.codec.encode(state.codec.request(state.address, text))  # before anything is asked for it
+        return found
 
     def signs(self) -> Procedure[Signs]:
-        return signs(self.state)
+        """Read what shows a failure, and where distances count from: MM=0 makes every target a position."""
+        state = self.state
+        found = {"MM": (yield from number(state, "MM")), "EO": (yield from number(state, "EO"))}
+        for axis in table.AXES:
+            words = ("MST", "SLS", "P") if found["MM"] == DISTANCES else ("MST", "SLS")
+            for word in words:
+                found[f"{word}{axis}"] = yield from number(state, f"{word}{axis}")
+        for program in PROGRAMS:
+            found[f"SASTAT{program}"] = yield from number(state, f"SASTAT{program}")
+        return found
 
     def old(self, signs: Signs, own: bool) -> Procedure[Signs]:
-        return old(self.state, signs, own)
+        """Report latched errors to who waits for another's motion; before an own one the move is refused."""
+        for axis in table.AXES if not own else ():
+            words = table.trouble_words(signs[f"MST{axis}"] & table.LIMIT_ERROR)
+            if signs[f"SLS{axis}"] in table.LOOP_ERRORS:
+                words = ", ".join(filter(None, (words, f"StepNLoop {table.loop_words(signs[f'SLS{axis}'])}")))
+            if words:
+                self.state.note(f"{who(self.state)}: {axis} has an error from before: {words}; CLR{axis} clears it")
+        return signs
+        yield
 
     def place(self, signs: Signs, axis: str) -> int | None:
-        return place(signs, axis)
+        """Where the distance of a move counts from: from 0 with ABS, from the axis at rest with INC; None: not read."""
+        if (mode := signs.get("MM")) != DISTANCES:
+            return None if mode is None else 0
+        return None if signs[f"MST{axis.upper()}"] & table.MOVING else signs[f"P{axis.upper()}"]
 
     def runs(self, signs: Signs) -> bool:
-        return runs(signs)
+        """Whether a program runs."""
+        return any(signs.get(f"SASTAT{program}") == RUNNING for program in PROGRAMS)
 
     def judge(self, axis: str, evidence: Evidence) -> Procedure[Ending | None]:
-        return judge(self.state, axis, evidence)
+        """Judge the motion of an axis at rest."""
+        state = self.state
+        name, before = axis.upper(), evidence.before
+        status = yield from number(state, f"MST{name}")
+        loop = yield from number(state, f"SLS{name}")
+        if loop in LOOP_BUSY or status & table.MOVING:
+            return None
+        ending = Ending(Outcome.REACHED, axis, (yield from number(state, f"P{name}")))
+        new = status & ~before.get(f"MST{name}", -1)
+        for bit, way in LATCHED.items():
+            if new & bit:
+                return replace(ending, outcome=Outcome.LIMIT, reason=f"{way} limit; CLR{name} clears the error")
+        if loop in table.LOOP_ERRORS and before.get(f"SLS{name}", loop) != loop:
+            return _loop_failed(ending, loop, name)
+        output = 1 << table.AXES.index(name)
+        drivers = yield from number(state, "EO")
+        if (before.get("EO", drivers) ^ drivers) & output:
+            return replace(ending, outcome=Outcome.POWER, reason="its motor driver was switched on or off (EO)")
+        if evidence.move is None:
+            return ending
+        if evidence.move.kind is MoveKind.PROGRAM:
+            return (yield from _program_ended(state, ending, before))
+        move = evidence.move
+        short = not evidence.program and (move.endless or (yield from _is_short(state, ending, move, loop)))
+        met = next((way for bit, way in SWITCHES.items() if status & bit), "")
+        no_target = move.target is None and move.kind is not MoveKind.POSITION
+        unexplained = (short or no_target) and not (evidence.stopped or evidence.program)
+        if met and unexplained and (yield from number(state, "IERR")):  # else it would be latched
+            return replace(ending, outcome=Outcome.LIMIT, reason=f"{met} limit switch is on (IERR=1 keeps no error)")
+        if short and not evidence.stopped and (yield from _program_runs(state)):
+            return ending
+        return replace(ending, outcome=Outcome.STOPPED) if short else ending

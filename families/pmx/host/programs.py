@@ -19,7 +19,13 @@ from multidrop.dialects.family import Printed, Programs, Progress
 from multidrop.dialects.program_files import Difference, Held, Stored
 from multidrop.dialects.state import who
 from multidrop.families.pmx.host.codec import PmxState
-from multidrop.families.pmx.host.operations import OK, PROGRAMS, answered, moving, number, perform
+from multidrop.families.pmx.host.operations import (
+    OK,
+    PROGRAMS,
+    PmxExchange,
+    PmxOperations,
+    number,
+)
 from multidrop.families.pmx.manual import program_file, script_checker
 from multidrop.families.pmx.manual.program_file import RAW, Undecodable
 from multidrop.families.pmx.manual.script_compiler import EMPTY, ERASED, LINES
@@ -32,56 +38,9 @@ BLANK = 16
 """Number of empty lines in a row that mark the end of the stored programs."""
 
 
-def listing(state: PmxState, start: str = "") -> Procedure[tuple[str, ...]]:
-    """List `SAn=TOKEN` for every stored line, from a number on."""
-    found: list[str] = []
-    blank = 0
-    for at in range(whole(start, 0, LINES) or 0, LINES):
-        token = yield from read_line(state, at)
-        blank = blank + 1 if token in EMPTY else 0
-        found.append(f"SA{at}={token}")
-        if blank == BLANK:
-            break
-    return tuple(found[: len(found) - blank])
-
-
 def read_line(state: PmxState, at: int) -> Procedure[str]:
-    reply = yield from answered(state, state.codec.request(state.address, f"SA{at}"))
+    reply = yield from PmxExchange(state).answered(state.codec.request(state.address, f"SA{at}"))
     return reply.text.strip()
-
-
-def download(
-    state: PmxState, lines: Sequence[SourceLine], held: Held | None, progress: Progress
-) -> Procedure[Sequence[SourceLine]]:
-    """Write a program and read back each line. Both programs must be idle. Raises Refused, NoAnswer or Diagnostic.
-
-    Compiled lines (`SAn=TOKEN`, or `TOKEN` alone) are written unchanged. A-SCRIPT is compiled, and only our simulator
-    can run the result: any other controller is refused before anything is written. It alone erases what follows it.
-    """
-    raw = program_file.is_raw(lines)
-    stored = program_file.compiled(lines)
-    if not raw:
-        yield from _simulator_only(state)
-    for program in PROGRAMS:
-        if (yield from number(state, f"SASTAT{program}")) in RUNS:
-            raise Refused(f"{who(state)}: program {program} runs; SR{program}=0 ends it (nothing was written)")
-    done, reported = 0, False
-    try:
-        for source, at, token in stored:
-            yield from _write(state, source, at, token)
-            done += 1
-            progress(done, len(stored))
-        if not raw:
-            yield from _erase_behind(state, len(stored))
-        reported = True
-    except DriveError as error:
-        reported = not isinstance(error, Stopped)  # the caller of a stopped one may have gone
-        error.args = (f"{error}; {_incomplete(state, done, len(stored))}",)
-        raise
-    finally:
-        if not reported:
-            state.note(f"{who(state)}: the download was cut off: {_incomplete(state, done, len(stored))}")
-    return lines
 
 
 def _incomplete(state: PmxState, done: int, total: int) -> str:
@@ -117,7 +76,7 @@ def _erase_behind(state: PmxState, at: int) -> Procedure[None]:
 
 def _write(state: PmxState, source: int, at: int, token: str) -> Procedure[None]:
     try:
-        yield from answered(state, state.codec.request(state.address, f"SA{at}={token}"))
+        yield from PmxExchange(state).answered(state.codec.request(state.address, f"SA{at}={token}"))
     except Refused as refused:
         raise Refused(f"line {source}: {refused}") from None
     written = yield from read_line(state, at)
@@ -125,66 +84,10 @@ def _write(state: PmxState, source: int, at: int, token: str) -> Procedure[None]
         raise NoAnswer(f"line {source}: {who(state)} has {written!r} at SA{at} after {token!r} was written")
 
 
-def read(state: PmxState, lines: Sequence[SourceLine], progress: Progress) -> Procedure[Held]:
-    """Read the stored lines, at least as far as these lines of a file go; then the variables, for a backup of them."""
-    last = max((at for _, at, _ in program_file.compiled(lines)), default=-1) if lines else -1
-    more = VARIABLES if lines else 0
-    found: list[Stored] = []
-    blank = at = 0
-    while at < LINES and (blank < BLANK or at <= last):
-        progress(at, max(at + BLANK - blank, last + 1) + more)
-        token = yield from read_line(state, at)
-        blank = blank + 1 if token in EMPTY else 0
-        found += [] if token in EMPTY else [Stored(at, token)]
-        at += 1
-    names = []
-    for variable in range(more):
-        progress(at + variable, at + more)
-        names.append(f"V{variable} = {(yield from number(state, f'V{variable}'))}")
-    return Held(tuple(found), tuple(names))
-
-
 def _command(state: PmxState, text: str) -> Procedure[None]:
-    reply = yield from answered(state, state.codec.request(state.address, text))
+    reply = yield from PmxExchange(state).answered(state.codec.request(state.address, text))
     if reply.text != OK:
         raise Refused(f"{who(state)} replied {reply.text!r} to '{text}'")
-
-
-def differences(
-    state: PmxState, lines: Sequence[SourceLine], held: Held, before: Held | None = None
-) -> tuple[Difference, ...]:
-    """Compare the compiled lines of a file with the stored ones; a script is all that the controller holds."""
-    there = dict(held.lines)
-    stored = program_file.compiled(lines)
-    found = [
-        Difference(source, f"SA{at}={token}", at, f"SA{at}={there.get(at, '')}")
-        for source, at, token in stored
-        if there.get(at, "") != token and not (token in EMPTY and at not in there)
-    ]
-    if not program_file.is_raw(lines):
-        found += [Difference(0, "", at, f"SA{at}={token}") for at, token in held.lines if at >= len(stored)]
-    return tuple(found)
-
-
-def start(lines: Sequence[SourceLine], label: str) -> str:
-    marks = {token for _, _, token in program_file.compiled(lines) if token.startswith("PS")} or {"PS0"}
-    if f"PS{label}" not in marks:
-        hint = f"programs: {', '.join(sorted(mark[2:] for mark in marks))}"
-        raise Diagnostic(f"no program {label} in the file", "", hint)
-    return f"SR{label}=1"
-
-
-def readable(held: Held) -> tuple[str, ...]:
-    """Return the program as A-SCRIPT, or as compiled lines with a remark where a unit's own compiler made them."""
-    listed = tuple(f"SA{line.at}={line.text}" for line in held.lines)
-    try:
-        return tuple(program_file.readable(listed))
-    except Undecodable as problem:
-        return (f"; compiled lines, as they are stored: {problem}", *listed)
-
-
-def file_of(_: PmxState, held: Held, raw: bool) -> tuple[str, ...]:
-    return tuple(f"SA{line.at}={line.text}" for line in held.lines) if raw else readable(held)
 
 
 class PmxPrograms(Programs):
@@ -194,17 +97,46 @@ class PmxPrograms(Programs):
 
     keeper = "controller"
 
-    def listing(self, place: str) -> Printed:
-        return listing(self.state, place)
+    def listing(self, place: str = "") -> Printed:
+        """List `SAn=TOKEN` for every stored line, from a number on."""
+        found: list[str] = []
+        blank = 0
+        for at in range(whole(place, 0, LINES) or 0, LINES):
+            token = yield from read_line(self.state, at)
+            blank = blank + 1 if token in EMPTY else 0
+            found.append(f"SA{at}={token}")
+            if blank == BLANK:
+                break
+        return tuple(found[: len(found) - blank])
 
     def readable(self, held: Held) -> Sequence[str]:
-        return readable(held)
+        """Return the program as A-SCRIPT, or as compiled lines with a remark where a unit's own compiler made them."""
+        listed = tuple(f"SA{line.at}={line.text}" for line in held.lines)
+        try:
+            return tuple(program_file.readable(listed))
+        except Undecodable as problem:
+            return (f"; compiled lines, as they are stored: {problem}", *listed)
 
     def read(self, lines: Sequence[SourceLine], progress: Progress) -> Procedure[Held]:
-        return read(self.state, lines, progress)
+        """Read the stored lines, at least as far as these lines of a file go; then the variables, for a backup."""
+        last = max((at for _, at, _ in program_file.compiled(lines)), default=-1) if lines else -1
+        more = VARIABLES if lines else 0
+        found: list[Stored] = []
+        blank = at = 0
+        while at < LINES and (blank < BLANK or at <= last):
+            progress(at, max(at + BLANK - blank, last + 1) + more)
+            token = yield from read_line(self.state, at)
+            blank = blank + 1 if token in EMPTY else 0
+            found += [] if token in EMPTY else [Stored(at, token)]
+            at += 1
+        names = []
+        for variable in range(more):
+            progress(at + variable, at + more)
+            names.append(f"V{variable} = {(yield from number(self.state, f'V{variable}'))}")
+        return Held(tuple(found), tuple(names))
 
     def file(self, held: Held, raw: bool) -> Sequence[str]:
-        return file_of(self.state, held, raw)
+        return tuple(f"SA{line.at}={line.text}" for line in held.lines) if raw else self.readable(held)
 
     def size(self, lines: Sequence[SourceLine]) -> int:
         return len(program_file.compiled(lines))
@@ -218,25 +150,69 @@ class PmxPrograms(Programs):
         for program in PROGRAMS:
             if (yield from number(self.state, f"SASTAT{program}")) in RUNS:
                 lines.append(f"SR{program}=0")
-        moves = yield from moving(self.state)
+        moves = yield from PmxOperations(self.state).moving()
         if not lines and moves:
             raise Refused(f"{who(self.state)} moves: stop it first (nothing was written)")
         for text in lines:
             yield from _command(self.state, text)
-        if lines and (yield from moving(self.state)):
+        if lines and (yield from PmxOperations(self.state).moving()):
             yield from _command(self.state, "STOP")
         return bool(lines)
 
     def download(
         self, lines: Sequence[SourceLine], held: Held | None, progress: Progress
     ) -> Procedure[Sequence[SourceLine]]:
-        return download(self.state, lines, held, progress)
+        """Write a program and read back each line. Both programs must be idle. Raises Refused, NoAnswer or Diagnostic.
 
-    def differences(self, lines: Sequence[SourceLine], held: Held, before: Held | None) -> Sequence[Difference]:
-        return differences(self.state, lines, held, before)
+        Compiled lines (`SAn=TOKEN`, or `TOKEN` alone) are written unchanged. A-SCRIPT is compiled, and only our
+        simulator can run the result: any other controller is refused before anything is written. It alone erases what
+        follows it.
+        """
+        state = self.state
+        raw = program_file.is_raw(lines)
+        stored = program_file.compiled(lines)
+        if not raw:
+            yield from _simulator_only(state)
+        for program in PROGRAMS:
+            if (yield from number(state, f"SASTAT{program}")) in RUNS:
+                raise Refused(f"{who(state)}: program {program} runs; SR{program}=0 ends it (nothing was written)")
+        done, reported = 0, False
+        try:
+            for source, at, token in stored:
+                yield from _write(state, source, at, token)
+                done += 1
+                progress(done, len(stored))
+            if not raw:
+                yield from _erase_behind(state, len(stored))
+            reported = True
+        except DriveError as error:
+            reported = not isinstance(error, Stopped)  # the caller of a stopped one may have gone
+            error.args = (f"{error}; {_incomplete(state, done, len(stored))}",)
+            raise
+        finally:
+            if not reported:
+                state.note(f"{who(state)}: the download was cut off: {_incomplete(state, done, len(stored))}")
+        return lines
+
+    def differences(self, lines: Sequence[SourceLine], held: Held, before: Held | None = None) -> Sequence[Difference]:
+        """Compare the compiled lines of a file with the stored ones; a script is all that the controller holds."""
+        there = dict(held.lines)
+        stored = program_file.compiled(lines)
+        found = [
+            Difference(source, f"SA{at}={token}", at, f"SA{at}={there.get(at, '')}")
+            for source, at, token in stored
+            if there.get(at, "") != token and not (token in EMPTY and at not in there)
+        ]
+        if not program_file.is_raw(lines):
+            found += [Difference(0, "", at, f"SA{at}={token}") for at, token in held.lines if at >= len(stored)]
+        return tuple(found)
 
     def start(self, lines: Sequence[SourceLine], label: str) -> str:
-        return start(lines, label)
+        marks = {token for _, _, token in program_file.compiled(lines) if token.startswith("PS")} or {"PS0"}
+        if f"PS{label}" not in marks:
+            hint = f"programs: {', '.join(sorted(mark[2:] for mark in marks))}"
+            raise Diagnostic(f"no program {label} in the file", "", hint)
+        return f"SR{label}=1"
 
     def annotated(self, text: str, held: Held) -> Sequence[str]:
         """Return the lines of a script: it shows no numbers of lines. Compiled lines are better read as a script."""
@@ -263,39 +239,6 @@ def _rows(held: tuple[Stored, ...]) -> tuple[Stored, ...]:
     return tuple(Stored(first[line], script[line - 1]) for line in sorted(first))
 
 
-def idle(state: PmxState, program: str, neighbours: Neighbours | None) -> Procedure[None]:
-    if neighbours is None:
-        raise Inexpressible(f"{who(state)}: {NO_STEP}; nothing was sent")
-    if (yield from _status(state, program)) in (RUNNING, PAUSED):
-        raise Refused(f"{who(state)}: program {program} runs already; not started; SR{program}=0 ends it")
-
-
-def trace(state: PmxState, program: str) -> Procedure[None]:
-    yield from perform(state, f"SR{_program(program)}={START}")
-
-
-def look(state: PmxState, program: str) -> Procedure[Look]:
-    status = yield from _status(state, program)
-    active = status in (RUNNING, PAUSED)
-    address = (yield from number(state, f"SPC{_program(program)}")) if active else None
-    return Look(active, status == PAUSED, address)
-
-
-def waits(state: PmxState, program: str, last: Stored | None) -> Procedure[None]:
-    if (yield from _status(state, program)) != PAUSED:
-        raise Refused(f"{who(state)}: program {_program(program)} is not paused; nothing was sent")
-
-
-def go_on(state: PmxState, program: str) -> Procedure[None]:
-    yield from perform(state, f"SR{_program(program)}={CONTINUE}")
-
-
-def break_now(state: PmxState, program: str) -> Procedure[None]:
-    if (yield from _status(state, program)) != RUNNING:
-        raise Refused(f"{who(state)}: program {_program(program)} does not run; nothing was sent")
-    yield from perform(state, f"SR{_program(program)}={PAUSE}")
-
-
 def _status(state: PmxState, program: str) -> Procedure[int]:
     return (yield from number(state, f"SASTAT{_program(program)}"))
 
@@ -305,13 +248,6 @@ def _program(place: str) -> str:
     if (place or "0") not in ("0", "1"):
         raise Diagnostic(f"no program {place}", "", "valid: 0 or 1")
     return place or "0"
-
-
-def check_names(state: PmxState, names: Sequence[str]) -> None:
-    for name in names:
-        row = lookup(name)
-        if row is None or "R" not in row.access:
-            raise Diagnostic(f"{name} cannot be watched: it reads no value", "", "valid: V0 to V63, PX, DI and others")
 
 
 class PmxDebugging(Debugging):
@@ -324,7 +260,7 @@ class PmxDebugging(Debugging):
 
     def listing(self) -> Procedure[tuple[Stored, ...]]:
         """Read the compiled lines; where they can be decompiled, the statements at their first lines."""
-        lines = yield from listing(self.state)
+        lines = yield from PmxPrograms(self.state).listing()
         return _rows(tuple(Stored(int(found[1]), found[2]) for line in lines if (found := RAW.fullmatch(line))))
 
     def rows(self, held: Held) -> Sequence[Stored]:
@@ -337,29 +273,45 @@ class PmxDebugging(Debugging):
         return None
 
     def idle(self, place: str, neighbours: Neighbours | None) -> Procedure[None]:
-        return idle(self.state, place, neighbours)
+        state = self.state
+        if neighbours is None:
+            raise Inexpressible(f"{who(state)}: {NO_STEP}; nothing was sent")
+        if (yield from _status(state, place)) in (RUNNING, PAUSED):
+            raise Refused(f"{who(state)}: program {place} runs already; not started; SR{place}=0 ends it")
 
     def trace(self, place: str) -> Procedure[None]:
-        return trace(self.state, place)
+        yield from PmxOperations(self.state).perform(f"SR{_program(place)}={START}")
 
     def waits(self, place: str, last: Stored | None) -> Procedure[None]:
-        return waits(self.state, place, last)
+        if (yield from _status(self.state, place)) != PAUSED:
+            raise Refused(f"{who(self.state)}: program {_program(place)} is not paused; nothing was sent")
 
     def go_on(self, place: str) -> Procedure[None]:
-        return go_on(self.state, place)
+        yield from PmxOperations(self.state).perform(f"SR{_program(place)}={CONTINUE}")
 
     def look(self, place: str) -> Procedure[Look]:
-        return look(self.state, place)
+        status = yield from _status(self.state, place)
+        active = status in (RUNNING, PAUSED)
+        address = (yield from number(self.state, f"SPC{_program(place)}")) if active else None
+        return Look(active, status == PAUSED, address)
 
     def break_now(self, place: str) -> Procedure[None]:
-        return break_now(self.state, place)
+        state = self.state
+        if (yield from _status(state, place)) != RUNNING:
+            raise Refused(f"{who(state)}: program {_program(place)} does not run; nothing was sent")
+        yield from PmxOperations(state).perform(f"SR{_program(place)}={PAUSE}")
 
     def names(self, names: Sequence[str]) -> None:
-        check_names(self.state, names)
+        for name in names:
+            row = lookup(name)
+            if row is None or "R" not in row.access:
+                raise Diagnostic(
+                    f"{name} cannot be watched: it reads no value", "", "valid: V0 to V63, PX, DI and others"
+                )
 
     def values(self, names: Sequence[str]) -> Procedure[Mapping[str, str]]:
         found = {}
         for name in names:
-            reply = yield from answered(self.state, self.state.codec.request(self.state.address, name))
+            reply = yield from PmxExchange(self.state).answered(self.state.codec.request(self.state.address, name))
             found[name] = reply.text
         return found

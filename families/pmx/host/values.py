@@ -49,14 +49,11 @@ from multidrop.families.pmx.host.codec import PmxState
 from multidrop.families.pmx.host.operations import (
     LATER,
     PROGRAMS,
-    answered,
-    beyond_doubt,
-    busy,
-    moving,
+    PmxExchange,
+    PmxOperations,
     number,
-    perform,
 )
-from multidrop.families.pmx.host.programs import listing
+from multidrop.families.pmx.host.programs import PmxPrograms
 from multidrop.families.pmx.manual import table
 from multidrop.families.pmx.manual.program_file import RAW
 
@@ -148,8 +145,8 @@ class PmxParameters(ListedParameters):
     def read_one(self, name: str) -> Procedure[Reading]:
         ratio = base(name) == RATIO
         form = NAME_FORM if name == "DN" else RATIO_FORM if ratio else WHOLE_FORM
-        reply = yield from answered(
-            self.state, replace(self.state.codec.request(self.state.address, name), expect=form)
+        reply = yield from PmxExchange(self.state).answered(
+            replace(self.state.codec.request(self.state.address, name), expect=form)
         )
         return reading(name, reply.text if name == "DN" else float(reply.text) if ratio else int(reply.text))
 
@@ -199,17 +196,17 @@ class PmxParameters(ListedParameters):
         return base(name) in ("POL", "SLR", "SL")
 
     def ready(self) -> Procedure[str]:
-        if (yield from moving(self.state)):
+        if (yield from PmxOperations(self.state).moving()):
             return f"{who(self.state)} moves: stop it first"
-        if (yield from busy(self.state)):
+        if (yield from PmxOperations(self.state).busy()):
             return f"{who(self.state)} runs a program: SR0=0 and SR1=0 end them"
         return ""
 
     def write(self, change: Change) -> Procedure[object]:
-        return perform(self.state, change.text)
+        return PmxOperations(self.state).perform(change.text)
 
     def save(self) -> Procedure[object]:
-        return perform(self.state, "STORE")
+        return PmxOperations(self.state).perform("STORE")
 
     def conflict(self, plan: Plan, others: Collection[str]) -> str:
         numbers = [str(change.after)[-2:] for change in plan if change.name == "DN"]
@@ -237,7 +234,7 @@ def _facts(state: PmxState, names: Sequence[str]) -> Procedure[dict[str, Value]]
     for name in names:
         found[name] = yield from number(state, name, Priority.POLL, doubts)
     if doubts:
-        yield from beyond_doubt(state, doubts[0])
+        yield from PmxExchange(state).beyond_doubt(doubts[0])
     return found
 
 
@@ -330,7 +327,7 @@ class PmxValues(Values):
 
     def snapshot(self, progress: Progress) -> Procedure[Snapshot]:
         readings = yield from PmxParameters(self.state).read(progress)
-        identity = yield from answered(self.state, self.state.codec.request(self.state.address, "ID"))
+        identity = yield from PmxExchange(self.state).answered(self.state.codec.request(self.state.address, "ID"))
         remarks = []
         for axis in table.AXES:
             if (yield from number(self.state, f"MST{axis}")) & table.MOVING:
@@ -346,7 +343,7 @@ class PmxValues(Values):
         # A bit of DI is 1 if the input is at ground, or with the other polarity if it is not.
         inverted = not int(number_of(values.get("POLX"))) & POLARITY
         levels = Levels("DI", tuple((n + 1, n) for n in range(POINTS)), inverted=inverted)
-        listed = yield from listing(self.state)
+        listed = yield from PmxPrograms(self.state).listing()
         return Snapshot(
             kind="pmx",
             product="PMX",
@@ -414,8 +411,8 @@ class PmxValues(Values):
         return word.upper()
 
     def again(self, word: str, priority: Priority) -> Procedure[float]:
-        reply = yield from answered(
-            self.state, replace(self.state.codec.request(self.state.address, word), priority=priority)
+        reply = yield from PmxExchange(self.state).answered(
+            replace(self.state.codec.request(self.state.address, word), priority=priority)
         )
         return printed_number(who(self.state), word, reply.text)
 

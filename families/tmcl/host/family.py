@@ -10,9 +10,10 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import ClassVar
 
+from multidrop.base.errors import Inexpressible, NoAnswer
 from multidrop.base.files import rows
 from multidrop.dialects.certifying import Certifying
-from multidrop.dialects.codec import Codec, Priority, Procedure
+from multidrop.dialects.codec import Codec, Procedure
 from multidrop.dialects.debugging import Debugging
 from multidrop.dialects.family import (
     ADDRESSES,
@@ -21,33 +22,23 @@ from multidrop.dialects.family import (
     Guard,
     Hints,
     Language,
-    Motion,
-    Printed,
     Programs,
-    Referencing,
     to_all,
 )
 from multidrop.dialects.motions import Motions
+from multidrop.dialects.owed_settings import repaired
 from multidrop.dialects.scanning import Scan
-from multidrop.dialects.state import DriveState
+from multidrop.dialects.state import DriveState, who
 from multidrop.dialects.units import Units
 from multidrop.dialects.values import Values
-from multidrop.families.tmcl.host import codec, operations
-from multidrop.families.tmcl.host.codec import STOP_BYTES, Tmcl, TmclState
-from multidrop.families.tmcl.host.operations import identify
+from multidrop.families.tmcl.host import codec
+from multidrop.families.tmcl.host.codec import FACTORY, STOP_BYTES, Tmcl, TmclState, number_of
+from multidrop.families.tmcl.host.operations import TmclCertifying, TmclOperations, count_line, end_download, find
 from multidrop.families.tmcl.manual import commands, help
 from multidrop.families.tmcl.manual.commands import Command, Global
 
 FIRST = "0"
 """The first motor."""
-
-
-def move(axis: str, steps: int | str) -> tuple[str, ...]:
-    return (f"MVP REL, {axis or FIRST}, {steps}",)
-
-
-def move_to(axis: str, position: int | str) -> tuple[str, ...]:
-    return (f"MVP ABS, {axis or FIRST}, {position}",)
 
 
 _ROWS = list(rows(__file__, "guards.csv"))
@@ -66,36 +57,7 @@ _PARAMETERS: Mapping[int, str] = {Global[row["parameter"]]: row["name"] for row 
 _SWITCHES = frozenset(Global[row["parameter"]] for row in _ROWS if row["switch"])
 
 
-def guarded(text: str, address: str) -> Guard | None:
-    """Find the guard of a line for a module; None: the line needs no agreement, as an invalid one."""
-    line = text.strip()
-    if (call := commands.parsed(text)) is None:
-        return None
-    name = _COMMANDS.get(call.command, "")
-    off = call.command == Command.SGP and call.type in _SWITCHES and not call.value
-    if call.command in (Command.SGP, Command.RSGP) and call.motor == 0 and not off:
-        name = _PARAMETERS.get(call.type, "")
-    if name:
-        return Guard(name, f"'{line}' {GUARDS[name]}")
-    return to_all(line) if address in ADDRESSES and call.moves and not only_ends(text) else None
-
-
-def only_ends(text: str) -> bool:
-    """Whether a line is a command of motion that can only end it: a velocity of 0."""
-    call = commands.parsed(text)
-    return call is not None and call.command in (Command.ROR, Command.ROL) and call.value == 0
-
-
-def word_of(text: str) -> str:
-    """The word at the head of a line, in capitals; the number of a command without a word."""
-    return text.strip().partition(" ")[0].upper()
-
-
-def only_reads(text: str) -> bool:
-    return word_of(text) in (Command.GAP.name, Command.GGP.name, Command.GIO.name)
-
-
-class TmclFamily(Family):
+class TmclFamily(TmclOperations, Family):
     """A Trinamic module in direct mode."""
 
     state: TmclState
@@ -116,46 +78,54 @@ class TmclFamily(Family):
 
     @classmethod
     def identify(cls, hints: Hints) -> Procedure[list[DriveState]]:
-        return [*(yield from identify(hints))]
+        """The modules at the addresses of `hints.drives`; without any, those tried, or the one at the factory's.
+
+        Raises NoAnswer where none replies, and Inexpressible for hints of other families.
+        """
+        if hints.checksum is not None or hints.em is not None or not hints.addressed:
+            raise Inexpressible("checksum=, em= and address=none are for other families: a module has none of them")
+        named = [name for name in hints.tried if name.isdecimal()]
+        names = tuple(dict.fromkeys(hints.drives or named)) or (FACTORY,)
+        for name in names:  # all, before the first is asked
+            number_of(name)
+        found: list[TmclState] = []
+        for name in names:
+            state = TmclState(Tmcl(), name)
+            state.named(name)
+            if any(each.name == name and not each.lines for each in hints.owed):
+                yield from end_download(state, "the last session left it in download mode")
+            if not (yield from find(state)):
+                state.note(f"{who(state)} does not reply")
+            found.append(state)
+        count_line(found)
+        for state in found:
+            yield from repaired(state, hints.owed, TmclOperations(state).perform)
+        if not any(state.product for state in found):
+            tried = ", ".join(state.address for state in found)
+            raise NoAnswer(f"no module replies at {tried}; drives=1,2,... names others")
+        return [*found]
 
     def guard(self, text: str) -> Guard | None:
-        return guarded(text, self.state.address)
-
-    @classmethod
-    def word_of(cls, text: str) -> str:
-        return word_of(text)
+        line = text.strip()
+        if (call := commands.parsed(text)) is None:
+            return None
+        name = _COMMANDS.get(call.command, "")
+        off = call.command == Command.SGP and call.type in _SWITCHES and not call.value
+        if call.command in (Command.SGP, Command.RSGP) and call.motor == 0 and not off:
+            name = _PARAMETERS.get(call.type, "")
+        if name:
+            return Guard(name, f"'{line}' {GUARDS[name]}")
+        return to_all(line) if self.state.address in ADDRESSES and call.moves and not self.only_ends(text) else None
 
     @classmethod
     def only_ends(cls, text: str) -> bool:
-        return only_ends(text)
+        """Whether a line is a command of motion that can only end it: a velocity of 0."""
+        call = commands.parsed(text)
+        return call is not None and call.command in (Command.ROR, Command.ROL) and call.value == 0
 
     @classmethod
     def only_reads(cls, text: str) -> bool:
-        return only_reads(text)
-
-    def perform(self, text: str) -> Printed:
-        return operations.perform(self.state, text)
-
-    def check(self, text: str) -> None:
-        operations.parsed(self.state, text)
-
-    def motion(self, priority: Priority) -> Procedure[tuple[Motion, ...]]:
-        return operations.motion(self.state, priority)
-
-    def moving(self) -> Procedure[bool]:
-        return operations.moving(self.state)
-
-    def busy(self) -> Procedure[bool]:
-        return operations.busy(self.state)
-
-    def status(self) -> Printed:
-        return operations.status(self.state)
-
-    def referencing(self, text: str) -> Referencing | None:
-        return operations.referencing(self.state, text)
-
-    def homed(self) -> Procedure[bool]:
-        return operations.homed(self.state)
+        return cls.word_of(text) in (Command.GAP.name, Command.GGP.name, Command.GIO.name)
 
     @classmethod
     def question(cls, word: str) -> str | None:
@@ -163,11 +133,11 @@ class TmclFamily(Family):
 
     @classmethod
     def move(cls, axis: str, distance: int | str) -> tuple[str, ...]:
-        return move(axis, distance)
+        return (f"MVP REL, {axis or FIRST}, {distance}",)
 
     @classmethod
     def move_to(cls, axis: str, position: int | str) -> tuple[str, ...]:
-        return move_to(axis, position)
+        return (f"MVP ABS, {axis or FIRST}, {position}",)
 
     @classmethod
     def assign(cls, word: str, value: str) -> str | None:
@@ -187,8 +157,6 @@ class TmclFamily(Family):
 
     @property
     def certifying(self) -> Certifying:
-        from multidrop.families.tmcl.host.operations import TmclCertifying
-
         return TmclCertifying(self.state)
 
     @property

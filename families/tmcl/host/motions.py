@@ -17,7 +17,7 @@ from multidrop.base.errors import Refused
 from multidrop.dialects.codec import Procedure
 from multidrop.dialects.motions import NOTHING, Effect, Ending, Evidence, Motions, Move, MoveKind, Outcome, Signs
 from multidrop.families.tmcl.host.codec import MOST_MOTORS, TmclState
-from multidrop.families.tmcl.host.operations import busy, motors, read
+from multidrop.families.tmcl.host.operations import TmclOperations, motors, read
 from multidrop.families.tmcl.manual import commands
 from multidrop.families.tmcl.manual.commands import Axis, Call, Command, Search
 
@@ -45,44 +45,6 @@ REASONS: Mapping[int, tuple[Outcome, str]] = {
 # What a line does
 
 
-def effect(state: TmclState, text: str) -> Effect:
-    """What a typed command does to the motions of its module."""
-    call = commands.parsed(text)
-    if call is None:
-        return NOTHING
-    axis = _axis(state, call.motor)
-    only = frozenset({axis})
-    match call.command, call.type:
-        case Command.ROR | Command.ROL, _:
-            return _begins(Move(MoveKind.VELOCITY, axis, endless=True)) if call.value else Effect(ends=only)
-        case Command.MST, _:
-            return Effect(ends=only)
-        case Command.MVP, kind if kind == ABSOLUTE:
-            return _begins(Move(MoveKind.POSITION, axis, target=call.value))
-        case Command.MVP, kind if kind == RELATIVE:
-            return _begins(Move(MoveKind.POSITION, axis, relative=call.value))
-        case Command.MVP, kind if kind == TOGETHER:
-            named = [n for n in range(MOST_MOTORS) if call.motor >> n & 1] if call.motor & SEVERAL else [call.motor]
-            # Where it ends is read from parameter 0, as after MVP REL.
-            return Effect(tuple(Move(MoveKind.POSITION, _axis(state, each), relative=0) for each in named))
-        case Command.SAP, Axis.TARGET_POSITION:
-            return _begins(Move(MoveKind.POSITION, axis, target=call.value))
-        case Command.SAP, Axis.TARGET_VELOCITY:
-            return _begins(Move(MoveKind.VELOCITY, axis, endless=True)) if call.value else Effect(ends=only)
-        case Command.SAP | Command.RSAP, Axis.ACTUAL_POSITION | Axis.MICROSTEPS:
-            return Effect(unknown=only)
-        case Command.RFS, Search.START:
-            return _begins(Move(MoveKind.HOMING, axis))
-        case Command.RFS, Search.STOP:
-            return Effect(ends=only)
-        case command, _ if command in STARTS:
-            every = [_axis(state, motor) for motor in range(max(1, state.motors))]
-            return Effect(begins=tuple(Move(MoveKind.PROGRAM, each) for each in every))
-        case Command.FACTORY, _:
-            return Effect(unknown=frozenset({"", *map(str, range(MOST_MOTORS))}))
-    return NOTHING
-
-
 def _begins(move: Move) -> Effect:
     return Effect(begins=(move,))
 
@@ -94,14 +56,6 @@ def _axis(state: TmclState, motor: int) -> str:
 # Before a motion
 
 
-def signs(state: TmclState) -> Procedure[Signs]:
-    """Read the flags of each motor's driver, 0 for a module without them, and whether its program runs."""
-    found = {PROGRAM: int((yield from busy(state)))}
-    for motor in range((yield from motors(state))):
-        found[f"208_{motor}"] = yield from _flags(state, motor)
-    return found
-
-
 def _flags(state: TmclState, motor: int) -> Procedure[int]:
     try:
         return (yield from read(state, Call(Command.GAP, Axis.DRIVER_FLAGS, motor)))
@@ -110,34 +64,6 @@ def _flags(state: TmclState, motor: int) -> Procedure[int]:
 
 
 # At its end
-
-
-def judge(state: TmclState, axis: str, evidence: Evidence) -> Procedure[Ending | None]:
-    """Judge the motion of a motor at rest."""
-    motor = int(axis or 0)
-    position = yield from _value(state, Axis.ACTUAL_POSITION, motor)
-    ending = Ending(Outcome.REACHED, axis, position)
-    new = (yield from _flags(state, motor)) & ~evidence.before.get(f"208_{motor}", -1)
-    for bit, reason in DRIVER_FAULTS.items():
-        if new & bit:
-            return replace(ending, outcome=Outcome.ERROR, reason=reason)
-    move = evidence.move
-    if move is None or move.kind is MoveKind.PROGRAM or evidence.program:
-        return ending
-    if move.kind is MoveKind.HOMING:
-        if (yield from _value(state, Axis.POSITION_REACHED, motor)):
-            return ending
-        return (yield from _short(state, replace(ending, reason="home was not found"), motor, 0, evidence))
-    target = move.target
-    if target is None and move.relative is not None:  # parameter 127 says from where MVP REL counts
-        target = yield from _value(state, Axis.TARGET_POSITION, motor)
-    if target is None:
-        if move.endless and not evidence.stopped:
-            return (yield from _short(state, ending, motor, 0, evidence))
-        met = None if evidence.stopped else (yield from _switch(state, motor, 0))
-        return ending if met is None else replace(ending, outcome=Outcome.LIMIT, reason=met)
-    ending = replace(ending, target=target)
-    return ending if position == target else (yield from _short(state, ending, motor, target - position, evidence))
 
 
 def _short(state: TmclState, ending: Ending, motor: int, way: int, evidence: Evidence) -> Procedure[Ending]:
@@ -154,7 +80,7 @@ def _short(state: TmclState, ending: Ending, motor: int, way: int, evidence: Evi
             if flags & bit:
                 return replace(ending, outcome=outcome, reason=reason)
     homing = evidence.move is not None and evidence.move.kind is MoveKind.HOMING
-    if not (evidence.stopped or homing) and (yield from busy(state)):
+    if not (evidence.stopped or homing) and (yield from TmclOperations(state).busy()):
         return ending  # its program runs now, which may have ended the motion
     return replace(ending, outcome=Outcome.STOPPED)
 
@@ -179,24 +105,85 @@ def _value(state: TmclState, parameter: Axis, motor: int) -> Procedure[int]:
     return (yield from read(state, Call(Command.GAP, parameter, motor)))
 
 
-def runs(found: Signs) -> bool:
-    """Whether its program runs."""
-    return bool(found.get(PROGRAM))
-
-
 class TmclMotions(Motions):
     """How the motions of a TMCL module begin and end."""
 
     state: TmclState
 
     def effect(self, text: str) -> Effect:
-        return effect(self.state, text)
+        """What a typed command does to the motions of its module."""
+        state = self.state
+        call = commands.parsed(text)
+        if call is None:
+            return NOTHING
+        axis = _axis(state, call.motor)
+        only = frozenset({axis})
+        match call.command, call.type:
+            case Command.ROR | Command.ROL, _:
+                return _begins(Move(MoveKind.VELOCITY, axis, endless=True)) if call.value else Effect(ends=only)
+            case Command.MST, _:
+                return Effect(ends=only)
+            case Command.MVP, kind if kind == ABSOLUTE:
+                return _begins(Move(MoveKind.POSITION, axis, target=call.value))
+            case Command.MVP, kind if kind == RELATIVE:
+                return _begins(Move(MoveKind.POSITION, axis, relative=call.value))
+            case Command.MVP, kind if kind == TOGETHER:
+                named = [n for n in range(MOST_MOTORS) if call.motor >> n & 1] if call.motor & SEVERAL else [call.motor]
+                # Where it ends is read from parameter 0, as after MVP REL.
+                return Effect(tuple(Move(MoveKind.POSITION, _axis(state, each), relative=0) for each in named))
+            case Command.SAP, Axis.TARGET_POSITION:
+                return _begins(Move(MoveKind.POSITION, axis, target=call.value))
+            case Command.SAP, Axis.TARGET_VELOCITY:
+                return _begins(Move(MoveKind.VELOCITY, axis, endless=True)) if call.value else Effect(ends=only)
+            case Command.SAP | Command.RSAP, Axis.ACTUAL_POSITION | Axis.MICROSTEPS:
+                return Effect(unknown=only)
+            case Command.RFS, Search.START:
+                return _begins(Move(MoveKind.HOMING, axis))
+            case Command.RFS, Search.STOP:
+                return Effect(ends=only)
+            case command, _ if command in STARTS:
+                every = [_axis(state, motor) for motor in range(max(1, state.motors))]
+                return Effect(begins=tuple(Move(MoveKind.PROGRAM, each) for each in every))
+            case Command.FACTORY, _:
+                return Effect(unknown=frozenset({"", *map(str, range(MOST_MOTORS))}))
+        return NOTHING
 
     def signs(self) -> Procedure[Signs]:
-        return signs(self.state)
+        """Read the flags of each motor's driver, 0 for a module without them, and whether its program runs."""
+        state = self.state
+        found = {PROGRAM: int((yield from TmclOperations(state).busy()))}
+        for motor in range((yield from motors(state))):
+            found[f"208_{motor}"] = yield from _flags(state, motor)
+        return found
 
     def runs(self, signs: Signs) -> bool:
-        return runs(signs)
+        """Whether its program runs."""
+        return bool(signs.get(PROGRAM))
 
     def judge(self, axis: str, evidence: Evidence) -> Procedure[Ending | None]:
-        return judge(self.state, axis, evidence)
+        """Judge the motion of a motor at rest."""
+        state = self.state
+        motor = int(axis or 0)
+        position = yield from _value(state, Axis.ACTUAL_POSITION, motor)
+        ending = Ending(Outcome.REACHED, axis, position)
+        new = (yield from _flags(state, motor)) & ~evidence.before.get(f"208_{motor}", -1)
+        for bit, reason in DRIVER_FAULTS.items():
+            if new & bit:
+                return replace(ending, outcome=Outcome.ERROR, reason=reason)
+        move = evidence.move
+        if move is None or move.kind is MoveKind.PROGRAM or evidence.program:
+            return ending
+        if move.kind is MoveKind.HOMING:
+            if (yield from _value(state, Axis.POSITION_REACHED, motor)):
+                return ending
+            return (yield from _short(state, replace(ending, reason="home was not found"), motor, 0, evidence))
+        target = move.target
+        if target is None and move.relative is not None:  # parameter 127 says from where MVP REL counts
+            target = yield from _value(state, Axis.TARGET_POSITION, motor)
+        if target is None:
+            if move.endless and not evidence.stopped:
+                return (yield from _short(state, ending, motor, 0, evidence))
+            met = None if evidence.stopped else (yield from _switch(state, motor, 0))
+            return ending if met is None else replace(ending, outcome=Outcome.LIMIT, reason=met)
+        ending = replace(ending, target=target)
+        return ending if position == target else (yield from _short(state, ending, motor, target - position, evidence))

@@ -6,17 +6,14 @@ Identification only reads: nothing moves, and no error is cleared.
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import partial
 
 from multidrop.base.errors import Inexpressible, NoAnswer, Refused, Stopped
 from multidrop.dialects.certifying import Certifying
 from multidrop.dialects.codec import End, Kind, Priority, Procedure, Reply, Request
 from multidrop.dialects.exchange import Exchange
-from multidrop.dialects.family import ADDRESSES, Hints, Motion, Referencing
-from multidrop.dialects.owed_settings import repaired
-from multidrop.dialects.state import who
+from multidrop.dialects.family import ADDRESSES, Motion, Referencing
+from multidrop.dialects.state import OfDrive, who
 from multidrop.families.tmcl.host.codec import (
-    FACTORY,
     LENGTH,
     MOST_MOTORS,
     Tmcl,
@@ -58,69 +55,6 @@ END = "133 0, 0, 0"
 """The line that ends download mode."""
 
 
-def answered(state: TmclState, request: Request) -> Procedure[Reply]:
-    """Send a request once, a reading one once more where no reply comes; its reply. Raises Refused or NoAnswer.
-
-    After a SAP 193 that was refused or got no reply, no search begins until 193 is read or set.
-    """
-    call = call_of(request.body)[1]
-    begins = (call.command, call.type) == (Command.RFS, Search.START)
-    if begins and call.motor in state.search_modes_unknown:
-        raise Refused(
-            f"{who(state)}: SAP 193 for motor {call.motor} was refused or got no reply: '{request.text}' would search "
-            f"in another mode and was not sent; read it (GAP 193, {call.motor}) or set it"
-        )
-    if state.programming:
-        raise Refused(f"{who(state)} is in download mode and would store '{request.text}'; {END} ends that")
-    yield from synchronised(state, request)
-    if state.programming:
-        raise Refused(f"{who(state)} is in download mode; '{request.text}' was not sent", int(Status.STORED))
-    sets = (call.command, call.type) == (Command.SAP, Axis.SEARCH_MODE)
-    if sets:
-        state.search_mode_sent(call.motor)
-    try:
-        reply = yield from TmclExchange(state).answered(request)
-    except NoAnswer as lost:
-        if request.kind is not Kind.PRINT or call.changed_by_reading:
-            raise
-        reply = yield from _asked_again(state, request, lost)
-    if sets or (call.command, call.type) == (Command.GAP, Axis.SEARCH_MODE):
-        state.search_mode_known(call.motor)
-    return reply
-
-
-def _asked_again(state: TmclState, request: Request, lost: NoAnswer) -> Procedure[Reply]:
-    """Send a reading request once more, when a mark has shown that all replies to the first one are over."""
-    try:
-        yield from synchronised(state, request)
-    except NoAnswer:
-        raise lost from None
-    except Stopped:
-        raise Stopped(f"{who(state)}: '{request.text}' was stopped before its reply came") from None
-    if state.programming:  # it would store the request
-        raise lost
-    try:
-        return (yield from TmclExchange(state).answered(request))
-    except NoAnswer:
-        raise NoAnswer(f"{who(state)} does not reply: '{request.text}' only reads, and was sent twice") from None
-
-
-def _replied(state: TmclState, request: Request) -> Procedure[Reply]:
-    """The reply to a request; a reply that is not awaited to its end is lost."""
-    try:
-        reply = yield request
-        status = status_of(reply) if call_of(request.body)[1].command != Command.READ_PROGRAM else None
-        if status == Status.STORED:
-            state.found_storing()
-            state.note(f"{who(state)} is in download mode and stored '{request.text}'; {END} or a stop ends that")
-        elif status == Status.DONE and state.restore is not None and not state.restore.lines:
-            state.owes_nothing()
-        return reply
-    except (Stopped, GeneratorExit):
-        _lost(state, request)
-        raise
-
-
 def status_of(reply: Reply) -> int | None:
     """The status in the frame of a reply; None: it is not one."""
     fields = parse_reply(reply.body) if len(reply.body) == LENGTH else None
@@ -130,55 +64,8 @@ def status_of(reply: Reply) -> int | None:
 def read(state: TmclState, call: Call, priority: Priority = Priority.OPERATOR) -> Procedure[int]:
     """The value of a reading command. Raises Refused or NoAnswer."""
     asked = state.codec.request(state.address, str(call), call)
-    reply = yield from answered(state, replace(asked, priority=priority))
+    reply = yield from TmclExchange(state).answered(replace(asked, priority=priority))
     return int(reply.text)
-
-
-def refusal(state: TmclState, request: Request, reply: Reply) -> Refused:
-    code = int(reply.text)
-    meaning, advice = REFUSALS.get(code, ("", ""))
-    text = f"{meaning} ({advice})" if meaning else "unknown status"
-    return Refused(f"{who(state)} refused '{request.text}': status {code}, {text}", code)
-
-
-def _lost(state: TmclState, request: Request) -> None:
-    state.reply_lost(call_of(request.body)[1].command)
-
-
-def _mark(state: TmclState, request: Request, sent: bool) -> Procedure[tuple[str, ...] | None]:
-    """Send a mark; where the commands of all marks have lost replies, the first one twice before it.
-
-    That one is sent again only once all have lost replies. So the second of two replies to it follows those to the
-    others, and only its own and a stop's may still be late.
-    """
-    lines: list[str] = []
-    if state.lost_commands.issuperset(each.command for each in MARKS):
-        for _ in range(2):
-            reply = yield from _asked(state, MARKS[0], request.priority)
-            if reply is None:
-                return None
-            lines += reply.lines[:-1]
-        state.late_again(MARKS[0].command)
-    own = call_of(request.body)[1].command
-    taken = state.lost_commands | ({own} if sent else set())
-    call = next((each for each in MARKS if each.command not in taken), MARKS[0])
-    reply = yield from _asked(state, call, request.priority)
-    if reply is None or (call.command in taken and reply.doubtful):
-        state.reply_lost(call.command)
-        return None
-    state.proved()
-    name = f"{who(state)}: {late_reply_to(own)}"
-    return tuple(line for line in (*lines, *reply.lines[:-1]) if not sent or name in line)
-
-
-def _asked(state: TmclState, call: Call, priority: Priority) -> Procedure[Reply | None]:
-    """Send a reading command, and gather what comes before its reply; None without a reply."""
-    asked = replace(state.codec.request(state.address, str(call), call), priority=priority)
-    reply = yield from _replied(state, replace(asked, expect=ANY_VALUE, gather=True))
-    if reply.end is not End.DONE:
-        state.reply_lost(call.command)
-        return None
-    return reply
 
 
 class TmclExchange(Exchange):
@@ -187,21 +74,139 @@ class TmclExchange(Exchange):
     state: TmclState
 
     def mark(self, request: Request, after: bool) -> Procedure[tuple[str, ...] | None]:
-        return _mark(self.state, request, after)
+        """Send a mark; where the commands of all marks have lost replies, the first one twice before it.
+
+        That one is sent again only once all have lost replies. So the second of two replies to it follows those to the
+        others, and only its own and a stop's may still be late.
+        """
+        state = self.state
+        lines: list[str] = []
+        if state.lost_commands.issuperset(each.command for each in MARKS):
+            for _ in range(2):
+                reply = yield from self._asked(MARKS[0], request.priority)
+                if reply is None:
+                    return None
+                lines += reply.lines[:-1]
+            state.late_again(MARKS[0].command)
+        own = call_of(request.body)[1].command
+        taken = state.lost_commands | ({own} if after else set())
+        call = next((each for each in MARKS if each.command not in taken), MARKS[0])
+        reply = yield from self._asked(call, request.priority)
+        if reply is None or (call.command in taken and reply.doubtful):
+            state.reply_lost(call.command)
+            return None
+        state.proved()
+        name = f"{who(state)}: {late_reply_to(own)}"
+        return tuple(line for line in (*lines, *reply.lines[:-1]) if not after or name in line)
 
     def lost(self, request: Request) -> None:
-        _lost(self.state, request)
+        self.state.reply_lost(call_of(request.body)[1].command)
 
     def refusal(self, request: Request, reply: Reply) -> Refused | NoAnswer:
-        return refusal(self.state, request, reply)
+        code = int(reply.text)
+        meaning, advice = REFUSALS.get(code, ("", ""))
+        text = f"{meaning} ({advice})" if meaning else "unknown status"
+        return Refused(f"{who(self.state)} refused '{request.text}': status {code}, {text}", code)
 
     def send(self, request: Request) -> Procedure[Reply]:
-        return _replied(self.state, request)
+        """The reply to a request; a reply that is not awaited to its end is lost."""
+        state = self.state
+        try:
+            reply = yield request
+            status = status_of(reply) if call_of(request.body)[1].command != Command.READ_PROGRAM else None
+            if status == Status.STORED:
+                state.found_storing()
+                state.note(f"{who(state)} is in download mode and stored '{request.text}'; {END} or a stop ends that")
+            elif status == Status.DONE and state.restore is not None and not state.restore.lines:
+                state.owes_nothing()
+            return reply
+        except (Stopped, GeneratorExit):
+            self.lost(request)
+            raise
 
+    def answered(self, request: Request, doubts: list[Request] | None = None) -> Procedure[Reply]:
+        """Send a request once, a reading one once more where no reply comes; its reply. Raises Refused or NoAnswer.
 
-def synchronised(state: TmclState, request: Request) -> Procedure[None]:
-    """See `Exchange.synchronised`."""
-    return TmclExchange(state).synchronised(request)
+        After a SAP 193 that was refused or got no reply, no search begins until 193 is read or set.
+        """
+        state = self.state
+        call = call_of(request.body)[1]
+        begins = (call.command, call.type) == (Command.RFS, Search.START)
+        if begins and call.motor in state.search_modes_unknown:
+            raise Refused(
+                f"{who(state)}: SAP 193 for motor {call.motor} was refused or got no reply: '{request.text}' would "
+                f"search in another mode and was not sent; read it (GAP 193, {call.motor}) or set it"
+            )
+        if state.programming:
+            raise Refused(f"{who(state)} is in download mode and would store '{request.text}'; {END} ends that")
+        yield from self.synchronised(request)
+        if state.programming:
+            raise Refused(f"{who(state)} is in download mode; '{request.text}' was not sent", int(Status.STORED))
+        sets = (call.command, call.type) == (Command.SAP, Axis.SEARCH_MODE)
+        if sets:
+            state.search_mode_sent(call.motor)
+        try:
+            reply = yield from super().answered(request, doubts)
+        except NoAnswer as lost:
+            if request.kind is not Kind.PRINT or call.changed_by_reading:
+                raise
+            reply = yield from self._asked_again(request, lost)
+        if sets or (call.command, call.type) == (Command.GAP, Axis.SEARCH_MODE):
+            state.search_mode_known(call.motor)
+        return reply
+
+    def _asked(self, call: Call, priority: Priority) -> Procedure[Reply | None]:
+        """Send a reading command, and gather what comes before its reply; None without a reply."""
+        state = self.state
+        asked = replace(state.codec.request(state.address, str(call), call), priority=priority)
+        reply = yield from self.send(replace(asked, expect=ANY_VALUE, gather=True))
+        if reply.end is not End.DONE:
+            state.reply_lost(call.command)
+            return None
+        return reply
+
+    def _asked_again(self, request: Request, lost: NoAnswer) -> Procedure[Reply]:
+        """Send a reading request once more, when a mark has shown that all replies to the first one are over."""
+        state = self.state
+        try:
+            yield from self.synchronised(request)
+        except NoAnswer:
+            raise lost from None
+        except Stopped:
+            raise Stopped(f"{who(state)}: '{request.text}' was stopped before its reply came") from None
+        if state.programming:  # it would store the request
+            raise lost
+        try:
+            return (yield from super().answered(request))
+        except NoAnswer:
+            raise NoAnswer(f"{who(state)} does not reply: '{request.text}' only reads, and was sent twice") from None
+
+    def store(self, request: Request, call: Call, by_hand: bool = True) -> Procedure[None]:
+        """Begin a download, store a line, or end the download; nothing else may go to the module meanwhile."""
+        state = self.state
+        if not state.programming:
+            yield from self.synchronised(request)
+            state.found_storing()
+            if by_hand:
+                state.remark(f"{who(state)}: download mode: every command is stored until {END}, or a stop")
+        begins, ends = call.command == Command.DOWNLOAD, call.command == Command.END_DOWNLOAD
+        reply = yield replace(request, kind=Kind.PROGRAM)
+        status = status_of(reply)
+        if status is None:
+            state.reply_lost(call.command)
+            raise NoAnswer(f"{who(state)}: it is not known whether '{request.text}' was stored; it was sent once")
+        control = call.command >= CONTROL and not ends
+        if status == Status.STORED or (status == Status.DONE and control):  # a module executes a control command
+            return
+        if status == Status.DONE or begins:
+            state.executes()
+            state.owes_nothing()
+        if status != Status.DONE:
+            raise self.refusal(request, reply)
+        if not ends:
+            raise Refused(
+                f"{who(state)} was not in download mode any more: '{request.text}' was executed and not stored"
+            )
 
 
 def motors(state: TmclState, priority: Priority = Priority.OPERATOR) -> Procedure[int]:
@@ -233,107 +238,124 @@ LACKS = (Status.INVALID_COMMAND, Status.WRONG_TYPE, Status.INVALID_VALUE)
 """The statuses of a module that does not know a command or a parameter."""
 
 
-def perform(state: TmclState, text: str) -> Procedure[tuple[str, ...]]:
-    """Send a command in TMCL's notation; the value where it prints one.
+class TmclOperations(OfDrive):
+    """What a TMCL module is asked to do, and what it says of its motion."""
 
-    Raises Refused, NoAnswer, Stopped or Inexpressible.
-    """
-    request, call = parsed(state, text)
-    if state.programming or call.command == Command.DOWNLOAD:
-        yield from store(state, request, call)
-        return ()
-    if call.command == Command.FACTORY or (
-        call.command in (Command.SAP, Command.RSAP) and call.type == Axis.RELATIVE_FROM
-    ):
-        state.relative_forgotten()
-    reply = yield from answered(state, request)
-    _remark(state, call)
-    return reply.lines if request.kind is Kind.PRINT else ()
+    state: TmclState
 
+    def perform(self, text: str) -> Procedure[tuple[str, ...]]:
+        """Send a command in TMCL's notation; the value where it prints one.
 
-def parsed(state: TmclState, text: str) -> tuple[Request, Call]:
-    """Build the request for a command. Raises Inexpressible for one that no module gets."""
-    try:
-        call = commands.parse(text)
-    except commands.LineError as error:
-        if state.address not in ("", *ADDRESSES):
-            number_of(state.address)  # in `@2GAP 1, 0` the address is what is wrong
-        raise Inexpressible(f"'{text.strip()}': {error}; nothing was sent") from None
-    return state.codec.request(state.address, text.strip(), call), call
+        Raises Refused, NoAnswer, Stopped or Inexpressible.
+        """
+        state = self.state
+        request, call = self.parsed(text)
+        if state.programming or call.command == Command.DOWNLOAD:
+            yield from TmclExchange(state).store(request, call)
+            return ()
+        if call.command == Command.FACTORY or (
+            call.command in (Command.SAP, Command.RSAP) and call.type == Axis.RELATIVE_FROM
+        ):
+            state.relative_forgotten()
+        reply = yield from TmclExchange(state).answered(request)
+        self._remark(call)
+        return reply.lines if request.kind is Kind.PRINT else ()
 
+    def check(self, text: str) -> None:
+        """Raise Inexpressible for a line that is wrong in the language."""
+        self.parsed(text)
 
-def store(state: TmclState, request: Request, call: Call, by_hand: bool = True) -> Procedure[None]:
-    """Begin a download, store a line, or end the download; nothing else may go to the module meanwhile."""
-    if not state.programming:
-        yield from synchronised(state, request)
-        state.found_storing()
-        if by_hand:
-            state.remark(f"{who(state)}: download mode: every command is stored until {END}, or a stop")
-    begins, ends = call.command == Command.DOWNLOAD, call.command == Command.END_DOWNLOAD
-    reply = yield replace(request, kind=Kind.PROGRAM)
-    status = status_of(reply)
-    if status is None:
-        state.reply_lost(call.command)
-        raise NoAnswer(f"{who(state)}: it is not known whether '{request.text}' was stored; it was sent once")
-    control = call.command >= CONTROL and not ends
-    if status == Status.STORED or (status == Status.DONE and control):  # a module executes a control command
-        return
-    if status == Status.DONE or begins:
-        state.executes()
-        state.owes_nothing()
-    if status != Status.DONE:
-        raise refusal(state, request, reply)
-    if not ends:
-        raise Refused(f"{who(state)} was not in download mode any more: '{request.text}' was executed and not stored")
-
-
-def motion(state: TmclState, priority: Priority) -> Procedure[tuple[Motion, ...]]:
-    found = []
-    count = yield from motors(state, priority)
-    for motor in range(count):
-        position = yield from read(state, Call(Command.GAP, Axis.ACTUAL_POSITION, motor), priority)
-        velocity = yield from read(state, Call(Command.GAP, Axis.ACTUAL_VELOCITY, motor), priority)
-        found.append(Motion(position, velocity, str(motor) if count > 1 else ""))
-    return tuple(found)
-
-
-def referencing(state: TmclState, text: str) -> Referencing | None:
-    if (call := commands.parsed(text)) is None:
-        return None
-    searches = call.command == Command.RFS and call.type == Search.START
-    if searches or (call.command == Command.SAP and call.type == Axis.ACTUAL_POSITION):
-        return Referencing(str(call.motor) if state.motors > 1 else "", searches)
-    return None
-
-
-def homed(state: TmclState) -> Procedure[bool]:
-    """A module shows no failure of a search: its end is all that is seen."""
-    yield from ()
-    return True
-
-
-def moving(state: TmclState) -> Procedure[bool]:
-    """Whether a motor has a velocity, or searches its reference."""
-    for motor in range((yield from motors(state))):
-        if (yield from read(state, Call(Command.GAP, Axis.ACTUAL_VELOCITY, motor))):
-            return True
+    def parsed(self, text: str) -> tuple[Request, Call]:
+        """Build the request for a command. Raises Inexpressible for one that no module gets."""
+        state = self.state
         try:
-            if (yield from read(state, Call(Command.RFS, Search.STATUS, motor))):
+            call = commands.parse(text)
+        except commands.LineError as error:
+            if state.address not in ("", *ADDRESSES):
+                number_of(state.address)  # in `@2GAP 1, 0` the address is what is wrong
+            raise Inexpressible(f"'{text.strip()}': {error}; nothing was sent") from None
+        return state.codec.request(state.address, text.strip(), call), call
+
+    def motion(self, priority: Priority) -> Procedure[tuple[Motion, ...]]:
+        state = self.state
+        found = []
+        count = yield from motors(state, priority)
+        for motor in range(count):
+            position = yield from read(state, Call(Command.GAP, Axis.ACTUAL_POSITION, motor), priority)
+            velocity = yield from read(state, Call(Command.GAP, Axis.ACTUAL_VELOCITY, motor), priority)
+            found.append(Motion(position, velocity, str(motor) if count > 1 else ""))
+        return tuple(found)
+
+    def moving(self) -> Procedure[bool]:
+        """Whether a motor has a velocity, or searches its reference."""
+        state = self.state
+        for motor in range((yield from motors(state))):
+            if (yield from read(state, Call(Command.GAP, Axis.ACTUAL_VELOCITY, motor))):
                 return True
-        except Refused:  # a module without reference search
-            pass
-    return False
+            try:
+                if (yield from read(state, Call(Command.RFS, Search.STATUS, motor))):
+                    return True
+            except Refused:  # a module without reference search
+                pass
+        return False
 
+    def busy(self, priority: Priority = Priority.OPERATOR) -> Procedure[bool]:
+        """Whether its program runs; a module that knows neither question has none."""
+        for call in (Call(Command.GGP, Global.PROGRAM_STATUS), PROGRAM):
+            try:
+                return mode_of((yield from read(self.state, call, priority))) == Running.RUNS
+            except Refused as refused:
+                if refused.code not in LACKS:
+                    raise
+        return False
 
-def busy(state: TmclState, priority: Priority = Priority.OPERATOR) -> Procedure[bool]:
-    """Whether its program runs; a module that knows neither question has none."""
-    for call in (Call(Command.GGP, Global.PROGRAM_STATUS), PROGRAM):
-        try:
-            return mode_of((yield from read(state, call, priority))) == Running.RUNS
-        except Refused as refused:
-            if refused.code not in LACKS:
-                raise
-    return False
+    def referencing(self, text: str) -> Referencing | None:
+        if (call := commands.parsed(text)) is None:
+            return None
+        searches = call.command == Command.RFS and call.type == Search.START
+        if searches or (call.command == Command.SAP and call.type == Axis.ACTUAL_POSITION):
+            return Referencing(str(call.motor) if self.state.motors > 1 else "", searches)
+        return None
+
+    def status(self) -> Procedure[tuple[str, ...]]:
+        state = self.state
+        lines = []
+        for motor in range((yield from motors(state))):
+            parts = []
+            for name, parameter in (
+                ("position", Axis.ACTUAL_POSITION),
+                ("target", Axis.TARGET_POSITION),
+                ("velocity", Axis.ACTUAL_VELOCITY),
+            ):
+                parts.append(f"{name} {(yield from read(state, Call(Command.GAP, parameter, motor)))}")
+            for name, parameter in (
+                ("left", Axis.LEFT_SWITCH),
+                ("right", Axis.RIGHT_SWITCH),
+                ("home", Axis.HOME_SWITCH),
+            ):
+                try:
+                    closed = yield from read(state, Call(Command.GAP, parameter, motor))
+                except Refused:  # not every module has each switch
+                    continue
+                parts.append(f"{name} switch {'on' if closed else 'off'}")
+            lines.append(f"motor {motor}: {', '.join(parts)}")
+        return tuple(lines)
+
+    def _remark(self, call: Call) -> None:
+        """Tell a person that the module is reached in another way from now on; follow it to its new address."""
+        state = self.state
+        if call.command == Command.SAP and call.type == Axis.RELATIVE_FROM:
+            state.relative_read(call.motor, call.value)
+        if call.command == Command.FACTORY:
+            state.remark(
+                f"{who(state)}: factory settings; it may now have address 1 and 9600 baud: open the line again"
+            )
+        of_module = call.command == Command.SGP and call.motor == 0  # in bank 2 the same numbers are user variables
+        if of_module and call.type == Global.BAUD:
+            state.remark(f"{who(state)}: its baud code is {call.value} from now on: open the line again with it")
+        if of_module and call.type == Global.ADDRESS:
+            state.remark(f"{who(state)}: its address is {call.value} from now on: type @{call.value}")
+            state.readdressed(call.value)
 
 
 def mode_of(value: int) -> int:
@@ -341,72 +363,9 @@ def mode_of(value: int) -> int:
     return value if value in tuple(Running) else value >> 24 & 0xFF
 
 
-def status(state: TmclState) -> Procedure[tuple[str, ...]]:
-    lines = []
-    for motor in range((yield from motors(state))):
-        parts = []
-        for name, parameter in (
-            ("position", Axis.ACTUAL_POSITION),
-            ("target", Axis.TARGET_POSITION),
-            ("velocity", Axis.ACTUAL_VELOCITY),
-        ):
-            parts.append(f"{name} {(yield from read(state, Call(Command.GAP, parameter, motor)))}")
-        for name, parameter in (("left", Axis.LEFT_SWITCH), ("right", Axis.RIGHT_SWITCH), ("home", Axis.HOME_SWITCH)):
-            try:
-                closed = yield from read(state, Call(Command.GAP, parameter, motor))
-            except Refused:  # not every module has each switch
-                continue
-            parts.append(f"{name} switch {'on' if closed else 'off'}")
-        lines.append(f"motor {motor}: {', '.join(parts)}")
-    return tuple(lines)
-
-
-def _remark(state: TmclState, call: Call) -> None:
-    """Tell a person that the module is reached in another way from now on; follow it to its new address."""
-    if call.command == Command.SAP and call.type == Axis.RELATIVE_FROM:
-        state.relative_read(call.motor, call.value)
-    if call.command == Command.FACTORY:
-        state.remark(f"{who(state)}: factory settings; it may now have address 1 and 9600 baud: open the line again")
-    of_module = call.command == Command.SGP and call.motor == 0  # in bank 2 the same numbers are user variables
-    if of_module and call.type == Global.BAUD:
-        state.remark(f"{who(state)}: its baud code is {call.value} from now on: open the line again with it")
-    if of_module and call.type == Global.ADDRESS:
-        state.remark(f"{who(state)}: its address is {call.value} from now on: type @{call.value}")
-        state.readdressed(call.value)
-
-
 TRIES = 2
 """The first request may complete an unfinished message in a module."""
 IDENTITY = Call(Command.VERSION, Version.BINARY)
-
-
-def identify(hints: Hints) -> Procedure[list[TmclState]]:
-    """The modules at the addresses of `hints.drives`; without any, those tried, or the one at the factory's address.
-
-    Raises NoAnswer where none replies, and Inexpressible for hints of other families.
-    """
-    if hints.checksum is not None or hints.em is not None or not hints.addressed:
-        raise Inexpressible("checksum=, em= and address=none are for other families: a module has none of them")
-    named = [name for name in hints.tried if name.isdecimal()]
-    names = tuple(dict.fromkeys(hints.drives or named)) or (FACTORY,)
-    for name in names:  # all, before the first is asked
-        number_of(name)
-    found = []
-    for name in names:
-        state = TmclState(Tmcl(), name)
-        state.named(name)
-        if any(each.name == name and not each.lines for each in hints.owed):
-            yield from _end_download(state, "the last session left it in download mode")
-        if not (yield from find(state)):
-            state.note(f"{who(state)} does not reply")
-        found.append(state)
-    count_line(found)
-    for state in found:
-        yield from repaired(state, hints.owed, partial(perform, state))
-    if not any(state.product for state in found):
-        tried = ", ".join(state.address for state in found)
-        raise NoAnswer(f"no module replies at {tried}; drives=1,2,... names others")
-    return found
 
 
 def count_line(states: list[TmclState]) -> None:
@@ -432,21 +391,21 @@ def find(state: TmclState) -> Procedure[bool]:
         state.identified("TMCL module", "")
     reply = yield state.codec.request(state.address, "135 0, 0, 0", PROGRAM)
     if reply.end is End.DONE and mode_of(int(reply.text)) == Running.STORES:
-        yield from _end_download(state, "found in download mode")
+        yield from end_download(state, "found in download mode")
     try:
         yield from motors(state)
         if state.programming:  # it stores what it is asked, and does not know that question
             state.executes()
             state.owes_nothing()
             state.motors_counted(0)
-            yield from _end_download(state, "found in download mode, where it stored one command more")
+            yield from end_download(state, "found in download mode, where it stored one command more")
             yield from motors(state)
     except NoAnswer as error:
         state.note(f"{who(state)}: its motors are not counted; a stop is for {MOST_MOTORS} ({error})")
     return True
 
 
-def _end_download(state: TmclState, why: str) -> Procedure[None]:
+def end_download(state: TmclState, why: str) -> Procedure[None]:
     yield state.codec.request(state.address, END, Call(Command.END_DOWNLOAD))
     state.note(f"{who(state)}: {why}; it was ended with 133: check the program in the module")
 

@@ -22,7 +22,12 @@ from multidrop.dialects.family import Printed, Programs, Progress
 from multidrop.dialects.program_files import Difference, Held, Stored, numbered
 from multidrop.dialects.state import who
 from multidrop.families.tmcl.host.codec import TmclState, call_of, line_in, parse_reply
-from multidrop.families.tmcl.host.operations import LACKS, answered, busy, moving, perform, read, store
+from multidrop.families.tmcl.host.operations import (
+    LACKS,
+    TmclExchange,
+    TmclOperations,
+    read,
+)
 from multidrop.families.tmcl.manual import program_file
 from multidrop.families.tmcl.manual.commands import Call, Command, Global, parameter
 from multidrop.families.tmcl.manual.instructions import EMPTY, MEMORY, Word, spelled
@@ -37,7 +42,7 @@ OVER = Call(EMPTY)
 def read_line(state: TmclState, at: int) -> Procedure[Call]:
     """Read one line of the memory. Raises Refused or NoAnswer."""
     request = state.codec.request(state.address, f"134 0, 0, {at}", Call(Command.READ_PROGRAM, value=at))
-    reply = yield from answered(state, request)
+    reply = yield from TmclExchange(state).answered(request)
     fields = parse_reply(reply.body)
     if fields is not None and (fields.module, fields.command) == (call_of(request.body)[0], Command.READ_PROGRAM):
         raise Refused(f"{who(state)} reads no line of its program to a host")
@@ -75,81 +80,7 @@ def calls_of(held: Held) -> dict[int, Call]:
     return {line.at: placed.call for line, placed in zip(held.lines, made.lines, strict=True)}
 
 
-def read_held(state: TmclState, lines: Sequence[SourceLine], progress: Progress) -> Procedure[Held]:
-    return held_of((yield from read_memory(state, len(program_file.compiled(lines)) if lines else -1, progress)))
-
-
-def listing(state: TmclState, start: str = "") -> Procedure[tuple[str, ...]]:
-    held = yield from read_held(state, (), lambda done, total: None)
-    first = whole(start, 0, MEMORY) or 0
-    return tuple(f"{line.at}  {line.text}" for line in held.lines if line.at >= first)
-
-
-def readable(held: Held) -> tuple[str, ...]:
-    """List each line with its address and, where a jump goes there, its label."""
-    calls = calls_of(held)
-    texts = [line for line in program_file.disassembled(calls) if not line.endswith(":")]
-    labels = {line.removesuffix(":") for line in program_file.disassembled(calls) if line.endswith(":")}
-    width = max((len(program_file.label_of(at)) + 2 for at in calls if program_file.label_of(at) in labels), default=0)
-    return tuple(
-        f"{at}  {f'{name}:' if (name := program_file.label_of(at)) in labels else '':{width}}{texts[at].strip()}"
-        for at in sorted(calls)
-    )
-
-
-def file_of(_: TmclState, held: Held, raw: bool) -> tuple[str, ...]:
-    """The lines of a file that gives this memory: with labels, or `raw` with addresses."""
-    calls = calls_of(held)
-    if not raw:
-        return tuple(program_file.disassembled(calls))
-    return tuple(spelled(calls.get(at, OVER)) for at in range(max(calls, default=-1) + 1))
-
-
 # Download
-
-
-def download(
-    state: TmclState, lines: Sequence[SourceLine], held: Held | None, progress: Progress
-) -> Procedure[Sequence[SourceLine]]:
-    """Store a program from address 0 on, and an empty line after it. Raises Refused or NoAnswer.
-
-    Ends download mode in every case. `held`: what was just read; its lines beyond the file stay.
-    """
-    stored = program_file.compiled(lines)
-    if state.programming:
-        raise Refused(f"{who(state)} is in download mode; 133 0, 0, 0 ends that (nothing was sent)")
-    if not stored:
-        return lines
-    if (yield from busy(state)):
-        raise Refused(f"{who(state)}: its program runs; 128 0, 0, 0 ends it (nothing was sent)")
-    sent = [(each.source, each.call) for each in stored] + [(0, OVER)] * (len(stored) < MEMORY)
-    done, fate = 0, "cut off"
-    try:
-        yield from store(state, *_line(state, Call(Command.DOWNLOAD)), by_hand=False)
-        for source, call in sent:
-            progress(done, len(stored))
-            try:
-                yield from store(state, *_line(state, call))
-            except DriveError as error:
-                error.args = (f"line {source}: {error}" if source else str(error),)
-                raise
-            done += bool(source)
-        yield from store(state, *_line(state, Call(Command.END_DOWNLOAD)))
-        fate = "done"
-    except DriveError as error:
-        fate = "cut off" if isinstance(error, Stopped) else "told"  # the caller of a stopped one may have gone
-        error.args = (f"{error}; {_incomplete(state, done, len(stored))}",)
-        raise
-    finally:
-        if fate == "cut off":
-            state.note(f"{who(state)}: the download was cut off: {_incomplete(state, done, len(stored))}")
-        if state.programming:
-            yield from _leave(state)
-    progress(len(stored), len(stored))
-    if rest := [line.at for line in held.lines if line.at > len(stored)] if held is not None else []:
-        count = counted(len(rest), "line")
-        state.remark(f"{who(state)}: {count} from address {rest[0]} on stay as they were: the file does not reach them")
-    return lines
 
 
 def _line(state: TmclState, call: Call) -> tuple[Any, Call]:
@@ -159,7 +90,7 @@ def _line(state: TmclState, call: Call) -> tuple[Any, Call]:
 def _leave(state: TmclState) -> Procedure[None]:
     """End a download that failed; a failure of this is noted, for the download's own is the one to raise."""
     try:
-        yield from store(state, *_line(state, Call(Command.END_DOWNLOAD)))
+        yield from TmclExchange(state).store(*_line(state, Call(Command.END_DOWNLOAD)))
     except DriveError as error:
         state.note(str(error))
 
@@ -170,49 +101,6 @@ def _incomplete(state: TmclState, done: int, total: int) -> str:
     return f"{done} of {total} lines are stored: the program in {who(state)} is incomplete"
 
 
-def end(state: TmclState) -> Procedure[bool]:
-    """End the program, and stop the motors that it has started; whether it ran.
-
-    Raises Refused where a motor moves without a program.
-    """
-    runs = yield from busy(state)
-    moves = yield from moving(state)
-    if not runs and moves:
-        raise Refused(f"{who(state)} moves: stop it first (nothing was sent)")
-    if runs:
-        yield from perform(state, "128 0, 0, 0")
-        for motor in range(max(state.motors, 1)):
-            yield from perform(state, f"MST {motor}")
-            with suppress(Refused):  # a module without reference search
-                yield from perform(state, f"RFS STOP, {motor}")
-    return runs
-
-
-def differences(
-    state: TmclState, lines: Sequence[SourceLine], held: Held, before: Held | None = None
-) -> tuple[Difference, ...]:
-    """Compare the lines of a file with the stored ones, and see that an empty line follows them."""
-    stored, there = program_file.compiled(lines), {line.at: line.text for line in held.lines}
-    found = [
-        Difference(each.source, text, each.at, there.get(each.at, spelled(OVER)))
-        for each in stored
-        if (text := spelled(each.call)) != there.get(each.at, spelled(OVER))
-    ]
-    if stored and (more := there.get(len(stored))) is not None:
-        found.append(Difference(0, "", len(stored), more))
-    return tuple(found)
-
-
-def start(lines: Sequence[SourceLine], label: str) -> str:
-    made = program_file.assembled(lines)
-    address = made.labels.get(label.upper(), whole(label, 0, max(len(made.lines) - 1, 0)))
-    if address is None or address >= len(made.lines):
-        raise Diagnostic(
-            f"no label {label} in the file", "", f"labels: {', '.join(made.labels) or 'none; 0 is its first line'}"
-        )
-    return program_file.run_at(address)
-
-
 class TmclPrograms(Programs):
     """The program in a TMCL module."""
 
@@ -221,34 +109,123 @@ class TmclPrograms(Programs):
     remark = "//"
     keeper = "module"
 
-    def listing(self, place: str) -> Printed:
-        return listing(self.state, place)
+    def listing(self, place: str = "") -> Printed:
+        held = yield from self.read((), lambda done, total: None)
+        first = whole(place, 0, MEMORY) or 0
+        return tuple(f"{line.at}  {line.text}" for line in held.lines if line.at >= first)
 
     def readable(self, held: Held) -> Sequence[str]:
-        return readable(held)
+        """List each line with its address and, where a jump goes there, its label."""
+        calls = calls_of(held)
+        texts = [line for line in program_file.disassembled(calls) if not line.endswith(":")]
+        labels = {line.removesuffix(":") for line in program_file.disassembled(calls) if line.endswith(":")}
+        width = max(
+            (len(program_file.label_of(at)) + 2 for at in calls if program_file.label_of(at) in labels), default=0
+        )
+        return tuple(
+            f"{at}  {f'{name}:' if (name := program_file.label_of(at)) in labels else '':{width}}{texts[at].strip()}"
+            for at in sorted(calls)
+        )
 
     def read(self, lines: Sequence[SourceLine], progress: Progress) -> Procedure[Held]:
-        return read_held(self.state, lines, progress)
+        return held_of(
+            (yield from read_memory(self.state, len(program_file.compiled(lines)) if lines else -1, progress))
+        )
 
     def file(self, held: Held, raw: bool) -> Sequence[str]:
-        return file_of(self.state, held, raw)
+        """The lines of a file that gives this memory: with labels, or `raw` with addresses."""
+        calls = calls_of(held)
+        if not raw:
+            return tuple(program_file.disassembled(calls))
+        return tuple(spelled(calls.get(at, OVER)) for at in range(max(calls, default=-1) + 1))
 
     def size(self, lines: Sequence[SourceLine]) -> int:
         return len(program_file.compiled(lines))
 
     def end(self) -> Procedure[bool]:
-        return end(self.state)
+        """End the program, and stop the motors that it has started; whether it ran.
+
+        Raises Refused where a motor moves without a program.
+        """
+        state = self.state
+        runs = yield from TmclOperations(state).busy()
+        moves = yield from TmclOperations(state).moving()
+        if not runs and moves:
+            raise Refused(f"{who(state)} moves: stop it first (nothing was sent)")
+        if runs:
+            yield from TmclOperations(state).perform("128 0, 0, 0")
+            for motor in range(max(state.motors, 1)):
+                yield from TmclOperations(state).perform(f"MST {motor}")
+                with suppress(Refused):  # a module without reference search
+                    yield from TmclOperations(state).perform(f"RFS STOP, {motor}")
+        return runs
 
     def download(
         self, lines: Sequence[SourceLine], held: Held | None, progress: Progress
     ) -> Procedure[Sequence[SourceLine]]:
-        return download(self.state, lines, held, progress)
+        """Store a program from address 0 on, and an empty line after it. Raises Refused or NoAnswer.
 
-    def differences(self, lines: Sequence[SourceLine], held: Held, before: Held | None) -> Sequence[Difference]:
-        return differences(self.state, lines, held, before)
+        Ends download mode in every case. `held`: what was just read; its lines beyond the file stay.
+        """
+        state = self.state
+        stored = program_file.compiled(lines)
+        if state.programming:
+            raise Refused(f"{who(state)} is in download mode; 133 0, 0, 0 ends that (nothing was sent)")
+        if not stored:
+            return lines
+        if (yield from TmclOperations(state).busy()):
+            raise Refused(f"{who(state)}: its program runs; 128 0, 0, 0 ends it (nothing was sent)")
+        sent = [(each.source, each.call) for each in stored] + [(0, OVER)] * (len(stored) < MEMORY)
+        done, fate = 0, "cut off"
+        try:
+            yield from TmclExchange(state).store(*_line(state, Call(Command.DOWNLOAD)), by_hand=False)
+            for source, call in sent:
+                progress(done, len(stored))
+                try:
+                    yield from TmclExchange(state).store(*_line(state, call))
+                except DriveError as error:
+                    error.args = (f"line {source}: {error}" if source else str(error),)
+                    raise
+                done += bool(source)
+            yield from TmclExchange(state).store(*_line(state, Call(Command.END_DOWNLOAD)))
+            fate = "done"
+        except DriveError as error:
+            fate = "cut off" if isinstance(error, Stopped) else "told"  # the caller of a stopped one may have gone
+            error.args = (f"{error}; {_incomplete(state, done, len(stored))}",)
+            raise
+        finally:
+            if fate == "cut off":
+                state.note(f"{who(state)}: the download was cut off: {_incomplete(state, done, len(stored))}")
+            if state.programming:
+                yield from _leave(state)
+        progress(len(stored), len(stored))
+        if rest := [line.at for line in held.lines if line.at > len(stored)] if held is not None else []:
+            count = counted(len(rest), "line")
+            state.remark(
+                f"{who(state)}: {count} from address {rest[0]} on stay as they were: the file does not reach them"
+            )
+        return lines
+
+    def differences(self, lines: Sequence[SourceLine], held: Held, before: Held | None = None) -> Sequence[Difference]:
+        """Compare the lines of a file with the stored ones, and see that an empty line follows them."""
+        stored, there = program_file.compiled(lines), {line.at: line.text for line in held.lines}
+        found = [
+            Difference(each.source, text, each.at, there.get(each.at, spelled(OVER)))
+            for each in stored
+            if (text := spelled(each.call)) != there.get(each.at, spelled(OVER))
+        ]
+        if stored and (more := there.get(len(stored))) is not None:
+            found.append(Difference(0, "", len(stored), more))
+        return tuple(found)
 
     def start(self, lines: Sequence[SourceLine], label: str) -> str:
-        return start(lines, label)
+        made = program_file.assembled(lines)
+        address = made.labels.get(label.upper(), whole(label, 0, max(len(made.lines) - 1, 0)))
+        if address is None or address >= len(made.lines):
+            raise Diagnostic(
+                f"no label {label} in the file", "", f"labels: {', '.join(made.labels) or 'none; 0 is its first line'}"
+            )
+        return program_file.run_at(address)
 
     def annotated(self, text: str, held: Held) -> Sequence[str]:
         """The lines of a file, each with its address where it gives a line of the memory."""
@@ -284,22 +261,6 @@ def counter(state: TmclState) -> Procedure[int | None]:
         raise
 
 
-def step(state: TmclState, listed: Sequence[Stored]) -> Procedure[Stepped]:
-    """Execute the next line; a program that comes to STOP, or to its end, is over."""
-    at = yield from counter(state)
-    if at is None:
-        raise Inexpressible(f"{who(state)} {NO_PLACE}; nothing was sent")
-    row = next((each for each in listed if each.at == at), Stored(at, ""))
-    yield from perform(state, "130 0, 0, 0")
-    state.program_halted(bool(row.text) and row.text != Word.STOP.name)
-    return Stepped(row)
-
-
-def check_names(state: TmclState, names: Sequence[str]) -> None:
-    for name in names:
-        watched_call(name)
-
-
 def watched_call(name: str) -> Call:
     """The command that reads a watched name: `A`, `X`, a user variable `V5`, or an axis parameter `AP1`, `AP1/2`."""
     registers = {"A": 2, "X": 3}
@@ -322,7 +283,7 @@ class TmclDebugging(Debugging):
     no_break = NO_BREAK
 
     def listing(self) -> Procedure[tuple[Stored, ...]]:
-        return (yield from read_held(self.state, (), lambda done, total: None)).lines
+        return (yield from TmclPrograms(self.state).read((), lambda done, total: None)).lines
 
     def entry(self, rows: Sequence[Stored]) -> str:
         return "0"
@@ -336,46 +297,55 @@ class TmclDebugging(Debugging):
             raise Inexpressible(
                 f"{who(self.state)}: single step begins with line 0: no command sets another; nothing was sent"
             )
-        if (yield from busy(self.state)):
+        if (yield from TmclOperations(self.state).busy()):
             raise Refused(f"{who(self.state)}: its program runs already; not started; 128 0, 0, 0 ends it")
 
     def trace(self, place: str) -> Procedure[None]:
         self.state.program_halted(False)
-        yield from perform(self.state, program_file.run_at(address_of(place)))
+        yield from TmclOperations(self.state).perform(program_file.run_at(address_of(place)))
 
     def begin(self, place: str) -> Procedure[None]:
-        yield from perform(self.state, "131 0, 0, 0")
+        yield from TmclOperations(self.state).perform("131 0, 0, 0")
         self.state.program_halted(True)
 
     def waits(self, place: str, last: Stored | None) -> Procedure[None]:
-        if not self.state.halted or (yield from busy(self.state)):
+        if not self.state.halted or (yield from TmclOperations(self.state).busy()):
             raise Refused(f"{who(self.state)}: its program is not known to be halted; nothing was sent")
 
     def forget(self) -> None:
         self.state.program_halted(False)
 
     def step(self, rows: Sequence[Stored]) -> Procedure[Stepped]:
-        return step(self.state, rows)
+        """Execute the next line; a program that comes to STOP, or to its end, is over."""
+        state = self.state
+        at = yield from counter(state)
+        if at is None:
+            raise Inexpressible(f"{who(state)} {NO_PLACE}; nothing was sent")
+        row = next((each for each in rows if each.at == at), Stored(at, ""))
+        yield from TmclOperations(state).perform("130 0, 0, 0")
+        state.program_halted(bool(row.text) and row.text != Word.STOP.name)
+        return Stepped(row)
 
     def go_on(self, place: str) -> Procedure[None]:
         self.state.program_halted(False)
-        yield from perform(self.state, "129 0, 0, 0")
+        yield from TmclOperations(self.state).perform("129 0, 0, 0")
 
     def look(self, place: str) -> Procedure[Look]:
-        runs = yield from busy(self.state)
+        runs = yield from TmclOperations(self.state).busy()
         self.state.program_halted(self.state.halted and not runs)
         if not runs and not self.state.halted:
             return Look(False)
         return Look(True, self.state.halted, (yield from counter(self.state)))
 
     def break_now(self, place: str) -> Procedure[None]:
-        if not (yield from busy(self.state)):
+        if not (yield from TmclOperations(self.state).busy()):
             raise Refused(f"{who(self.state)}: its program does not run; nothing was sent")
-        yield from perform(self.state, "128 0, 0, 0")
+        yield from TmclOperations(self.state).perform("128 0, 0, 0")
         self.state.program_halted(True)
 
     def names(self, names: Sequence[str]) -> None:
-        check_names(self.state, names)
+        for name in names:
+            watched_call(name)
 
     def values(self, names: Sequence[str]) -> Procedure[Mapping[str, str]]:
         found = {}

@@ -91,28 +91,6 @@ class _Search:
         return bool(known and replies_in((yield from _heard(known, SLOWEST))))
 
 
-def search(reach: Reach, found: Found, step: Step) -> Procedure[Outcome]:
-    """Search for modules; report each as soon as it is identified, with the number of its motors."""
-    own, addresses = _Search(reach, found), _addresses(reach)
-    for begin in range(0, len(addresses), BLOCK):
-        block = addresses[begin : begin + BLOCK]
-        for address in block:
-            yield from own.ask(address)
-            step()
-        if len(addresses) == 1 or (yield from own.counted()):
-            continue
-        yield from _heard(FACTORY, RESYNC)
-        for address in block:
-            if address not in own.states:
-                yield from own.ask(address)
-        if own.states and not (yield from own.counted()):
-            own.remarks.append(f"the line loses bytes: modules at {block[0]} to {block[-1]} may have been missed")
-    if own.unread:
-        why = "is no module's reply: several may reply at once, or drives of another kind"
-        own.remarks.append(f"what came at {', '.join(own.unread)} {why}")
-    return Outcome(tuple(own.remarks))
-
-
 def _addresses(reach: Reach) -> Sequence[str]:
     return ALL if reach.everything and not reach.alone else ALL[:1]
 
@@ -121,16 +99,6 @@ def _heard(address: str, quiet: float) -> Procedure[bytes]:
     """Ask for the version; return what was received until it was quiet, or until the module's own reply."""
     asked = Tmcl().request(address, str(IDENTITY), IDENTITY)
     return (yield replace(asked, kind=Kind.QUIET, settle=quiet, timeout=quiet)).raw
-
-
-def stop(asked: Sequence[str]) -> Sequence[StopPiece]:
-    """MST for the first motor of each, twice: a module that lost a byte takes the first one for the rest of a message.
-
-    The whole stop of an absent module would take half a second.
-    """
-    frames = [frame_of(int(address), Call(Command.MST)) for address in asked]
-    pieces = [StopPiece(each, GAP) for each in frames]
-    return [*pieces, *(StopPiece(each, GAP if at else RESYNC) for at, each in enumerate(frames))]
 
 
 class TmclScan(Scan):
@@ -146,13 +114,37 @@ class TmclScan(Scan):
         return len(_addresses(reach))
 
     def search(self, reach: Reach, found: Found, step: Step) -> Procedure[Outcome]:
-        return search(reach, found, step)
+        """Search for modules; report each as soon as it is identified, with the number of its motors."""
+        own, addresses = _Search(reach, found), _addresses(reach)
+        for begin in range(0, len(addresses), BLOCK):
+            block = addresses[begin : begin + BLOCK]
+            for address in block:
+                yield from own.ask(address)
+                step()
+            if len(addresses) == 1 or (yield from own.counted()):
+                continue
+            yield from _heard(FACTORY, RESYNC)
+            for address in block:
+                if address not in own.states:
+                    yield from own.ask(address)
+            if own.states and not (yield from own.counted()):
+                own.remarks.append(f"the line loses bytes: modules at {block[0]} to {block[-1]} may have been missed")
+        if own.unread:
+            why = "is no module's reply: several may reply at once, or drives of another kind"
+            own.remarks.append(f"what came at {', '.join(own.unread)} {why}")
+        return Outcome(tuple(own.remarks))
 
     def asked(self, reach: Reach) -> str:
         return "addresses 1 to 255" if len(_addresses(reach)) > 1 else "address 1 only (--all: each address)"
 
     def stop(self, asked: Sequence[str]) -> Sequence[StopPiece]:
-        return stop(asked)
+        """MST for the first motor of each, twice: a module that lost a byte takes the first for the rest of a message.
+
+        The whole stop of an absent module would take half a second.
+        """
+        frames = [frame_of(int(address), Call(Command.MST)) for address in asked]
+        pieces = [StopPiece(each, GAP) for each in frames]
+        return [*pieces, *(StopPiece(each, GAP if at else RESYNC) for at, each in enumerate(frames))]
 
 
 SCAN = TmclScan()

@@ -41,8 +41,8 @@ from multidrop.dialects.values import (
 )
 from multidrop.families.tmcl.host.codec import TmclState
 from multidrop.families.tmcl.host.motions import DRIVER_FAULTS
-from multidrop.families.tmcl.host.operations import busy, motors, moving, perform, read
-from multidrop.families.tmcl.host.programs import read_held
+from multidrop.families.tmcl.host.operations import TmclOperations, motors, read
+from multidrop.families.tmcl.host.programs import TmclPrograms
 from multidrop.families.tmcl.manual.commands import (
     STARTING_PARAMETERS,
     Axis,
@@ -152,10 +152,10 @@ class TmclParameters(ListedParameters):
         return _parts(name)[:2] == (False, Axis.MICROSTEPS)
 
     def ready(self) -> Procedure[str]:
-        return f"{who(self.state)} moves: stop it first" if (yield from moving(self.state)) else ""
+        return f"{who(self.state)} moves: stop it first" if (yield from TmclOperations(self.state).moving()) else ""
 
     def write(self, change: Change) -> Procedure[object]:
-        return perform(self.state, change.text)
+        return TmclOperations(self.state).perform(change.text)
 
     def save(self) -> Procedure[None]:
         """Store the axis parameters in EEPROM, one by one; a module may lack some."""
@@ -164,7 +164,7 @@ class TmclParameters(ListedParameters):
             if not name.startswith(GLOBAL_PREFIX):
                 call = _call(name, Command.GAP)
                 try:
-                    yield from perform(self.state, f"STAP {call.type}, {call.motor}")
+                    yield from TmclOperations(self.state).perform(f"STAP {call.type}, {call.motor}")
                 except Refused as refusal:
                     if refusal.code not in NOT_STORED:
                         raise
@@ -197,7 +197,7 @@ def _count(state: TmclState) -> Procedure[Facts]:
 
 
 def _program(state: TmclState) -> Procedure[Facts]:
-    return {RUNS: int((yield from busy(state, Priority.POLL)))}
+    return {RUNS: int((yield from TmclOperations(state).busy(Priority.POLL)))}
 
 
 def _parameters(state: TmclState, motor: int, wanted: Sequence[Axis]) -> Procedure[Facts]:
@@ -280,12 +280,12 @@ class TmclValues(Values):
     def snapshot(self, progress: Progress) -> Procedure[Snapshot]:
         readings = yield from TmclParameters(self.state).read(progress)
         remarks = []
-        if active := (yield from moving(self.state)):
+        if active := (yield from TmclOperations(self.state).moving()):
             remarks.append("moving while it was read: its position is one of that moment")
-        if runs := (yield from busy(self.state)):
+        if runs := (yield from TmclOperations(self.state).busy()):
             remarks.append("its program ran while it was read")
         try:
-            held = yield from read_held(self.state, (), lambda done, total: None)
+            held = yield from TmclPrograms(self.state).read((), lambda done, total: None)
         except Refused as refused:
             held = Held()
             remarks.append(f"its program was not read: {refused}")

@@ -11,7 +11,9 @@ import pytest
 
 from multidrop.base.errors import DriveError, Inexpressible, NoAnswer, Refused, Stopped
 from multidrop.drives.stopping import Fate
-from multidrop.families.lexium.host.mcode.debugging import traced
+from multidrop.families.lexium.host.mcode.codec import MCode
+from multidrop.families.lexium.host.mcode.debugging import MCodeDebugging
+from multidrop.families.lexium.host.mcode.state import MCodeState
 from multidrop.shell.events import FAILURES, By
 from multidrop.simulator.cell.spec import Faults
 from tests.support.cell_session import CellSession, bus
@@ -79,7 +81,10 @@ async def test_noise_never_steps_twice(tmp_path: Path, em: int, seed: int) -> No
             except NoAnswer:
                 outcomes = {0, 1}  # or a value after the line could not be read
             except FAILURES as failure:
-                told, outcomes = failure, {sum(traced(line) is not None for line in out(it))}
+                told, outcomes = (
+                    failure,
+                    {sum(MCodeDebugging(MCodeState(MCode())).traced(line) is not None for line in out(it))},
+                )
             assert taken.executed - before in outcomes, told
             assert len(taken.keys) - pressed <= 1 and "\r" not in taken.keys[pressed:]
             if outcomes != {1}:

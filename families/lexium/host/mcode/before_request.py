@@ -14,7 +14,8 @@ from multidrop.base.errors import Inexpressible, NoAnswer
 from multidrop.dialects.codec import End, Kind, Procedure, Request
 from multidrop.dialects.exchange import limited, unanswered
 from multidrop.dialects.state import who
-from multidrop.families.lexium.host.mcode import classify
+from multidrop.families.lexium.host import classify
+from multidrop.families.lexium.host.errors import earlier_error
 from multidrop.families.lexium.host.mcode.codec import MCode
 from multidrop.families.lexium.host.mcode.exchange import (
     printed_value,
@@ -26,7 +27,7 @@ from multidrop.families.lexium.host.mcode.exchange import (
 )
 from multidrop.families.lexium.host.mcode.framing import NAK
 from multidrop.families.lexium.host.mcode.identity import activate_party, asked, find, find_in_text, look_in, pinged
-from multidrop.families.lexium.host.mcode.state import MCodeState, Place, earlier_error
+from multidrop.families.lexium.host.mcode.state import MCodeState, Place
 from multidrop.families.lexium.manual.mnemonic import ETHERNET
 
 T = TypeVar("T")

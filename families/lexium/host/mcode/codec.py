@@ -13,7 +13,8 @@ from typing import ClassVar
 
 from multidrop.base.errors import Inexpressible
 from multidrop.dialects.codec import Codec, Decoded, End, Kind, Reply, Request, Started, StopPiece
-from multidrop.families.lexium.host.mcode import classify, framing
+from multidrop.families.lexium.host import classify
+from multidrop.families.lexium.host.mcode import framing
 from multidrop.families.lexium.host.mcode.reply_parser import ENDLESS, ReplyLines, ReplyParser, divided
 from multidrop.families.lexium.manual.groups import SLOW
 from multidrop.families.lexium.manual.program_file import LONGEST, commented, spaced, unsendable

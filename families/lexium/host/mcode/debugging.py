@@ -23,7 +23,7 @@ from multidrop.dialects.state import who
 from multidrop.families.lexium.host.mcode.codec import MCode
 from multidrop.families.lexium.host.mcode.exchange import printed_value
 from multidrop.families.lexium.host.mcode.framing import printable
-from multidrop.families.lexium.host.mcode.operations import flag, listing, perform
+from multidrop.families.lexium.host.mcode.operations import MCodeOperations
 from multidrop.families.lexium.host.mcode.state import MCodeState
 from multidrop.families.lexium.manual.grammar import Name, Number, parsed
 from multidrop.families.lexium.manual.mnemonic import MDRIVE_PLUS
@@ -100,68 +100,12 @@ FIRST = "1"
 BEGIN = "/step LABEL begins single step, /break now breaks a program that runs"
 
 
-def rows(state: MCodeState) -> Procedure[tuple[Stored, ...]]:
-    """Read the program in the drive. LK is read first: a refusal would run an OE subroutine."""
-    if (yield from flag(state, "LK")):
-        raise Refused(f"{who(state)}: its program is locked (LK=1), so it is neither listed, traced nor stepped")
-    lines = yield from listing(state, "")
-    found = [each for line in lines if (each := _LISTED.fullmatch(line))]
-    return tuple(Stored(int(each[1]), each[2]) for each in found)
-
-
-def entry(program: Sequence[Stored]) -> str:
-    """Return SU where the program has it, else the first address."""
-    return "SU" if _places(program).get("SU") else FIRST
-
-
-def address_of(program: Sequence[Stored], place: str) -> int | None:
-    """Return the address of the first line at a place that is not a label."""
-    return _code_at(program, _places(program).get(place.upper(), -1))
-
-
-def traced(line: str) -> Stored | None:
-    """Return the executed line that a printed line shows."""
-    found = TRACED.fullmatch(line)
-    return Stored(int(found[1]), found[2]) if found else None
-
-
 # Starting
-
-
-def idle(state: MCodeState, place: str, neighbours: Neighbours | None) -> Procedure[None]:
-    """Raise Refused while a program runs, which EX would leave where it is.
-
-    A traced line begins with its address. On a party line a drive whose name is a digit may take it for a command.
-    """
-    _checked(place)
-    if neighbours is None:
-        _check_keys(state)
-    runs = yield from flag(state, "BY")  # which may find other settings
-    if neighbours is None:
-        _check_keys(state)
-    elif state.codec.party and (digits := [each for each in neighbours if each.isdigit()]):
-        raise Refused(
-            f"{who(state)}: a traced line begins with a number, and drive {digits[0]} on this line may take it for a "
-            "command; not started"
-        )
-    if runs:
-        raise Refused(f"{who(state)}: a program runs already; not started; E ends it")
-
-
-def trace(state: MCodeState, place: str) -> Procedure[None]:
-    yield from perform(state, f"EX {_checked(place)},1")
-
-
-def begin(state: MCodeState, place: str) -> Procedure[None]:
-    """Start a program in EX mode 2. With a break point it would run up to that unseen, so that is removed."""
-    yield from perform(state, "BP=0")
-    yield from perform(state, f"EX {_checked(place)},2")
-    yield from _waits_now(state)
 
 
 def _waits_now(state: MCodeState) -> Procedure[None]:
     """Record that the drive waits for a key, after a line that leads there was accepted."""
-    if not (yield from flag(state, "BY")):
+    if not (yield from MCodeOperations(state).flag("BY")):
         raise Refused(f"{who(state)}: no program runs; there is nothing to step through")
     state.steps()
 
@@ -185,17 +129,6 @@ def _check_keys(state: MCodeState) -> None:
 # Keys
 
 
-def waits(state: MCodeState, place: str, last: Stored | None) -> Procedure[None]:
-    """Raise Refused unless it is known that the drive waits for a key now. `last`: an H may still hold for motion."""
-    _check_keys(state)
-    if state.stepping and not (yield from flag(state, "BY")):
-        state.steps(False)
-        raise Refused(f"{who(state)}: its program has ended; no key was sent; {BEGIN}")
-    _check_steps(state)
-    if last is not None and _holds_for_motion(last.text) and not (yield from _settled(state)):
-        raise Refused(f"{who(state)}: '{last.text}' waits for the end of the motion; no key was sent; step again later")
-
-
 def _check_steps(state: MCodeState) -> None:
     """Raise unless it is known that the drive waits, and a key can be sent."""
     _check_keys(state)
@@ -203,91 +136,7 @@ def _check_steps(state: MCodeState) -> None:
         raise Refused(f"{who(state)}: it is not known that it waits for a key, so none was sent; {BEGIN}")
 
 
-def step(state: MCodeState, program: Sequence[Stored]) -> Procedure[Stepped]:
-    """Press the space bar once; return the line that it executed. Raises NoAnswer where that is not known."""
-    _check_steps(state)
-    state.steps(False)
-    reply = yield key(state, SPACE)
-    if reply.end is End.REFUSED:
-        raise Refused(f"{who(state)} takes the space bar as text, so it does not step; nothing was executed")
-    row = traced(reply.text) if reply.end is End.DONE and not reply.doubtful else None
-    if row is None or (program and row not in program):
-        state.reply_lost()
-        why = "may be a late reply" if reply.doubtful else "is not a line of its program"
-        came = f"'{reply.text}' came, which {why}" if reply.text else "no line came"
-        raise NoAnswer(f"{who(state)}: {came}: it is not known whether it stepped; the key was sent once")
-    state.steps()
-    return Stepped(row, (yield from _hold(state, row.text)))
-
-
-def _hold(state: MCodeState, text: str) -> Procedure[float | None]:
-    """Seconds for which a line holds; a variable is read."""
-    if (seconds := hold(text)) is not None:
-        return seconds
-    statement = parsed(text)
-    argument = statement.arguments[0] if statement is not None else None
-    read = (yield from values(state, [argument.word])) if isinstance(argument, Name) else {}
-    figure = "".join(read.values())
-    return int(figure) / 1000 if figure.isdecimal() else None
-
-
-def go_on(state: MCodeState, place: str) -> Procedure[None]:
-    _check_steps(state)
-    state.steps(False)
-    yield key(state, ENTER)
-
-
 # Break points
-
-
-def break_at(state: MCodeState, place: str, passes: int) -> Procedure[None]:
-    """Set the break point. It is refused where no key could be sent to a program that waits there."""
-    _check_keys(state)
-    yield from perform(state, f"BP {_checked(place)},{passes}")
-
-
-def break_off(state: MCodeState) -> Procedure[None]:
-    yield from perform(state, "BP=0")
-
-
-def break_now(state: MCodeState, place: str = "") -> Procedure[None]:
-    """Have a running program wait for keys from here on."""
-    if state.product in MDRIVE_PLUS:
-        raise Inexpressible(f"{who(state)}: an {state.product} takes BP with a place only; nothing was sent")
-    _check_keys(state)
-    if not (yield from flag(state, "BY")):
-        raise Refused(f"{who(state)}: no program runs; nothing was sent")
-    _check_keys(state)
-    yield from perform(state, "BP")
-    yield from _waits_now(state)
-
-
-def broken(state: MCodeState, program: Sequence[Stored], last: Stored, place: str) -> Procedure[int | None]:
-    """Whether the drive waits at the break point, where the trace was quiet longer than `last` holds its program."""
-    if not may_follow(program, last, place):
-        return None
-    if not (yield from flag(state, "BY")):
-        return None
-    if _holds_for_motion(last.text) and not (yield from _settled(state)):
-        return None
-    state.steps()
-    return address_of(program, place)
-
-
-def may_follow(program: Sequence[Stored], last: Stored, place: str) -> bool:
-    """Whether the line at `place` can be the next one after `last`."""
-    wanted = address_of(program, place)
-    statement = parsed(last.text)
-    if wanted is None or statement is None or statement.word in ("E", "LK"):  # a lock ends the trace
-        return False
-    if statement.word == "RT":  # a trip's may return to a hold
-        return not any(_is(row.text, "H") for row in program)
-    following = [_code_at(program, last.at + 1)]
-    if statement.word in JUMPS and statement.arguments:
-        target = statement.arguments[0]
-        name = str(int(target.value)) if isinstance(target, Number) else getattr(target, "word", "")
-        following.append(address_of(program, name))
-    return wanted in following
 
 
 def _places(program: Sequence[Stored]) -> Mapping[str, int]:
@@ -314,15 +163,6 @@ def _is(text: str, word: str) -> bool:
     return statement is not None and statement.word == word
 
 
-def hold(text: str) -> float | None:
-    """Seconds for which a line holds its program; 0 where it holds for motion or not at all."""
-    statement = parsed(text)
-    if statement is None or statement.word != "H" or not statement.arguments:
-        return 0.0
-    argument = statement.arguments[0]
-    return float(argument.value) / 1000 if isinstance(argument, Number) else None
-
-
 def _settled(state: MCodeState) -> Procedure[bool]:
     """Whether an H for motion is over: it waits for MV=0, then MT; MP=0 comes later still (5.1.50)."""
     said = yield from printed_value(state, 'MV," ",MP," ",MT', r"[01] [01] \d{1,5}")
@@ -330,43 +170,7 @@ def _settled(state: MCodeState) -> Procedure[bool]:
     return moving == "0" and "0" in (positioning, settling)
 
 
-def _holds_for_motion(text: str) -> bool:
-    return _is(text, "H") and hold(text) == 0
-
-
 # What is read
-
-
-def look(state: MCodeState, place: str = "") -> Procedure[Look]:
-    """Read whether a program runs; an MCode drive does not report where."""
-    runs = yield from flag(state, "BY")
-    if not runs:
-        state.steps(False)
-    return Look(runs, state.stepping)
-
-
-def check_names(state: MCodeState, names: Sequence[str]) -> None:
-    """Check names to watch: a word that prints one value and clears nothing, or the form of a user's name."""
-    for name in names:
-        row = lookup(name.upper(), state.product)
-        readable = row is not None and row.kind in ("variable", "flag") and row.access in ("RW", "RO") and not row.lines
-        if not (readable or (row is None and PLACE.fullmatch(name) and not name.isdigit())):
-            why = "reading it clears it" if row is not None and row.access == "RC" else "it prints no value"
-            raise Diagnostic(f"{name} cannot be watched: {why}", "", "valid: a variable, a flag, or a name with VA")
-
-
-def values(state: MCodeState, names: Sequence[str]) -> Procedure[Mapping[str, str]]:
-    """Read variables. User variables come from PR UV: to ask for one that is not there would be an error."""
-    found: dict[str, str] = {}
-    users = [name for name in names if lookup(name, state.product) is None]
-    listed = (yield from perform(state, "PR UV")) if users else ()
-    declared = {each[1].upper(): each[2] for line in listed if (each := _USER.fullmatch(line))}
-    for name in names:
-        if name in users:
-            found.update({name: declared[name]} if name in declared else {})
-        else:
-            found[name] = " ".join((yield from perform(state, f"PR {name}")))
-    return found
 
 
 class MCodeDebugging(Debugging):
@@ -375,58 +179,193 @@ class MCodeDebugging(Debugging):
     state: MCodeState
 
     def listing(self) -> Procedure[tuple[Stored, ...]]:
-        return rows(self.state)
+        """Read the program in the drive. LK is read first: a refusal would run an OE subroutine."""
+        state = self.state
+        if (yield from MCodeOperations(state).flag("LK")):
+            raise Refused(f"{who(state)}: its program is locked (LK=1), so it is neither listed, traced nor stepped")
+        lines = yield from MCodeOperations(state).listing("")
+        found = [each for line in lines if (each := _LISTED.fullmatch(line))]
+        return tuple(Stored(int(each[1]), each[2]) for each in found)
 
     def entry(self, rows: Sequence[Stored]) -> str:
-        return entry(rows)
+        """Return SU where the program has it, else the first address."""
+        return "SU" if _places(rows).get("SU") else FIRST
 
     def address(self, rows: Sequence[Stored], place: str) -> int | None:
-        return address_of(rows, place)
+        """Return the address of the first line at a place that is not a label."""
+        return _code_at(rows, _places(rows).get(place.upper(), -1))
 
     def idle(self, place: str, neighbours: Neighbours | None) -> Procedure[None]:
-        return idle(self.state, place, neighbours)
+        """Raise Refused while a program runs, which EX would leave where it is.
+
+        A traced line begins with its address. On a party line a drive whose name is a digit may take it for a command.
+        """
+        state = self.state
+        _checked(place)
+        if neighbours is None:
+            _check_keys(state)
+        runs = yield from MCodeOperations(state).flag("BY")  # which may find other settings
+        if neighbours is None:
+            _check_keys(state)
+        elif state.codec.party and (digits := [each for each in neighbours if each.isdigit()]):
+            raise Refused(
+                f"{who(state)}: a traced line begins with a number, and drive {digits[0]} on this line may take it for "
+                "a command; not started"
+            )
+        if runs:
+            raise Refused(f"{who(state)}: a program runs already; not started; E ends it")
 
     def trace(self, place: str) -> Procedure[None]:
-        return trace(self.state, place)
+        yield from MCodeOperations(self.state).perform(f"EX {_checked(place)},1")
 
     def begin(self, place: str) -> Procedure[None]:
-        return begin(self.state, place)
+        """Start a program in EX mode 2. With a break point it would run up to that unseen, so that is removed."""
+        state = self.state
+        yield from MCodeOperations(state).perform("BP=0")
+        yield from MCodeOperations(state).perform(f"EX {_checked(place)},2")
+        yield from _waits_now(state)
 
     def waits(self, place: str, last: Stored | None) -> Procedure[None]:
-        return waits(self.state, place, last)
+        """Raise Refused unless the drive is known to wait for a key now. `last`: an H may still hold for motion."""
+        state = self.state
+        _check_keys(state)
+        if state.stepping and not (yield from MCodeOperations(state).flag("BY")):
+            state.steps(False)
+            raise Refused(f"{who(state)}: its program has ended; no key was sent; {BEGIN}")
+        _check_steps(state)
+        if last is not None and self._holds_for_motion(last.text) and not (yield from _settled(state)):
+            raise Refused(
+                f"{who(state)}: '{last.text}' waits for the end of the motion; no key was sent; step again later"
+            )
 
     def forget(self) -> None:
         self.state.steps(False)
 
     def step(self, rows: Sequence[Stored]) -> Procedure[Stepped]:
-        return step(self.state, rows)
+        """Press the space bar once; return the line that it executed. Raises NoAnswer where that is not known."""
+        state = self.state
+        _check_steps(state)
+        state.steps(False)
+        reply = yield key(state, SPACE)
+        if reply.end is End.REFUSED:
+            raise Refused(f"{who(state)} takes the space bar as text, so it does not step; nothing was executed")
+        row = self.traced(reply.text) if reply.end is End.DONE and not reply.doubtful else None
+        if row is None or (rows and row not in rows):
+            state.reply_lost()
+            why = "may be a late reply" if reply.doubtful else "is not a line of its program"
+            came = f"'{reply.text}' came, which {why}" if reply.text else "no line came"
+            raise NoAnswer(f"{who(state)}: {came}: it is not known whether it stepped; the key was sent once")
+        state.steps()
+        return Stepped(row, (yield from self._hold(row.text)))
 
     def go_on(self, place: str) -> Procedure[None]:
-        return go_on(self.state, place)
+        state = self.state
+        _check_steps(state)
+        state.steps(False)
+        yield key(state, ENTER)
 
-    def look(self, place: str) -> Procedure[Look]:
-        return look(self.state, place)
+    def look(self, place: str = "") -> Procedure[Look]:
+        """Read whether a program runs; an MCode drive does not report where."""
+        state = self.state
+        runs = yield from MCodeOperations(state).flag("BY")
+        if not runs:
+            state.steps(False)
+        return Look(runs, state.stepping)
 
     def break_at(self, place: str, passes: int) -> Procedure[None]:
-        return break_at(self.state, place, passes)
+        """Set the break point. It is refused where no key could be sent to a program that waits there."""
+        _check_keys(self.state)
+        yield from MCodeOperations(self.state).perform(f"BP {_checked(place)},{passes}")
 
     def break_off(self) -> Procedure[None]:
-        return break_off(self.state)
+        yield from MCodeOperations(self.state).perform("BP=0")
 
-    def break_now(self, place: str) -> Procedure[None]:
-        return break_now(self.state, place)
+    def break_now(self, place: str = "") -> Procedure[None]:
+        """Have a running program wait for keys from here on."""
+        state = self.state
+        if state.product in MDRIVE_PLUS:
+            raise Inexpressible(f"{who(state)}: an {state.product} takes BP with a place only; nothing was sent")
+        _check_keys(state)
+        if not (yield from MCodeOperations(state).flag("BY")):
+            raise Refused(f"{who(state)}: no program runs; nothing was sent")
+        _check_keys(state)
+        yield from MCodeOperations(state).perform("BP")
+        yield from _waits_now(state)
 
     def broken(self, rows: Sequence[Stored], last: Stored, place: str) -> Procedure[int | None]:
-        return broken(self.state, rows, last, place)
+        """Whether the drive waits at the break point: the trace was quiet longer than `last` holds its program."""
+        state = self.state
+        if not self.may_follow(rows, last, place):
+            return None
+        if not (yield from MCodeOperations(state).flag("BY")):
+            return None
+        if self._holds_for_motion(last.text) and not (yield from _settled(state)):
+            return None
+        state.steps()
+        return self.address(rows, place)
 
     def hold(self, text: str) -> float | None:
-        return hold(text)
+        """Seconds for which a line holds its program; 0 where it holds for motion or not at all."""
+        statement = parsed(text)
+        if statement is None or statement.word != "H" or not statement.arguments:
+            return 0.0
+        argument = statement.arguments[0]
+        return float(argument.value) / 1000 if isinstance(argument, Number) else None
 
     def names(self, names: Sequence[str]) -> None:
-        check_names(self.state, names)
+        """Check names to watch: a word that prints one value and clears nothing, or the form of a user's name."""
+        for name in names:
+            row = lookup(name.upper(), self.state.product)
+            readable = (
+                row is not None and row.kind in ("variable", "flag") and row.access in ("RW", "RO") and not row.lines
+            )
+            if not (readable or (row is None and PLACE.fullmatch(name) and not name.isdigit())):
+                why = "reading it clears it" if row is not None and row.access == "RC" else "it prints no value"
+                raise Diagnostic(f"{name} cannot be watched: {why}", "", "valid: a variable, a flag, or a name with VA")
 
     def values(self, names: Sequence[str]) -> Procedure[Mapping[str, str]]:
-        return values(self.state, names)
+        """Read variables. User variables come from PR UV: to ask for one that is not there would be an error."""
+        state = self.state
+        found: dict[str, str] = {}
+        users = [name for name in names if lookup(name, state.product) is None]
+        listed = (yield from MCodeOperations(state).perform("PR UV")) if users else ()
+        declared = {each[1].upper(): each[2] for line in listed if (each := _USER.fullmatch(line))}
+        for name in names:
+            if name in users:
+                found.update({name: declared[name]} if name in declared else {})
+            else:
+                found[name] = " ".join((yield from MCodeOperations(state).perform(f"PR {name}")))
+        return found
 
     def traced(self, line: str) -> Stored | None:
-        return traced(line)
+        """Return the executed line that a printed line shows."""
+        found = TRACED.fullmatch(line)
+        return Stored(int(found[1]), found[2]) if found else None
+
+    def _hold(self, text: str) -> Procedure[float | None]:
+        """Seconds for which a line holds; a variable is read."""
+        if (seconds := self.hold(text)) is not None:
+            return seconds
+        statement = parsed(text)
+        argument = statement.arguments[0] if statement is not None else None
+        read = (yield from self.values([argument.word])) if isinstance(argument, Name) else {}
+        figure = "".join(read.values())
+        return int(figure) / 1000 if figure.isdecimal() else None
+
+    def may_follow(self, program: Sequence[Stored], last: Stored, place: str) -> bool:
+        """Whether the line at `place` can be the next one after `last`."""
+        wanted = self.address(program, place)
+        statement = parsed(last.text)
+        if wanted is None or statement is None or statement.word in ("E", "LK"):  # a lock ends the trace
+            return False
+        if statement.word == "RT":  # a trip's may return to a hold
+            return not any(_is(row.text, "H") for row in program)
+        following = [_code_at(program, last.at + 1)]
+        if statement.word in JUMPS and statement.arguments:
+            target = statement.arguments[0]
+            name = str(int(target.value)) if isinstance(target, Number) else getattr(target, "word", "")
+            following.append(self.address(program, name))
+        return wanted in following
+
+    def _holds_for_motion(self, text: str) -> bool:
+        return _is(text, "H") and self.hold(text) == 0

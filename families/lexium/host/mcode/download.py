@@ -22,7 +22,8 @@ from multidrop.dialects.codec import End, Kind, Procedure, Request
 from multidrop.dialects.family import Progress
 from multidrop.dialects.program_files import LOCKED, Held
 from multidrop.dialects.state import who
-from multidrop.families.lexium.host.mcode import classify
+from multidrop.families.lexium.host import classify
+from multidrop.families.lexium.host.errors import described
 from multidrop.families.lexium.host.mcode.before_request import before_request
 from multidrop.families.lexium.host.mcode.exchange import (
     REPEATS,
@@ -31,7 +32,12 @@ from multidrop.families.lexium.host.mcode.exchange import (
     read_error,
     take_out,
 )
-from multidrop.families.lexium.host.mcode.operations import echo_everything, immediate, put_back, restore_echo
+from multidrop.families.lexium.host.mcode.operations import (
+    MCodeOperations,
+    echo_everything,
+    put_back,
+    restore_echo,
+)
 from multidrop.families.lexium.host.mcode.program_readout import (
     GLOBAL,
     LABEL,
@@ -45,7 +51,7 @@ from multidrop.families.lexium.host.mcode.program_readout import (
     read,
     size,
 )
-from multidrop.families.lexium.host.mcode.state import MCodeState, described
+from multidrop.families.lexium.host.mcode.state import MCodeState
 from multidrop.families.lexium.manual.groups import SLOW
 from multidrop.families.lexium.manual.program_checker import slips
 from multidrop.families.lexium.manual.program_file import ProgramLine
@@ -81,7 +87,7 @@ def prepare(state: MCodeState, lines: Sequence[SourceLine], held: Held) -> Proce
     variables = [name for name, called in names.items() if called.kind == GLOBAL]
     for slip in slips([line for line in lines if isinstance(line, ProgramLine)], variables):
         raise Refused(f"line {slip.line}: {slip.what} (nothing was sent)")
-    yield from immediate(state, state.codec.request(state.address, "CP"))
+    yield from MCodeOperations(state).immediate(state.codec.request(state.address, "CP"))
     state.note(f"{who(state)}: {_cleared(made, [name for name in names if names[name].kind == LABEL], lines)}")
     again: list[ProgramLine] = []  # the programs that stay, each line at its address
     for program in programs([line for each in made.kept for line in each.lines], state.product, fine=True):
@@ -296,7 +302,7 @@ def _one(state: MCodeState, line: SourceLine, memory: _Memory) -> Procedure[None
             raise NoAnswer(f"{who(state)}: no reply to '{request.text}' ({reply.end.value})")
         state.entered_program_mode(int(reply.prompt))
     else:
-        yield from immediate(state, request)
+        yield from MCodeOperations(state).immediate(request)
 
 
 def _needs_own_echo(text: str) -> bool:

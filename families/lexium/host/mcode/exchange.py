@@ -11,10 +11,11 @@ from multidrop.base.errors import DriveError, Inexpressible, NoAnswer, Refused, 
 from multidrop.dialects.codec import End, Kind, Priority, Procedure, Reply, Request
 from multidrop.dialects.exchange import unanswered
 from multidrop.dialects.state import who
-from multidrop.families.lexium.host.mcode import classify
-from multidrop.families.lexium.host.mcode.classify import INTEGER, NOTHING
+from multidrop.families.lexium.host import classify
+from multidrop.families.lexium.host.classify import INTEGER, NOTHING
+from multidrop.families.lexium.host.errors import described
 from multidrop.families.lexium.host.mcode.framing import ACK, UNPRINTED
-from multidrop.families.lexium.host.mcode.state import MCodeState, described
+from multidrop.families.lexium.host.mcode.state import MCodeState
 from multidrop.families.lexium.manual import errors
 from multidrop.families.lexium.manual.errors import ErrorNumber
 

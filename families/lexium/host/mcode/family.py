@@ -4,34 +4,35 @@ from __future__ import annotations
 
 from typing import ClassVar
 
+from multidrop.base.errors import Inexpressible
 from multidrop.dialects.certifying import Certifying
-from multidrop.dialects.codec import Codec, Priority, Procedure
+from multidrop.dialects.codec import Codec, Procedure
 from multidrop.dialects.debugging import Debugging
-from multidrop.dialects.family import Guard, Hints, Language, Motion, Printed, Programs, Referencing
+from multidrop.dialects.family import Guard, Hints, Language, Programs
 from multidrop.dialects.motions import Motions
 from multidrop.dialects.scanning import Scan
 from multidrop.dialects.state import DriveState, Remembered
 from multidrop.dialects.units import Units
 from multidrop.dialects.values import Values
+from multidrop.families.lexium.host import classify
 from multidrop.families.lexium.host.family import LexiumFamily
-from multidrop.families.lexium.host.mcode import classify, operations
-from multidrop.families.lexium.host.mcode.codec import STOP_BYTES, MCode
-from multidrop.families.lexium.host.mcode.identify import identify, remember
+from multidrop.families.lexium.host.mcode.codec import STOP_BYTES, TO_PARTY, MCode
+from multidrop.families.lexium.host.mcode.identify import (
+    IN_TEXT,
+    expected_places,
+    expected_state,
+    look_around,
+    wake,
+)
+from multidrop.families.lexium.host.mcode.identity import overflow, write_stop
+from multidrop.families.lexium.host.mcode.operations import MCodeOperations
 from multidrop.families.lexium.host.mcode.state import MCodeState
 from multidrop.families.lexium.manual import guards, help
 from multidrop.families.lexium.manual.guards import NAMES
+from multidrop.families.lexium.manual.statements import UNNAMED
 
 
-def guarded(state: MCodeState, text: str) -> Guard | None:
-    party, product, starts = state.codec.party, state.product, classify.starts_motion
-    return guards.find(text, address=state.address, party=party, product=product, starts=starts)
-
-
-def homed(state: MCodeState) -> Procedure[bool]:
-    return not (yield from operations.flag(state, "EF"))
-
-
-class MCodeFamily(LexiumFamily):
+class MCodeFamily(MCodeOperations, LexiumFamily):
     """A Lexium MDrive or MDrivePlus on a serial line, or over MCode/TCP."""
 
     state: MCodeState
@@ -51,44 +52,35 @@ class MCodeFamily(LexiumFamily):
 
     @classmethod
     def identify(cls, hints: Hints) -> Procedure[list[DriveState]]:
-        return [*(yield from identify(hints))]
+        """Find the drives on a line, in the order of `hints.drives`. Raises NoAnswer where no drive replies.
+
+        Raises Inexpressible, before anything is sent, for a name longer than one character: a drive would take the
+        second character for the beginning of a command.
+        """
+        for name in hints.drives:
+            if len(name) != 1:
+                raise Inexpressible(f"no drive name '{name}'; valid: one letter or digit each, as in drives=a,b")
+        if hints.lazy and not (hints.cut or hints.owed) and (expected := expected_places(hints)):
+            if expected[0].place.party:
+                yield from wake(TO_PARTY if expected[0].stated else IN_TEXT)
+            return [expected_state(each, hints) for each in expected]
+        if not hints.cut:
+            return [*(yield from look_around(hints))]
+        yield from overflow(hints.drives or (UNNAMED,))
+        found = yield from look_around(hints)
+        for state in found:  # their stops are known now, and an error's subroutine may have started since
+            yield from write_stop(state.codec.stop([state.address or state.name], sure=not state.settings_unknown))
+        return [*found]
 
     def guard(self, text: str) -> Guard | None:
-        return guarded(self.state, text)
-
-    def perform(self, text: str) -> Printed:
-        return operations.perform(self.state, text)
-
-    def check(self, text: str) -> None:
-        operations.check(self.state, text)
-
-    def motion(self, priority: Priority) -> Procedure[tuple[Motion, ...]]:
-        return operations.motion(self.state, priority)
-
-    def moving(self) -> Procedure[bool]:
-        return operations.flag(self.state, name="MV")
-
-    def busy(self) -> Procedure[bool]:
-        return operations.flag(self.state, name="BY")
-
-    def status(self) -> Printed:
-        return operations.status(self.state)
-
-    def referencing(self, text: str) -> Referencing | None:
-        return classify.referencing(self.state, text)
-
-    def homed(self) -> Procedure[bool]:
-        return homed(self.state)
+        state, starts = self.state, classify.starts_motion
+        return guards.find(text, address=state.address, party=state.codec.party, product=state.product, starts=starts)
 
     @property
     def programs(self) -> Programs:
         from multidrop.families.lexium.host.mcode.programs import MCodePrograms
 
         return MCodePrograms(self.state)
-
-    @classmethod
-    def vouched(cls, text: str, product: str) -> bool:
-        return classify.vouched(text, product)
 
     @classmethod
     def addressed(cls, text: str, product: str) -> tuple[str, str] | None:
@@ -101,7 +93,15 @@ class MCodeFamily(LexiumFamily):
         return MCodeDebugging(self.state)
 
     def remember(self) -> Remembered | None:
-        return remember(self.state)
+        """Return what the next use of the port may expect; None where the drive or its settings are not known."""
+        state = self.state
+        if state.unconfirmed is not None:
+            return state.unconfirmed.last
+        if not state.product or state.settings_unknown:
+            return None
+        mode = state.codec
+        identity = (state.name, state.product, state.version, state.part, state.serial)
+        return Remembered(state.address, *identity, mode.party, mode.checksum, mode.em)
 
     @classmethod
     def scan(cls) -> Scan:

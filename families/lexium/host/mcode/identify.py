@@ -21,10 +21,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from multidrop.base.errors import Inexpressible, NoAnswer
+from multidrop.base.errors import NoAnswer
 from multidrop.dialects.codec import Kind, Procedure, Reply, Request
 from multidrop.dialects.family import Hints
-from multidrop.dialects.state import Remembered, who
+from multidrop.dialects.state import who
 from multidrop.families.lexium.host.mcode.codec import NOBODY, TO_PARTY, MCode
 from multidrop.families.lexium.host.mcode.identity import (
     BRIEF,
@@ -34,8 +34,6 @@ from multidrop.families.lexium.host.mcode.identity import (
     end_text,
     find,
     find_in_text,
-    overflow,
-    write_stop,
 )
 from multidrop.families.lexium.host.mcode.operations import put_back_found
 from multidrop.families.lexium.host.mcode.state import MCodeState, Place, Unconfirmed
@@ -46,29 +44,7 @@ IN_TEXT = TEXT + b"\n\n"
 SEARCH = "multidrop scan PORT tries every name and baud rate"
 
 
-def identify(hints: Hints) -> Procedure[list[MCodeState]]:
-    """Find the drives on a line, in the order of `hints.drives`. Raises NoAnswer where no drive replies.
-
-    Raises Inexpressible, before anything is sent, for a name longer than one character: a drive would take the second
-    character for the beginning of a command.
-    """
-    for name in hints.drives:
-        if len(name) != 1:
-            raise Inexpressible(f"no drive name '{name}'; valid: one letter or digit each, as in drives=a,b")
-    if hints.lazy and not (hints.cut or hints.owed) and (expected := _expected(hints)):
-        if expected[0].place.party:
-            yield from _wake(TO_PARTY if expected[0].stated else IN_TEXT)
-        return [_expected_state(each, hints) for each in expected]
-    if not hints.cut:
-        return (yield from _look_around(hints))
-    yield from overflow(hints.drives or (UNNAMED,))
-    found = yield from _look_around(hints)
-    for state in found:  # their stops are known now, and an error's subroutine may have started since
-        yield from write_stop(state.codec.stop([state.address or state.name], sure=not state.settings_unknown))
-    return found
-
-
-def _expected(hints: Hints) -> list[Unconfirmed]:
+def expected_places(hints: Hints) -> list[Unconfirmed]:
     """Return where the drives are, by the user's hints or from last time; nothing where one is not known."""
     last = {each.address: each for each in hints.remembered}
     party, checks = _party(hints), _checks(hints)
@@ -81,7 +57,7 @@ def _expected(hints: Hints) -> list[Unconfirmed]:
     return []
 
 
-def _expected_state(expected: Unconfirmed, hints: Hints) -> MCodeState:
+def expected_state(expected: Unconfirmed, hints: Hints) -> MCodeState:
     """A drive that the host looks for before the first line for it."""
     state, last = _new_state(expected.place, hints), expected.last
     if last is not None:
@@ -92,24 +68,13 @@ def _expected_state(expected: Unconfirmed, hints: Hints) -> MCodeState:
     return state
 
 
-def remember(state: MCodeState) -> Remembered | None:
-    """Return what the next use of the port may expect; None where the drive or its settings are not known."""
-    if state.unconfirmed is not None:
-        return state.unconfirmed.last
-    if not state.product or state.settings_unknown:
-        return None
-    mode = state.codec
-    identity = (state.name, state.product, state.version, state.part, state.serial)
-    return Remembered(state.address, *identity, mode.party, mode.checksum, mode.em)
-
-
 def _party(hints: Hints) -> bool | None:
     if hints.party is None and (len(hints.drives) > 1 or hints.drives == ("P",)):
         return True
     return hints.party
 
 
-def _look_around(hints: Hints) -> Procedure[list[MCodeState]]:
+def look_around(hints: Hints) -> Procedure[list[MCodeState]]:
     """Find the drives on a line that holds no half-sent command."""
     party = _party(hints)
     if party is not False and not hints.drives:
@@ -130,7 +95,7 @@ def _look_around(hints: Hints) -> Procedure[list[MCodeState]]:
                 "no drive replies (MCode outside of party mode was tried); party=1 and drives=NAMES open a party line; "
                 f"{SEARCH}"
             )
-    yield from _wake(TO_PARTY)
+    yield from wake(TO_PARTY)
     found = []
     for name in hints.drives or (UNNAMED,):
         found.append((yield from _named(name, hints)))
@@ -169,7 +134,7 @@ def _likely(names: Sequence[str], hints: Hints) -> Procedure[list[MCodeState]]:
     for name in names if found else ():
         state = present.get(name) or _new_state(Place(True, name, _checks(hints)), hints)
         if name not in present and name in last:
-            state = _expected_state(Unconfirmed(Place(True, name, _checks(hints)), last[name]), hints)
+            state = expected_state(Unconfirmed(Place(True, name, _checks(hints)), last[name]), hints)
             state.note(f"{who(state)} replied here last time, and does not reply")
         states.append(state if name in present or name in last else _absent(state, found[0]))
     return states
@@ -190,10 +155,10 @@ def _no_reply(hints: Hints, party: bool | None) -> str:
 
 def _by_name_first(hints: Hints) -> Procedure[MCodeState | None]:
     """Look for the one named drive on a party line; None where it is silent, or not in party mode."""
-    woken = yield from _wake(IN_TEXT)
+    woken = yield from wake(IN_TEXT)
     if TEXT in woken.raw:  # by a drive that is not in party mode; an adapter's repetition is removed from here on
         ended = yield from end_text()
-        if END_OF_TEXT in ended.raw or TEXT in (yield from _wake(IN_TEXT)).raw:
+        if END_OF_TEXT in ended.raw or TEXT in (yield from wake(IN_TEXT)).raw:
             return None
     place = Place(True, hints.drives[0], _checks(hints))
     state = _new_state(place, hints)
@@ -203,7 +168,7 @@ def _by_name_first(hints: Hints) -> Procedure[MCodeState | None]:
     return state
 
 
-def _wake(spoiler: bytes) -> Procedure[Reply]:
+def wake(spoiler: bytes) -> Procedure[Reply]:
     """Make half a line harmless, and party mode effective (5.1.105: a line feed; facts of real units: two)."""
     form = MCode(party=True)
     return (yield Request(NOBODY, "", Kind.QUIET, form, settle=SETTLE, timeout=BRIEF, body=spoiler))

@@ -18,8 +18,8 @@ from dataclasses import replace
 from multidrop.base.errors import NoAnswer, Refused
 from multidrop.dialects.codec import Kind, Priority, Procedure, Reply, Request
 from multidrop.dialects.state import who
-from multidrop.families.lexium.host.mcode import classify
-from multidrop.families.lexium.host.mcode.classify import NOTHING, Setting
+from multidrop.families.lexium.host import classify
+from multidrop.families.lexium.host.classify import NOTHING, Setting
 from multidrop.families.lexium.host.mcode.codec import NOBODY, PONG, SLOWEST, MCode, pongs
 from multidrop.families.lexium.host.mcode.exchange import answered, as_printed, fresh, refused, take_out
 from multidrop.families.lexium.host.mcode.framing import NAK, sealed

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import lru_cache, partial
+from functools import lru_cache
 
 from multidrop.base.errors import DriveError, Inexpressible, NoAnswer, Refused, Stopped
 from multidrop.dialects.codec import End, Kind, Priority, Procedure, Reply, Request
@@ -13,12 +13,15 @@ from multidrop.dialects.exchange import unsent_if_stopped
 from multidrop.dialects.family import Motion
 from multidrop.dialects.owed_settings import repaired
 from multidrop.dialects.state import Owed, who
-from multidrop.families.lexium.host.mcode import classify, exchange
+from multidrop.families.lexium.host import classify
+from multidrop.families.lexium.host.classify import INTEGER
+from multidrop.families.lexium.host.errors import report_error
+from multidrop.families.lexium.host.mcode import exchange
 from multidrop.families.lexium.host.mcode.before_request import before_request, find_again, first_print, value_of
-from multidrop.families.lexium.host.mcode.classify import INTEGER
 from multidrop.families.lexium.host.mcode.codec import EVERY_DRIVE, MCode
 from multidrop.families.lexium.host.mcode.identity import find, set_wire
-from multidrop.families.lexium.host.mcode.state import MCodeState, Place, refuse_in_program, report_error
+from multidrop.families.lexium.host.mcode.state import MCodeState, Place, refuse_in_program
+from multidrop.families.lexium.host.operations import LexiumOperations
 from multidrop.families.lexium.manual import grammar
 from multidrop.families.lexium.manual.grammar import Number, Unary, parsed
 from multidrop.families.lexium.manual.groups import READ_BACK
@@ -133,7 +136,7 @@ def put_back_found(state: MCodeState, owed: Sequence[Owed]) -> Procedure[None]:
         return
     if any(each.serial for each in alike):
         state.serial_read((yield from serial_number(state)))
-    yield from repaired(state, owed, partial(perform, state))
+    yield from repaired(state, owed, MCodeOperations(state).perform)
     mine = next((each for each in alike if each.serial == state.serial and not each.lines), None)
     if mine is None or state.codec.em != 0:  # another host has set it since
         return
@@ -266,140 +269,150 @@ def _numbers(state: MCodeState, items: str, form: str) -> Procedure[list[int]]:
 # Typed lines, lists, motion, flags. `exchange` has the single request.
 
 
-def perform(state: MCodeState, text: str) -> Procedure[tuple[str, ...]]:
-    """Send a typed line and prove its outcome; return the printed lines.
+class MCodeOperations(LexiumOperations):
+    """What an MCode drive is asked to do, and what it says of its motion."""
 
-    Raises Refused, NoAnswer, Stopped or Inexpressible.
-    """
-    check(state, text)
-    request = state.codec.request(state.address, text)
-    if state.address in EVERY_DRIVE:
-        # Send to all drives. No drive replies, so lines that need a proof are refused.
-        if classify.word_of(request.text)[0] == "PG":
-            raise Refused(
-                f"'{request.text}' to all drives would make each of them store the next lines; name one drive"
-            )
-        if classify.setting_of(request.text) is not None:
-            state.settings_may_have_changed()
-        yield request
-        state.remark(f"{state.address}: no drive replies to a command to all; it is not known whether it was executed")
-        return ()
-    if state.programming:
-        return (yield from program_line(state, request))
-    if state.restore is not None and not state.restore.lines:
-        yield from put_back(state)
+    state: MCodeState
+
+    def perform(self, text: str) -> Procedure[tuple[str, ...]]:
+        """Send a typed line and prove its outcome; return the printed lines.
+
+        Raises Refused, NoAnswer, Stopped or Inexpressible.
+        """
+        state = self.state
+        self.check(text)
         request = state.codec.request(state.address, text)
-    if classify.enters_program(request.text):
-        return (yield from enter_program(state, request))
-    if classify.word_of(request.text)[0] == "PG":
-        raise Refused(f"{who(state)} is not in program mode: 'PG' alone would enter it; type PG and an address")
-    return (yield from immediate(state, request))
+        if state.address in EVERY_DRIVE:
+            # Send to all drives. No drive replies, so lines that need a proof are refused.
+            if classify.word_of(request.text)[0] == "PG":
+                raise Refused(
+                    f"'{request.text}' to all drives would make each of them store the next lines; name one drive"
+                )
+            if classify.setting_of(request.text) is not None:
+                state.settings_may_have_changed()
+            yield request
+            state.remark(
+                f"{state.address}: no drive replies to a command to all; it is not known whether it was executed"
+            )
+            return ()
+        if state.programming:
+            return (yield from program_line(state, request))
+        if state.restore is not None and not state.restore.lines:
+            yield from put_back(state)
+            request = state.codec.request(state.address, text)
+        if classify.enters_program(request.text):
+            return (yield from enter_program(state, request))
+        if classify.word_of(request.text)[0] == "PG":
+            raise Refused(f"{who(state)} is not in program mode: 'PG' alone would enter it; type PG and an address")
+        return (yield from self.immediate(request))
 
+    def check(self, text: str) -> None:
+        """Raise Inexpressible for a line with a number in groups of digits, or with a comment."""
+        try:
+            grammar.check_groups(text)
+        except grammar.LineError as error:
+            raise Inexpressible(f"'{text}': {error.why}; nothing was sent") from None
+        if why := commented(text):
+            raise Inexpressible(f"'{text}': {why}")
 
-def check(state: MCodeState, text: str) -> None:
-    """Raise Inexpressible for a line with a number in groups of digits, or with a comment."""
-    try:
-        grammar.check_groups(text)
-    except grammar.LineError as error:
-        raise Inexpressible(f"'{text}': {error.why}; nothing was sent") from None
-    if why := commented(text):
-        raise Inexpressible(f"'{text}': {why}")
+    def immediate(self, request: Request) -> Procedure[tuple[str, ...]]:
+        """Send a line that is executed at once, not stored."""
+        state = self.state
+        if state.unconfirmed is not None and (lines := (yield from first_print(state, request))) is not None:
+            return lines
+        request = yield from unsent_if_stopped(who(state), request, before_request(state, request))
+        if request.kind is Kind.SETTING:
+            yield from set_wire(state, request)
+            return ()
+        if request.kind is Kind.PRINT:
+            return (yield from self._print(request))
+        before = yield from unsent_if_stopped(who(state), request, rest_before(state, request))
+        if classify.acts_on_program(request.text):
+            state.steps(False)
+        if classify.word_of(request.text)[0] == "EX":
+            state.program_started()
+        target = classify.target_of(request.text, state.rest)
+        if displaces := classify.may_displace(request.text):
+            state.heads_for(None)
+        reply = yield from exchange.attempted(state, request)
+        if request.kind is Kind.LIST:
+            # Print a mark after a list: EM 1 to 3 give a list no end.
+            lines = reply.lines
+            rest: tuple[str, ...] | None = ()
+            if state.codec.em != 0:
+                rest = yield from exchange.rest_of_list(state, request.priority)
+                lines += rest or ()
+                if rest is not None and not lines:
+                    yield from exchange.check_error_flag(state, request)
+            if rest is None or exchange.lacks_lines(reply, lines):
+                raise NoAnswer(f"{who(state)}: the list may be incomplete: its end or a line was damaged; ask again")
+            return tuple(line for line in lines if line)
+        if not reply.acknowledged:
+            late = yield from exchange.check_error_flag(state, request, silent=reply.end is End.SILENT)
+            if reply.doubtful or (reply.end is End.SILENT and not late):
+                yield from confirm_effect(state, request, before)
+        if displaces:
+            state.heads_for(target)
+        return reply.lines
 
-
-def immediate(state: MCodeState, request: Request) -> Procedure[tuple[str, ...]]:
-    """Send a line that is executed at once, not stored."""
-    if state.unconfirmed is not None and (lines := (yield from first_print(state, request))) is not None:
+    def _print(self, request: Request) -> Procedure[tuple[str, ...]]:
+        """Send a person's print, signed so that no other line is taken for it."""
+        state = self.state
+        request = exchange.signed(state, request)
+        reply = yield from exchange.attempted(state, request)
+        if reply.end is End.SILENT:
+            # Find the reason for an empty print: a refusal, or a loss (with EM=2, where not even a line feed is sent).
+            if state.codec.em == 2:
+                state.reply_outstanding()
+                yield from exchange.mark(state, request)
+            yield from exchange.check_error_flag(state, request)
+            if not classify.may_be_blank(request.text, request.expect):
+                raise NoAnswer(f"{who(state)} printed nothing for '{request.text}', and has no error")
+        own = exchange.sign(state).shown if request.signed else ""
+        lines = tuple(line.removesuffix(own) for line in reply.lines)
+        if classify.reads_error(request.text) and lines and lines[-1].strip().isdecimal():
+            report_error(state, int(lines[-1]))
         return lines
-    request = yield from unsent_if_stopped(who(state), request, before_request(state, request))
-    if request.kind is Kind.SETTING:
-        yield from set_wire(state, request)
-        return ()
-    if request.kind is Kind.PRINT:
-        return (yield from _print(state, request))
-    before = yield from unsent_if_stopped(who(state), request, rest_before(state, request))
-    if classify.acts_on_program(request.text):
-        state.steps(False)
-    if classify.word_of(request.text)[0] == "EX":
-        state.program_started()
-    target = classify.target_of(request.text, state.rest)
-    if displaces := classify.may_displace(request.text):
-        state.heads_for(None)
-    reply = yield from exchange.attempted(state, request)
-    if request.kind is Kind.LIST:
-        # Print a mark after a list: EM 1 to 3 give a list no end.
-        lines = reply.lines
-        rest: tuple[str, ...] | None = ()
-        if state.codec.em != 0:
-            rest = yield from exchange.rest_of_list(state, request.priority)
-            lines += rest or ()
-            if rest is not None and not lines:
-                yield from exchange.check_error_flag(state, request)
-        if rest is None or exchange.lacks_lines(reply, lines):
-            raise NoAnswer(f"{who(state)}: the list may be incomplete: its end or a line was damaged; ask again")
-        return tuple(line for line in lines if line)
-    if not reply.acknowledged:
-        late = yield from exchange.check_error_flag(state, request, silent=reply.end is End.SILENT)
-        if reply.doubtful or (reply.end is End.SILENT and not late):
-            yield from confirm_effect(state, request, before)
-    if displaces:
-        state.heads_for(target)
-    return reply.lines
 
+    def listing(self, start: str) -> Procedure[tuple[str, ...]]:
+        refuse_in_program(self.state, "list it")
+        return (yield from self.perform(f"L {start}".rstrip()))
 
-def _print(state: MCodeState, request: Request) -> Procedure[tuple[str, ...]]:
-    """Send a person's print, signed so that no other line is taken for it."""
-    request = exchange.signed(state, request)
-    reply = yield from exchange.attempted(state, request)
-    if reply.end is End.SILENT:
-        # Find the reason for an empty print: a refusal, or a loss (with EM=2, where not even a line feed is sent).
-        if state.codec.em == 2:
-            state.reply_outstanding()
-            yield from exchange.mark(state, request)
-        yield from exchange.check_error_flag(state, request)
-        if not classify.may_be_blank(request.text, request.expect):
-            raise NoAnswer(f"{who(state)} printed nothing for '{request.text}', and has no error")
-    own = exchange.sign(state).shown if request.signed else ""
-    lines = tuple(line.removesuffix(own) for line in reply.lines)
-    if classify.reads_error(request.text) and lines and lines[-1].strip().isdecimal():
-        report_error(state, int(lines[-1]))
-    return lines
+    def motion(self, priority: Priority) -> Procedure[tuple[Motion, ...]]:
+        """Read position and velocity in one print, so that they belong together and use the wire half as long.
 
+        The drive's signature is between them, so another drive's reply does not match. Only a poll leaves out BY, which
+        is read before the velocity: after BY=0 no program sets a new one.
+        """
+        state = self.state
+        refuse_in_program(state, "ask again")
+        yield from before_request(state, _motion(state.codec, state.address, exchange.sign(state), priority))
+        request = _motion(state.codec, state.address, exchange.sign(state), priority)
+        reply = yield from exchange.once(state, request)
+        exchange.check_printed(state, reply)
+        found = re.fullmatch(request.expect or "", reply.text)
+        assert found is not None
+        return (Motion(int(found[2]), int(found[3]), program=found[1] == "1" if found[1] else None),)
 
-def listing(state: MCodeState, start: str) -> Procedure[tuple[str, ...]]:
-    refuse_in_program(state, "list it")
-    return (yield from perform(state, f"L {start}".rstrip()))
+    def status(self) -> Procedure[tuple[str, ...]]:
+        """Describe motion, program, error and inputs from one print; nothing is cleared.
 
+        Every product has these words: an error could start the drive's error subroutine.
+        """
+        state = self.state
+        if state.programming:
+            return ("program mode: lines are stored, not executed; PG ends it",)
+        asked = '" ",'.join(f"{word}," for word in STATUS).rstrip(",")
+        pattern = " ".join((INTEGER, INTEGER, "[01]", "[01]", "[01]", r"\d{1,4}"))
+        found = (yield from value_of(state, asked, pattern)).split()
+        position, velocity, moving, busy, error, inputs = map(int, found)
+        state.error_flag_read(error == 1)
+        points = EXPANDED_INPUTS if state.product in EXPANDED else INPUTS
+        return in_words(position, velocity, moving, busy, error, inputs, points=points)
 
-def motion(state: MCodeState, priority: Priority) -> Procedure[tuple[Motion, ...]]:
-    """Read position and velocity in one print, so that they belong together and use the wire half as long.
-
-    The drive's signature is between them, so another drive's reply does not match. Only a poll leaves out BY, which is
-    read before the velocity: after BY=0 no program sets a new one.
-    """
-    refuse_in_program(state, "ask again")
-    yield from before_request(state, _motion(state.codec, state.address, exchange.sign(state), priority))
-    request = _motion(state.codec, state.address, exchange.sign(state), priority)
-    reply = yield from exchange.once(state, request)
-    exchange.check_printed(state, reply)
-    found = re.fullmatch(request.expect or "", reply.text)
-    assert found is not None
-    return (Motion(int(found[2]), int(found[3]), program=found[1] == "1" if found[1] else None),)
-
-
-def status(state: MCodeState) -> Procedure[tuple[str, ...]]:
-    """Describe motion, program, error and inputs from one print; nothing is cleared.
-
-    Every product has these words: an error could start the drive's error subroutine.
-    """
-    if state.programming:
-        return ("program mode: lines are stored, not executed; PG ends it",)
-    asked = '" ",'.join(f"{word}," for word in STATUS).rstrip(",")
-    pattern = " ".join((INTEGER, INTEGER, "[01]", "[01]", "[01]", r"\d{1,4}"))
-    found = (yield from value_of(state, asked, pattern)).split()
-    position, velocity, moving, busy, error, inputs = map(int, found)
-    state.error_flag_read(error == 1)
-    points = EXPANDED_INPUTS if state.product in EXPANDED else INPUTS
-    return in_words(position, velocity, moving, busy, error, inputs, points=points)
+    def flag(self, name: str) -> Procedure[bool]:
+        refuse_in_program(self.state, "ask again")
+        return (yield from value_of(self.state, name, "[01]")) == "1"
 
 
 @lru_cache(maxsize=256)
@@ -409,8 +422,3 @@ def _motion(codec: MCode, address: str, own: exchange.Sign, priority: Priority) 
     asked = codec.request(address, f"PR {'BY,' if busy else ''}P,{own.item},V")
     expect = f"({'[01]' if busy else ''})({INTEGER}){re.escape(own.shown)}({INTEGER})"
     return replace(asked, expect=expect, signed=True, priority=priority)
-
-
-def flag(state: MCodeState, name: str) -> Procedure[bool]:
-    refuse_in_program(state, "ask again")
-    return (yield from value_of(state, name, "[01]")) == "1"

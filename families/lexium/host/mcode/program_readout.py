@@ -14,10 +14,10 @@ from multidrop.dialects.codec import Procedure
 from multidrop.dialects.family import Progress
 from multidrop.dialects.program_files import Held, Stored
 from multidrop.dialects.state import who
-from multidrop.families.lexium.host.mcode import classify
+from multidrop.families.lexium.host import classify
 from multidrop.families.lexium.host.mcode.codec import EVERY_DRIVE
 from multidrop.families.lexium.host.mcode.exchange import REPEATS
-from multidrop.families.lexium.host.mcode.operations import flag, immediate, listing, perform
+from multidrop.families.lexium.host.mcode.operations import MCodeOperations
 from multidrop.families.lexium.host.mcode.settings import listed
 from multidrop.families.lexium.host.mcode.state import MCodeState
 from multidrop.families.lexium.manual import editing, help, program_file
@@ -167,13 +167,13 @@ T = TypeVar("T")
 def read(state: MCodeState, _: Sequence[SourceLine], progress: Progress) -> Procedure[Held]:
     """Read the program as listed, and labels and variables; no lines from a drive that is locked."""
     progress(0, 1)
-    locked = yield from _again(state, lambda: flag(state, "LK"))
-    listed = () if locked else (yield from _again(state, lambda: listing(state, "")))
-    names = yield from _again(state, lambda: perform(state, "PR UV"))
+    locked = yield from _again(state, lambda: MCodeOperations(state).flag("LK"))
+    listed = () if locked else (yield from _again(state, lambda: MCodeOperations(state).listing("")))
+    names = yield from _again(state, lambda: MCodeOperations(state).perform("PR UV"))
     held = Held(stored(listed), tuple(name.strip() for name in names if name.strip()), locked)
     labels = any(each.kind == LABEL for each in names_of(held).values())
     if labels and not (held.lines or locked):  # the L was lost on the line
-        held = replace(held, lines=stored((yield from _again(state, lambda: listing(state, "")))))
+        held = replace(held, lines=stored((yield from _again(state, lambda: MCodeOperations(state).listing("")))))
     return held
 
 
@@ -204,13 +204,13 @@ def end_program(state: MCodeState) -> Procedure[bool]:
 
     Both take a while. Raises Refused where the motor moves without a program.
     """
-    if not (yield from _again(state, lambda: flag(state, "BY"))):
-        if (yield from _again(state, lambda: flag(state, "MV"))):
+    if not (yield from _again(state, lambda: MCodeOperations(state).flag("BY"))):
+        if (yield from _again(state, lambda: MCodeOperations(state).flag("MV"))):
             raise Refused(f"{who(state)} moves: stop it first (nothing was sent)")
         return False
-    yield from immediate(state, state.codec.request(state.address, "E"))
-    if (yield from _again(state, lambda: flag(state, "MV"))):
-        yield from immediate(state, state.codec.request(state.address, "SL 0"))
+    yield from MCodeOperations(state).immediate(state.codec.request(state.address, "E"))
+    if (yield from _again(state, lambda: MCodeOperations(state).flag("MV"))):
+        yield from MCodeOperations(state).immediate(state.codec.request(state.address, "SL 0"))
     return True
 
 

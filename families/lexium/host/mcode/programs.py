@@ -15,10 +15,11 @@ from multidrop.dialects.codec import Procedure
 from multidrop.dialects.family import Printed, Programs, Progress
 from multidrop.dialects.program_files import Difference, Held, Stored, first_difference
 from multidrop.dialects.state import who
-from multidrop.families.lexium.host.mcode import classify, operations, program_readout
+from multidrop.families.lexium.host import classify
+from multidrop.families.lexium.host.mcode import program_readout
 from multidrop.families.lexium.host.mcode.before_request import value_of
 from multidrop.families.lexium.host.mcode.download import clears_itself, download
-from multidrop.families.lexium.host.mcode.operations import immediate
+from multidrop.families.lexium.host.mcode.operations import MCodeOperations
 from multidrop.families.lexium.host.mcode.program_readout import FileProgram
 from multidrop.families.lexium.host.mcode.state import MCodeState
 from multidrop.families.lexium.manual import guards
@@ -161,7 +162,7 @@ def _literal(argument: Argument | None) -> float | None:
 
 def _read_setting(state: MCodeState, name: str, values: Sequence[float | None]) -> Procedure[list[float | None]]:
     """Read the present values of a setting; of a setting with several rows the row that begins alike."""
-    printed = yield from immediate(state, state.codec.request(state.address, f"PR {name}"))
+    printed = yield from MCodeOperations(state).immediate(state.codec.request(state.address, f"PR {name}"))
     rows = [[real(each) for each in line.rpartition("=")[2].split(",")] for line in printed if line.strip()]
     if len(rows) == 1:
         return rows[0]
@@ -179,7 +180,7 @@ class MCodePrograms(Programs):
     begins = ("PG", "FD")
 
     def listing(self, place: str) -> Printed:
-        return operations.listing(self.state, place)
+        return MCodeOperations(self.state).listing(place)
 
     def readable(self, held: Held) -> Sequence[str]:
         return program_readout.readable(held)
@@ -235,28 +236,6 @@ class MCodePrograms(Programs):
 # read before that: a drive that is locked refuses L with an error. (MCode reference 5.1.40, 5.1.75, 5.1.94.)
 
 
-def _traits(state: MCodeState) -> set[str]:
-    """The firmware, the port, and how the drive is set, as far as questions depend on it."""
-    found = {
-        "mdrive" if state.product in EXPANDED | {"MDI", "MDIE"} else "lexium",
-        "ethernet" if ETHERNET.match(state.product) else "serial",
-    }
-    found |= {"base"} if state.product == "MDI" else set()
-    found |= {"hmt"} if (row := lookup("AF", state.product)) is not None and state.product in row.products else set()
-    return found | {"party" if state.codec.party else "alone"}
-
-
-def _occupied(state: MCodeState) -> Procedure[Occupied]:
-    """Find out whether a program is stored. Raises Refused where an error stands."""
-    error, locked = (yield from value_of(state, 'EF," ",LK', "[01] [01]")).split()
-    if error == "1":
-        raise Refused(f"{who(state)} has an error (EF=1) that the questions would clear: read it with PR ER, then ask")
-    if locked == "1":
-        return Occupied(errors=f"its program is locked (LK=1), so it cannot be listed; {_SUBROUTINE}")
-    lines = yield from operations.listing(state, "")
-    return Occupied(errors=f"a program is stored ({counted(len(lines), 'line')}); {_SUBROUTINE}" if lines else "")
-
-
 def _masked(address: str, raw: bytes) -> str:
     """Replace the drive's name, and check bytes, which depend on it."""
     text, name = raw.decode("latin-1"), re.escape(address)
@@ -278,10 +257,30 @@ class MCodeCertifying(Certifying):
     writes = "{}={}"
 
     def traits(self) -> set[str]:
-        return _traits(self.state)
+        """The firmware, the port, and how the drive is set, as far as questions depend on it."""
+        state = self.state
+        found = {
+            "mdrive" if state.product in EXPANDED | {"MDI", "MDIE"} else "lexium",
+            "ethernet" if ETHERNET.match(state.product) else "serial",
+        }
+        found |= {"base"} if state.product == "MDI" else set()
+        found |= (
+            {"hmt"} if (row := lookup("AF", state.product)) is not None and state.product in row.products else set()
+        )
+        return found | {"party" if state.codec.party else "alone"}
 
     def occupied(self) -> Procedure[Occupied]:
-        return _occupied(self.state)
+        """Find out whether a program is stored. Raises Refused where an error stands."""
+        state = self.state
+        error, locked = (yield from value_of(state, 'EF," ",LK', "[01] [01]")).split()
+        if error == "1":
+            raise Refused(
+                f"{who(state)} has an error (EF=1) that the questions would clear: read it with PR ER, then ask"
+            )
+        if locked == "1":
+            return Occupied(errors=f"its program is locked (LK=1), so it cannot be listed; {_SUBROUTINE}")
+        lines = yield from MCodeOperations(state).listing("")
+        return Occupied(errors=f"a program is stored ({counted(len(lines), 'line')}); {_SUBROUTINE}" if lines else "")
 
     def masked(self, raw: bytes) -> str:
         return _masked(self.state.address, raw)

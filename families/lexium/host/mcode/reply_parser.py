@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from multidrop.dialects.codec import Decoded, End, Kind, Reply, Request
-from multidrop.families.lexium.host.mcode import classify
+from multidrop.families.lexium.host import classify
 from multidrop.families.lexium.host.mcode.framing import (
     ADDRESS_PROMPT,
     SIGN_ON,

@@ -39,23 +39,6 @@ PG, EVERYONE = b"PG", b"*PG"
 RESETS = (b"\rFD\r", sealed(b"FD") + b"\r", sealed(b"CK=0") + b"\r", b"\n*FD\n", b"\n" + sealed(b"*FD") + b"\n")
 
 
-def clear() -> Procedure[None]:
-    """Stop all programs, overflow half lines, leave program mode, and stop what errors started."""
-    yield from overflow(NAMES)
-    for line in (PG, sealed(PG)):
-        for part in (line[:1] + b"\n", line[1:2] + b"\n", line[2:] + b"\r"):
-            yield from _sent(part, APART)
-    for line in (EVERYONE, sealed(EVERYONE)):
-        yield from _sent(line + b"\n", APART)
-    yield from write_stop(MCode(party=True).stop(NAMES, sure=False))
-
-
-def erase() -> Procedure[None]:
-    """Set every drive on the line to factory defaults: program, variables and parameters are lost."""
-    for line in RESETS:
-        yield from _sent(line, RESTARTING)
-
-
 def _sent(line: bytes, quiet: float) -> Procedure[None]:
     yield Request(NOBODY, "rescue", Kind.QUIET, MCode(party=True), settle=quiet, timeout=max(quiet, BRIEF), body=line)
 
@@ -140,22 +123,6 @@ class _Search:
         form = MCode(party=bool(name))
         reply = yield Request(name, what, Kind.QUIET, form, settle=quiet, timeout=timeout, body=request)
         return reply.raw
-
-
-def search(reach: Reach, found: Found, step: Step) -> Procedure[Outcome]:
-    """Search for every drive at one baud rate; report each as soon as it is identified."""
-    own = _Search(reach, found, step, list(reach.known))
-    if reach.cut:
-        yield from overflow(NAMES)
-    alone = yield from _unnamed(own)
-    step()
-    if not (alone or reach.alone):
-        yield from _named(own)
-    return Outcome(tuple(text for about, text in own.remarks.items() if about not in own.names))
-
-
-def _places(reach: Reach) -> int:
-    return 1 if reach.alone else 1 + ROUNDS * len(NAMES)
 
 
 # A drive outside of party mode
@@ -320,16 +287,33 @@ class MCodeScan(Scan):
     names = NAMES
 
     def places(self, reach: Reach) -> int:
-        return _places(reach)
+        return 1 if reach.alone else 1 + ROUNDS * len(NAMES)
 
     def search(self, reach: Reach, found: Found, step: Step) -> Procedure[Outcome]:
-        return search(reach, found, step)
+        """Search for every drive at one baud rate; report each as soon as it is identified."""
+        own = _Search(reach, found, step, list(reach.known))
+        if reach.cut:
+            yield from overflow(NAMES)
+        alone = yield from _unnamed(own)
+        step()
+        if not (alone or reach.alone):
+            yield from _named(own)
+        return Outcome(tuple(text for about, text in own.remarks.items() if about not in own.names))
 
     def clear(self) -> Procedure[None]:
-        return clear()
+        """Stop all programs, overflow half lines, leave program mode, and stop what errors started."""
+        yield from overflow(NAMES)
+        for line in (PG, sealed(PG)):
+            for part in (line[:1] + b"\n", line[1:2] + b"\n", line[2:] + b"\r"):
+                yield from _sent(part, APART)
+        for line in (EVERYONE, sealed(EVERYONE)):
+            yield from _sent(line + b"\n", APART)
+        yield from write_stop(MCode(party=True).stop(NAMES, sure=False))
 
     def erase(self) -> Procedure[None]:
-        return erase()
+        """Set every drive on the line to factory defaults: program, variables and parameters are lost."""
+        for line in RESETS:
+            yield from _sent(line, RESTARTING)
 
     def asked(self, reach: Reach) -> str:
         return "all names, with and without a checksum"

@@ -11,6 +11,9 @@ from multidrop.dialects.codec import End, Kind, Priority, Procedure, Request
 from multidrop.dialects.state import who
 from multidrop.dialects.values import (
     VARIABLES,
+    Change,
+    Parameters,
+    Permission,
     Plan,
     Progress,
     Reading,
@@ -30,8 +33,10 @@ from multidrop.families.lexium.host.mcode.exchange import (
     sign,
     value,
 )
-from multidrop.families.lexium.host.mcode.operations import perform
+from multidrop.families.lexium.host.mcode.operations import MCodeOperations
 from multidrop.families.lexium.host.mcode.state import MCodeState, refuse_in_program
+from multidrop.families.lexium.host.values import rows_of_list
+from multidrop.families.lexium.manual import parameter_plan
 from multidrop.families.lexium.manual import parameters as manual
 from multidrop.families.lexium.manual.groups import BANKED, COUNTED, LISTS
 from multidrop.families.lexium.manual.mnemonic import ENCODER, MDRIVE_ENCODER, Mnemonic
@@ -56,39 +61,6 @@ BETWEEN = ":"
 NOT_PRINTED = "the drive refuses the line in which it is asked (PR ER shows why), or prints another form"
 USER = re.compile(r"([A-Z][A-Z0-9]{0,2}) *= *(?:([GL]) +)?(-?\d+(?:\.\d+)?)", re.I)
 """A line of PR UV: a variable with its scope, or a label with its address."""
-
-
-def read(state: MCodeState, progress: Progress) -> Procedure[Readings]:
-    """Read every setting that the drive prints. Raises Refused where it would store the questions, or NoAnswer."""
-    if state.address in EVERY_DRIVE:
-        raise Refused(f"'{state.address}' is every drive; name one")
-    refuse_in_program(state)
-    flag = yield from _print(state, "EF", [Form.DIGIT.value])
-    state.error_flag_read(flag != ["0"])
-    if not state.serial:
-        prints_it = state.product.startswith("LM") or state.codec.party or state.codec.checksum  # others may refuse
-        serial = (yield from _print(state, "SN", ["[!-~][ -~]*"])) if prints_it else None
-        state.serial_read(serial[0] if serial else "")
-    batches = list(_batches(state, manual.settings(state.product, state.version, state.part)))
-    lists = manual.lists(state.product, state.version)
-    total, values, unread = len(batches) + len(lists) + 1, dict[str, Value](), [*manual.unread(state.product)]
-    if state.name and state.product not in ETHERNET:
-        values["DN"] = state.name
-    for done, batch in enumerate(batches):
-        progress(done, total)
-        texts = yield from _print(state, *items_and_forms(batch))
-        if texts is None:
-            unread += [(row.name, NOT_PRINTED) for row in batch]
-        else:
-            values |= {row.name: _value(form_of(row), text) for row, text in zip(batch, texts, strict=True)}
-    for done, (word, numbers) in enumerate(lists.items(), len(batches)):
-        progress(done, total)
-        rows = rows_of_list(word, numbers, (yield from _numbered(state, word, numbers)))
-        values |= rows
-        unread += [(f"{word}{n}", "the drive does not print it") for n in numbers if f"{word}{n}" not in rows]
-    users = yield from listed(state, "PR UV")
-    progress(total, total)
-    return _readings(state, values, unread, users)
 
 
 def _readings(
@@ -219,44 +191,81 @@ def listed(state: MCodeState, text: str) -> Procedure[tuple[str, ...]]:
     raise NoAnswer(f"{who(state)}: the list of '{text}' may be incomplete ({reply.end.value}); ask again")
 
 
-def rows_of_list(word: str, numbers: Sequence[int], lines: Sequence[str]) -> dict[str, Value]:
-    """The set-ups in the lines of PR IS, OS or LS, by number."""
-    found: dict[str, Value] = {}
-    for line in lines:
-        row = re.fullmatch(rf"{word} *= *(\d+) *((?:, *-?\d+)+)", line.strip())
-        if row is not None and int(row[1]) in numbers:
-            found[f"{word}{int(row[1])}"] = tuple(int(each) for each in row[2].split(",")[1:])
-    return found
+class MCodeParameters(Parameters):
+    """The settings of an MCode drive."""
 
+    state: MCodeState
 
-def conflict(plan: Plan, others: Collection[str]) -> str:
-    """Return the reason for which a name or party mode would disturb other drives of the line; empty: none."""
-    final = {change.name: change.after for change in plan}
-    if final.get("DN") in others:
-        return f"another drive of the line is named {final['DN']}"
-    return (
-        "other drives share the line, and PY=0 would make this one reply to all of it"
-        if (others and final.get("PY") == 0)
-        else ""
-    )
+    language = "MCode"
+    later = frozenset({"BD"})
 
+    def read(self, progress: Progress) -> Procedure[Readings]:
+        """Read every setting that the drive prints. Raises Refused where it would store the questions, or NoAnswer."""
+        state = self.state
+        if state.address in EVERY_DRIVE:
+            raise Refused(f"'{state.address}' is every drive; name one")
+        refuse_in_program(state)
+        flag = yield from _print(state, "EF", [Form.DIGIT.value])
+        state.error_flag_read(flag != ["0"])
+        if not state.serial:
+            prints_it = state.product.startswith("LM") or state.codec.party or state.codec.checksum  # others may refuse
+            serial = (yield from _print(state, "SN", ["[!-~][ -~]*"])) if prints_it else None
+            state.serial_read(serial[0] if serial else "")
+        batches = list(_batches(state, manual.settings(state.product, state.version, state.part)))
+        lists = manual.lists(state.product, state.version)
+        total, values, unread = len(batches) + len(lists) + 1, dict[str, Value](), [*manual.unread(state.product)]
+        if state.name and state.product not in ETHERNET:
+            values["DN"] = state.name
+        for done, batch in enumerate(batches):
+            progress(done, total)
+            texts = yield from _print(state, *items_and_forms(batch))
+            if texts is None:
+                unread += [(row.name, NOT_PRINTED) for row in batch]
+            else:
+                values |= {row.name: _value(form_of(row), text) for row, text in zip(batch, texts, strict=True)}
+        for done, (word, numbers) in enumerate(lists.items(), len(batches)):
+            progress(done, total)
+            rows = rows_of_list(word, numbers, (yield from _numbered(state, word, numbers)))
+            values |= rows
+            unread += [(f"{word}{n}", "the drive does not print it") for n in numbers if f"{word}{n}" not in rows]
+        users = yield from listed(state, "PR UV")
+        progress(total, total)
+        return _readings(state, values, unread, users)
 
-def ready(state: MCodeState) -> Procedure[str]:
-    """Return the reason for which settings must not change now; empty: there is none."""
-    if state.programming:
-        return f"{who(state)} is in program mode and would store the settings: PG ends that"
-    yield from before_request(state, question(state, "MV", "[01]"))
-    said = yield from printed_value(state, "MV,BY,TE", r"[01][01]\d{1,3}")
-    if said[:1] == "1":
-        return f"{who(state)} moves: stop it first"
-    if said[1:2] == "1":
-        return f"{who(state)} runs a program: E ends it"
-    if said[2:] not in ("", "0"):
-        return f"{who(state)} has armed trips (TE={said[2:]}): TE=0 disarms them"
-    return ""
+    def plan(self, present: Readings, wanted: Mapping[str, Value], permission: Permission) -> Plan:
+        return parameter_plan.plan(self.state.product, present, wanted, permission)
 
+    def ready(self) -> Procedure[str]:
+        """Return the reason for which settings must not change now; empty: there is none."""
+        state = self.state
+        if state.programming:
+            return f"{who(state)} is in program mode and would store the settings: PG ends that"
+        yield from before_request(state, question(state, "MV", "[01]"))
+        said = yield from printed_value(state, "MV,BY,TE", r"[01][01]\d{1,3}")
+        if said[:1] == "1":
+            return f"{who(state)} moves: stop it first"
+        if said[1:2] == "1":
+            return f"{who(state)} runs a program: E ends it"
+        if said[2:] not in ("", "0"):
+            return f"{who(state)} has armed trips (TE={said[2:]}): TE=0 disarms them"
+        return ""
 
-def save(state: MCodeState) -> Procedure[None]:
-    if state.programming:
-        raise Refused(f"{who(state)} is in program mode and would store S: PG ends that")
-    yield from perform(state, "S")
+    def write(self, change: Change) -> Procedure[object]:
+        return MCodeOperations(self.state).perform(change.text)
+
+    def save(self) -> Procedure[None]:
+        state = self.state
+        if state.programming:
+            raise Refused(f"{who(state)} is in program mode and would store S: PG ends that")
+        yield from MCodeOperations(state).perform("S")
+
+    def conflict(self, plan: Plan, others: Collection[str]) -> str:
+        """Return the reason for which a name or party mode would disturb other drives of the line; empty: none."""
+        final = {change.name: change.after for change in plan}
+        if final.get("DN") in others:
+            return f"another drive of the line is named {final['DN']}"
+        return (
+            "other drives share the line, and PY=0 would make this one reply to all of it"
+            if (others and final.get("PY") == 0)
+            else ""
+        )

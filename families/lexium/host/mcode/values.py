@@ -3,35 +3,28 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 
 from multidrop.base.errors import Diagnostic, NoAnswer, Refused
 from multidrop.dialects.codec import End, Priority, Procedure
 from multidrop.dialects.program_files import LOCKED
-from multidrop.dialects.state import DriveState, who
+from multidrop.dialects.state import who
 from multidrop.dialects.values import (
-    Actions,
-    Change,
     Conditions,
-    Controls,
     Facts,
-    Levels,
     Parameters,
     Part,
-    Permission,
-    Plan,
     Progress,
     Readings,
     Snapshot,
     Value,
-    Values,
     printed_number,
 )
-from multidrop.families.lexium.host.mcode import debugging
 from multidrop.families.lexium.host.mcode.before_request import before_request, value_of
 from multidrop.families.lexium.host.mcode.codec import EVERY_DRIVE
+from multidrop.families.lexium.host.mcode.debugging import MCodeDebugging
 from multidrop.families.lexium.host.mcode.exchange import (
     check_printed,
     note_error,
@@ -39,25 +32,20 @@ from multidrop.families.lexium.host.mcode.exchange import (
     question,
     value,
 )
-from multidrop.families.lexium.host.mcode.motions import POINTS, cause
-from multidrop.families.lexium.host.mcode.operations import perform
 from multidrop.families.lexium.host.mcode.settings import (
     BETWEEN,
-    conflict,
+    MCodeParameters,
     items_and_forms,
     list_request,
     listed,
-    read,
-    ready,
-    rows_of_list,
-    save,
 )
 from multidrop.families.lexium.host.mcode.state import MCodeState, refuse_in_program
-from multidrop.families.lexium.manual import parameter_plan, points
+from multidrop.families.lexium.host.motions import POINTS, cause
+from multidrop.families.lexium.host.values import SNAPSHOT_WORDS, LexiumValues, number_in, rows_of_list
 from multidrop.families.lexium.manual import parameters as manual
-from multidrop.families.lexium.manual.mnemonic import EVERY, EXPANDED, LEXIUM, MDRIVE_PLUS
+from multidrop.families.lexium.manual import points
+from multidrop.families.lexium.manual.mnemonic import EVERY, LEXIUM, MDRIVE_PLUS
 from multidrop.families.lexium.manual.parameters import Form, form_of
-from multidrop.families.lexium.manual.points import EXPANDED_INPUTS, INPUTS
 from multidrop.families.lexium.manual.statements import UNNAMED
 from multidrop.families.lexium.manual.table import lookup, words
 
@@ -75,107 +63,10 @@ SETTLED = "IS1"
 REFUSAL = "refuses to print its conditions"
 
 
-def parts(state: MCodeState, facts: Facts) -> Sequence[Part]:
-    """The parts of a drive: its state, its settings, and its set-ups, which have another form on an MDrivePlus."""
-    if state.codec.em == 3 or state.address in EVERY_DRIVE or state.programming:
-        return ()
-    found = [
-        Part("state", partial(_state, state, before=facts)),
-        Part("settings", partial(_values, state, names=points.SETTINGS), slow=True),
-    ]
-    if facts.get("BY") and SETTLED in facts:
-        return found  # a list has no signature, and a program prints lines, too
-    if not (lists := manual.lists(state.product, state.version)):
-        return [*found, Part("points", partial(_values, state, names=POINTS), slow=True)]
-    return found + [
-        Part(word, partial(_list, state, word=word, numbers=rows), slow=True) for word, rows in lists.items()
-    ]
-
-
-def _state(state: MCodeState, before: Facts) -> Procedure[Facts]:
-    facts = dict((yield from _values(state, STATE)))
-    facts[points.CAUSE] = cause(state.product, facts, before)
-    state.program_read(error=bool(facts["EF"]), running=bool(facts["BY"]))
-    position = facts["P"]
-    at_rest = isinstance(position, int) and not facts["MV"] and not facts["BY"]
-    state.seen_at_rest(position if at_rest and isinstance(position, int) else None)
-    return facts
-
-
-def _values(state: MCodeState, names: Sequence[str]) -> Procedure[Facts]:
-    """Print values in one line. Raises Refused or NoAnswer, and reads no error.
-
-    Asks the words that the product has; of an unknown product, those that every Lexium has.
-    """
-    table, known = words(state.product), state.product in EVERY
-    batch = [table[name] for name in names if name in table]
-    batch = [
-        row for row in batch if (state.product in row.products if known else row.products in (LEXIUM, MDRIVE_PLUS))
-    ]
-    items, forms = items_and_forms(batch)
-    answer = "".join(f"(?:{form})" for form in forms)
-    yield from before_request(state, replace(question(state, items, answer), priority=Priority.POLL))
-    reply = yield from once(state, replace(question(state, items, answer), priority=Priority.POLL))
-    check_printed(state, reply, REFUSAL)
-    found = re.fullmatch("".join(f"({form})" for form in forms), value(state, reply))
-    assert found is not None
-    facts: dict[str, Value] = {}
-    for row, text in zip(batch, found.groups(), strict=True):
-        fields = tuple(int(each) for each in text.removeprefix(BETWEEN).split(","))
-        facts[row.name] = fields if form_of(row) is Form.FIELDS else fields[0]
-    return facts
-
-
-def _list(state: MCodeState, word: str, numbers: Sequence[int]) -> Procedure[Facts]:
-    yield from before_request(state, replace(question(state, "EF", "[01]"), priority=Priority.POLL))
-    reply = yield from once(state, replace(list_request(state, word, numbers), priority=Priority.POLL))
-    check_printed(state, reply, REFUSAL)
-    rows = rows_of_list(word, numbers, reply.lines)
-    if reply.doubtful or len(rows) < len(numbers):
-        state.reply_lost()
-        raise NoAnswer(f"{who(state)}: the list of {word} may be incomplete, or another drive's")
-    return rows
-
-
-def fold(state: MCodeState, facts: Facts) -> tuple[Conditions, ...]:
-    modes = f"EM{state.codec.em} CK{state.codec.checksum}"
-    return (replace(points.conditions(state.product, facts, state.heading), modes=modes),)
-
-
 # Values for plots: one signed print each, and never a word whose reading clears it.
 
 
 NUMBER = r"-?\d{1,10}(?:\.\d+)?"
-
-
-def check(state: MCodeState, word: str) -> str:
-    """Check the form of a word, and that its reading clears nothing."""
-    try:
-        debugging.check_names(state, [word])
-    except Diagnostic as wrong:
-        raise Diagnostic(wrong.message.replace("be watched", "be polled"), wrong.where, wrong.hint) from None
-    return word.upper()
-
-
-def first(state: MCodeState, word: str) -> Procedure[float]:
-    """Read a value; a name with VA is looked up first, since asking for one that is not there is an error."""
-    refuse_in_program(state)
-    found = yield from debugging.values(state, [word])
-    if word not in found:
-        raise Refused(f"{who(state)} has no variable {word}")
-    return printed_number(who(state), word, found[word])
-
-
-def again(state: MCodeState, word: str, priority: Priority) -> Procedure[float]:
-    """Read a value. The error flag is noted and not cleared."""
-    refuse_in_program(state)
-    yield from before_request(state, replace(question(state, word, NUMBER), priority=priority))
-    reply = yield replace(question(state, word, NUMBER), priority=priority)
-    if reply.end is End.REFUSED:
-        note_error(state, reply)
-        raise Refused(f"{who(state)} refused 'PR {word}'")
-    check_printed(state, reply)
-    return float(value(state, reply))
 
 
 # A snapshot. A locked program is not asked for, as the refusal would run a resident OE subroutine (5.1.75).
@@ -183,110 +74,10 @@ def again(state: MCodeState, word: str, priority: Priority) -> Procedure[float]:
 
 BAUDS = {48: 4800, 96: 9600, 19: 19200, 38: 38400, 11: 115200}
 """By BD (5.1.9)."""
-SNAPSHOT_WORDS = ("P", "C1", "C2", "V", "BY", "IN", "I5")
-"""The words of the state, as far as the product has them."""
-OUTPUT_TYPES = range(16, 30)
-"""Types of a point that is not an input (MDrivePlus: S<n>)."""
 _LISTED = re.compile(r"(\d+)\s+(\S.*)")
 
 
-def take(state: MCodeState, progress: Progress) -> Procedure[Snapshot]:
-    """Read a drive. Raises Refused where it would store the questions, or NoAnswer."""
-    readings = yield from read(state, progress)
-    known, whole = words(state.product), state.product in EVERY
-    asked = [word for word in SNAPSHOT_WORDS if word in known and (state.product in known[word].products or not whole)]
-    items, pattern = '," ",'.join(asked), " ".join(r"-?\d{1,10}" for _ in asked)
-    now = dict(zip(asked, map(int, (yield from value_of(state, items, pattern)).split()), strict=True))
-    program, remarks = yield from _program(state, readings, running=bool(now["BY"]))
-    found = snapshot_of(state, readings, now)
-    return replace(
-        found,
-        name=state.name or UNNAMED,
-        party=state.codec.party,
-        baud=BAUDS.get(_whole(readings, "BD"), 0),
-        program=program,
-        remarks=(*remarks, *found.remarks),
-    )
-
-
-def snapshot_of(state: DriveState, readings: Readings, now: Mapping[str, int]) -> Snapshot:
-    """Make the record of a drive from its settings and its state of the moment, by word."""
-    remarks = []
-    if now["V"]:
-        remarks.append(f"moving at V={now['V']} while it was read: its position is one of that moment")
-    if now["BY"]:
-        remarks.append("a program ran while it was read")
-    points = EXPANDED_INPUTS if state.product in EXPANDED else INPUTS
-    types = {name: held for name, held in readings.values.items() if isinstance(held, tuple)}
-    outputs = {n for n in points if types.get(f"S{n}", (0,))[0] in OUTPUT_TYPES}
-    levels = Levels("IN", tuple((n, bit) for bit, n in enumerate(points) if n not in outputs))
-    counts = _whole(readings, "EE") and not _whole(readings, "AS")
-    other = "C1" if counts else "C2"
-    return Snapshot(
-        kind="mcode",
-        product=state.product,
-        part=state.part,
-        version=state.version,
-        serial=state.serial,
-        name=UNNAMED,
-        readings=readings,
-        counters=({"position": (now["P"],)} | ({other: (now[other],)} if other in now else {})),
-        inputs=levels.of(now["IN"]),
-        levels=levels,
-        active=bool(now["V"] or now["BY"]),
-        analog=(now["I5"],) if "I5" in now else (),
-        remarks=tuple(remarks),
-    )
-
-
-def _program(
-    state: MCodeState, readings: Readings, running: bool
-) -> Procedure[tuple[tuple[tuple[int, str], ...], list[str]]]:
-    """Read the listing; one that a running program's prints may have come into is read twice."""
-    if _whole(readings, "LK"):
-        return (), [f"not read: {LOCKED}"]
-    first = yield from listed(state, "L")
-    if running and first != (yield from listed(state, "L")):
-        return (), ["its program was not read: it runs, and its prints came between the lines"]
-    found = [_LISTED.fullmatch(line.strip()) for line in first]
-    lost = [line for line, row in zip(first, found, strict=True) if row is None]
-    doubts = [f"its listing has a line that is not a program line: {line!r}" for line in lost]
-    return tuple((int(row[1]), row[2]) for row in found if row is not None), doubts
-
-
-def _whole(readings: Readings, name: str) -> int:
-    found = readings.values.get(name, 0)
-    return found if isinstance(found, int) else 0
-
-
-class MCodeParameters(Parameters):
-    """The settings of an MCode drive."""
-
-    state: MCodeState
-
-    language = "MCode"
-    later = frozenset({"BD"})
-
-    def read(self, progress: Progress) -> Procedure[Readings]:
-        return read(self.state, progress)
-
-    def plan(self, present: Readings, wanted: Mapping[str, Value], permission: Permission) -> Plan:
-        return parameter_plan.plan(self.state.product, present, wanted, permission)
-
-    def ready(self) -> Procedure[str]:
-        return ready(self.state)
-
-    def write(self, change: Change) -> Procedure[object]:
-        return perform(self.state, change.text)
-
-    def save(self) -> Procedure[object]:
-        return save(self.state)
-
-    def conflict(self, plan: Plan, others: Collection[str]) -> str:
-        return conflict(plan, others)
-
-
-class MCodeValues(Values):
+class MCodeValues(LexiumValues):
     """What is read of an MCode drive."""
 
     state: MCodeState
@@ -296,29 +87,133 @@ class MCodeValues(Values):
         return MCodeParameters(self.state)
 
     def snapshot(self, progress: Progress) -> Procedure[Snapshot]:
-        return take(self.state, progress)
+        """Read a drive. Raises Refused where it would store the questions, or NoAnswer."""
+        state = self.state
+        readings = yield from MCodeParameters(state).read(progress)
+        known, whole = words(state.product), state.product in EVERY
+        asked = [
+            word for word in SNAPSHOT_WORDS if word in known and (state.product in known[word].products or not whole)
+        ]
+        items, pattern = '," ",'.join(asked), " ".join(r"-?\d{1,10}" for _ in asked)
+        now = dict(zip(asked, map(int, (yield from value_of(state, items, pattern)).split()), strict=True))
+        program, remarks = yield from self._program(readings, running=bool(now["BY"]))
+        found = self.snapshot_of(readings, now)
+        return replace(
+            found,
+            name=state.name or UNNAMED,
+            party=state.codec.party,
+            baud=BAUDS.get(number_in(readings, "BD"), 0),
+            program=program,
+            remarks=(*remarks, *found.remarks),
+        )
 
     def parts(self, facts: Facts) -> Sequence[Part]:
-        return parts(self.state, facts)
+        """The parts of a drive: its state, its settings, and its set-ups, which have another form on an MDrivePlus."""
+        state = self.state
+        if state.codec.em == 3 or state.address in EVERY_DRIVE or state.programming:
+            return ()
+        found = [
+            Part("state", partial(self._state, before=facts)),
+            Part("settings", partial(self._values, names=points.SETTINGS), slow=True),
+        ]
+        if facts.get("BY") and SETTLED in facts:
+            return found  # a list has no signature, and a program prints lines, too
+        if not (lists := manual.lists(state.product, state.version)):
+            return [*found, Part("points", partial(self._values, names=POINTS), slow=True)]
+        return found + [
+            Part(word, partial(self._list, word=word, numbers=rows), slow=True) for word, rows in lists.items()
+        ]
 
     def fold(self, facts: Facts) -> tuple[Conditions, ...]:
-        return fold(self.state, facts)
+        state = self.state
+        modes = f"EM{state.codec.em} CK{state.codec.checksum}"
+        return (replace(points.conditions(state.product, facts, state.heading), modes=modes),)
 
     def check(self, word: str) -> str:
-        return check(self.state, word)
+        """Check the form of a word, and that its reading clears nothing."""
+        try:
+            MCodeDebugging(self.state).names([word])
+        except Diagnostic as wrong:
+            raise Diagnostic(wrong.message.replace("be watched", "be polled"), wrong.where, wrong.hint) from None
+        return word.upper()
 
     def first(self, word: str) -> Procedure[float]:
-        return first(self.state, word)
+        """Read a value; a name with VA is looked up first, since asking for one that is not there is an error."""
+        state = self.state
+        refuse_in_program(state)
+        found = yield from MCodeDebugging(state).values([word])
+        if word not in found:
+            raise Refused(f"{who(state)} has no variable {word}")
+        return printed_number(who(state), word, found[word])
 
     def again(self, word: str, priority: Priority) -> Procedure[float]:
-        return again(self.state, word, priority)
-
-    def controls(self, axis: str) -> Controls:
-        return points.controls(self.state, axis)
-
-    @property
-    def actions(self) -> Actions:
-        return points.LexiumActions(self.state)
+        """Read a value. The error flag is noted and not cleared."""
+        state = self.state
+        refuse_in_program(state)
+        yield from before_request(state, replace(question(state, word, NUMBER), priority=priority))
+        reply = yield replace(question(state, word, NUMBER), priority=priority)
+        if reply.end is End.REFUSED:
+            note_error(state, reply)
+            raise Refused(f"{who(state)} refused 'PR {word}'")
+        check_printed(state, reply)
+        return float(value(state, reply))
 
     def own(self, word: str) -> bool:
         return lookup(word.upper(), self.state.product) is not None
+
+    def _state(self, before: Facts) -> Procedure[Facts]:
+        state = self.state
+        facts = dict((yield from self._values(STATE)))
+        facts[points.CAUSE] = cause(state.product, facts, before)
+        state.program_read(error=bool(facts["EF"]), running=bool(facts["BY"]))
+        position = facts["P"]
+        at_rest = isinstance(position, int) and not facts["MV"] and not facts["BY"]
+        state.seen_at_rest(position if at_rest and isinstance(position, int) else None)
+        return facts
+
+    def _values(self, names: Sequence[str]) -> Procedure[Facts]:
+        """Print values in one line. Raises Refused or NoAnswer, and reads no error.
+
+        Asks the words that the product has; of an unknown product, those that every Lexium has.
+        """
+        state = self.state
+        table, known = words(state.product), state.product in EVERY
+        batch = [table[name] for name in names if name in table]
+        batch = [
+            row for row in batch if (state.product in row.products if known else row.products in (LEXIUM, MDRIVE_PLUS))
+        ]
+        items, forms = items_and_forms(batch)
+        answer = "".join(f"(?:{form})" for form in forms)
+        yield from before_request(state, replace(question(state, items, answer), priority=Priority.POLL))
+        reply = yield from once(state, replace(question(state, items, answer), priority=Priority.POLL))
+        check_printed(state, reply, REFUSAL)
+        found = re.fullmatch("".join(f"({form})" for form in forms), value(state, reply))
+        assert found is not None
+        facts: dict[str, Value] = {}
+        for row, text in zip(batch, found.groups(), strict=True):
+            fields = tuple(int(each) for each in text.removeprefix(BETWEEN).split(","))
+            facts[row.name] = fields if form_of(row) is Form.FIELDS else fields[0]
+        return facts
+
+    def _list(self, word: str, numbers: Sequence[int]) -> Procedure[Facts]:
+        state = self.state
+        yield from before_request(state, replace(question(state, "EF", "[01]"), priority=Priority.POLL))
+        reply = yield from once(state, replace(list_request(state, word, numbers), priority=Priority.POLL))
+        check_printed(state, reply, REFUSAL)
+        rows = rows_of_list(word, numbers, reply.lines)
+        if reply.doubtful or len(rows) < len(numbers):
+            state.reply_lost()
+            raise NoAnswer(f"{who(state)}: the list of {word} may be incomplete, or another drive's")
+        return rows
+
+    def _program(self, readings: Readings, running: bool) -> Procedure[tuple[tuple[tuple[int, str], ...], list[str]]]:
+        """Read the listing; one that a running program's prints may have come into is read twice."""
+        if number_in(readings, "LK"):
+            return (), [f"not read: {LOCKED}"]
+        first = yield from listed(self.state, "L")
+        if running and first != (yield from listed(self.state, "L")):
+            return (), ["its program was not read: it runs, and its prints came between the lines"]
+        found = [_LISTED.fullmatch(line.strip()) for line in first]
+        lost = [line for line, row in zip(first, found, strict=True) if row is None]
+        doubts = [f"its listing has a line that is not a program line: {line!r}" for line in lost]
+        return tuple((int(row[1]), row[2]) for row in found if row is not None), doubts

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, ClassVar
 
 from multidrop.dialects.codec import Codec, Decoded, End, Reply, Request, Started, StopPiece
 from multidrop.dialects.state import DriveState
-from multidrop.families.lexium.host.mcode import classify
+from multidrop.families.lexium.host import classify
 from multidrop.families.lexium.host.modbus import framing
 from multidrop.families.lexium.manual.grammar import LineError, parse
 from multidrop.families.lexium.manual.groups import CALM_AT_0

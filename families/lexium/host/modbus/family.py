@@ -2,75 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import ClassVar
 
 from multidrop.dialects.certifying import Certifying
-from multidrop.dialects.codec import Codec, Priority, Procedure
-from multidrop.dialects.family import Guard, Hints, Language, Motion, Printed, Referencing, Registers
+from multidrop.dialects.codec import Codec, Procedure
+from multidrop.dialects.family import Guard, Hints, Language, Registers
 from multidrop.dialects.motions import Motions
-from multidrop.dialects.state import DriveState
+from multidrop.dialects.state import DriveState, who
 from multidrop.dialects.units import Units
 from multidrop.dialects.values import Values
 from multidrop.families.lexium.host.family import LexiumFamily
-from multidrop.families.lexium.host.mcode import classify
-from multidrop.families.lexium.host.modbus import operations
 from multidrop.families.lexium.host.modbus.codec import USER, Modbus, ModbusState, pdu_codec
-from multidrop.families.lexium.host.modbus.mapping import lines_of
-from multidrop.families.lexium.host.modbus.operations import identify
+from multidrop.families.lexium.host.modbus.identity import WARNING, announced, recognise
+from multidrop.families.lexium.host.modbus.operations import ModbusCertifying, ModbusOperations, flagged
 from multidrop.families.lexium.manual import grammar, guards
 from multidrop.families.lexium.manual.guards import NAMES
 from multidrop.families.lexium.manual.modbus import help
 from multidrop.families.lexium.manual.modbus.registers import ALTERNATIVE, REGISTERS
 
 
-def guarded(state: ModbusState, text: str) -> Guard | None:
-    """Find the guard of a typed line for a drive. A word that has no register is refused, so it needs no agreement."""
-    if guards.word_of(text) not in REGISTERS:
-        return None
-    return guards.find(text, address=state.address, party=False, product=state.product, starts=lambda line: True)
-
-
-def homed(state: ModbusState) -> Procedure[bool]:
-    return not (yield from operations.flag(state, "EF"))
-
-
-def vouched(text: str, product: str) -> bool:
-    """Whether the tables show nothing for which a drive would refuse a line: a value that its register takes."""
-    statement = grammar.parsed(text, USER)
-    if statement is None or statement.word == "PR":
-        return classify.vouched(text, product)
-    register, values = REGISTERS.get(statement.word), [getattr(each, "value", None) for each in statement.arguments]
-    if register is None or len(values) != 1 or not isinstance(values[0], int):
-        return False
-    return register.writable and register.allows(values[0])
-
-
-class ModbusRegisters(Registers):
-    """The registers and outputs of an Ethernet drive."""
-
-    state: ModbusState
-
-    def read(self, address: int, count: int | None) -> Printed:
-        return operations.read_registers(self.state, address, count)
-
-    def write(self, address: int, values: Sequence[int]) -> Printed:
-        return operations.write_registers(self.state, address, values)
-
-    def lines(self, address: int, values: Sequence[int]) -> tuple[str, ...]:
-        return lines_of(address, values)
-
-    def read_coil(self, number: int) -> Printed:
-        return operations.read_coil(self.state, number)
-
-    def write_coil(self, number: int, on: bool) -> Printed:
-        return operations.write_coil(self.state, number, on)
-
-    def device(self) -> Printed:
-        return operations.device(self.state)
-
-
-class ModbusFamily(LexiumFamily):
+class ModbusFamily(ModbusOperations, LexiumFamily):
     """A Lexium Ethernet drive over Modbus/TCP, with the words of MCode."""
 
     state: ModbusState
@@ -89,42 +40,37 @@ class ModbusFamily(LexiumFamily):
 
     @classmethod
     def identify(cls, hints: Hints) -> Procedure[list[DriveState]]:
-        return [*(yield from identify(hints))]
+        state = ModbusState(Modbus())
+        recognise(state, (yield from announced(state)))
+        if state.stranger:
+            state.note(WARNING)
+        elif (yield from flagged(state)):
+            state.note(f"{who(state)}: its error flag is set (EF=1); PR ER shows and clears the error")
+        return [state]
 
     def guard(self, text: str) -> Guard | None:
-        return guarded(self.state, text)
-
-    def perform(self, text: str) -> Printed:
-        return operations.perform(self.state, text)
-
-    def check(self, text: str) -> None:
-        operations.parsed(self.state, text)
-
-    def motion(self, priority: Priority) -> Procedure[tuple[Motion, ...]]:
-        return operations.motion(self.state, priority)
-
-    def moving(self) -> Procedure[bool]:
-        return operations.flag(self.state, name="MV")
-
-    def busy(self) -> Procedure[bool]:
-        return operations.flag(self.state, name="BY")
-
-    def status(self) -> Printed:
-        return operations.status(self.state)
-
-    def referencing(self, text: str) -> Referencing | None:
-        return classify.referencing(self.state, text)
-
-    def homed(self) -> Procedure[bool]:
-        return homed(self.state)
+        """A word that has no register is refused, so it needs no agreement."""
+        if self.word_of(text) not in REGISTERS:
+            return None
+        state = self.state
+        return guards.find(text, address=state.address, party=False, product=state.product, starts=lambda line: True)
 
     @property
-    def registers(self) -> Registers | None:
+    def registers(self) -> Registers:
+        from multidrop.families.lexium.host.modbus.registers import ModbusRegisters
+
         return ModbusRegisters(self.state)
 
     @classmethod
     def vouched(cls, text: str, product: str) -> bool:
-        return vouched(text, product)
+        """Whether the tables show nothing for which a drive would refuse a line: a value that its register takes."""
+        statement = grammar.parsed(text, USER)
+        if statement is None or statement.word == "PR":
+            return super().vouched(text, product)
+        register, values = REGISTERS.get(statement.word), [getattr(each, "value", None) for each in statement.arguments]
+        if register is None or len(values) != 1 or not isinstance(values[0], int):
+            return False
+        return register.writable and register.allows(values[0])
 
     @classmethod
     def prepare(cls) -> None:
@@ -132,8 +78,6 @@ class ModbusFamily(LexiumFamily):
 
     @property
     def certifying(self) -> Certifying:
-        from multidrop.families.lexium.host.modbus.operations import ModbusCertifying
-
         return ModbusCertifying(self.state)
 
     @property
@@ -150,6 +94,6 @@ class ModbusFamily(LexiumFamily):
 
     @property
     def units(self) -> Units:
-        from multidrop.families.lexium.host.modbus.values import ModbusUnits
+        from multidrop.families.lexium.host.modbus.units import ModbusUnits
 
         return ModbusUnits(self.state)

@@ -135,14 +135,6 @@ def write(register: Register, value: int) -> bytes:
     return pdu_codec().write_registers(register.address, framing.words_of(value, register.count))
 
 
-def lines_of(address: int, values: Sequence[int]) -> tuple[str, ...]:
-    """The typed lines that do the same as a write of raw registers, as far as words have them."""
-    row = AT.get(address)
-    if len(values) == 1 and row is not None and row.address == address:
-        return (f"{row.name}={values[0]}",)
-    return tuple(f"{AT[address + n].name}={value}" for n, value in enumerate(values) if address + n in AT)
-
-
 def reading(word: str) -> Reading:
     """Build the request for `PR word`. Raises Inexpressible, or Refused for a word that cannot be printed."""
     if word in INPUTS:

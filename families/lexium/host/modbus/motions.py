@@ -11,32 +11,11 @@ from collections.abc import Mapping, Sequence
 from multidrop.base.errors import Refused
 from multidrop.base.files import split_lines
 from multidrop.dialects.codec import Procedure
-from multidrop.families.lexium.host.mcode.motions import LexiumMotions, starts_program
 from multidrop.families.lexium.host.modbus.codec import ModbusState
-from multidrop.families.lexium.host.modbus.operations import PRODUCT, error_number, printed, value
+from multidrop.families.lexium.host.modbus.identity import PRODUCT
+from multidrop.families.lexium.host.modbus.operations import error_number, printed, value
+from multidrop.families.lexium.host.motions import LexiumMotions, starts_program
 from multidrop.families.lexium.manual.modbus.registers import REGISTERS
-
-
-def _values(state: ModbusState, words: Sequence[str]) -> Procedure[Mapping[str, int]]:
-    """Read each of these registers that the product has."""
-    found: dict[str, int] = {}
-    if not PRODUCT.fullmatch(state.product):
-        return found
-    for word in words:
-        register = REGISTERS.get(word)
-        if register is None or not register.readable or (register.only and state.product.startswith("LMDO")):
-            continue
-        try:
-            found[word] = yield from value(state, word)
-        except Refused:
-            continue  # this drive lacks the register
-    return found
-
-
-def _program_input(state: ModbusState) -> Procedure[bool]:
-    """Read the set-ups of the inputs, which function 65 prints as text."""
-    text = yield from printed(state, "IS")
-    return starts_program(split_lines(text))
 
 
 class ModbusMotions(LexiumMotions):
@@ -45,10 +24,25 @@ class ModbusMotions(LexiumMotions):
     state: ModbusState
 
     def read(self, words: Sequence[str]) -> Procedure[Mapping[str, int]]:
-        return _values(self.state, words)
+        """Read each of these registers that the product has."""
+        state = self.state
+        found: dict[str, int] = {}
+        if not PRODUCT.fullmatch(state.product):
+            return found
+        for word in words:
+            register = REGISTERS.get(word)
+            if register is None or not register.readable or (register.only and state.product.startswith("LMDO")):
+                continue
+            try:
+                found[word] = yield from value(state, word)
+            except Refused:
+                continue  # this drive lacks the register
+        return found
 
     def error(self) -> Procedure[int | None]:
         return error_number(self.state)
 
     def program_input(self) -> Procedure[bool]:
-        return _program_input(self.state)
+        """Read the set-ups of the inputs, which function 65 prints as text."""
+        text = yield from printed(self.state, "IS")
+        return starts_program(split_lines(text))

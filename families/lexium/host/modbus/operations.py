@@ -1,29 +1,30 @@
-"""Conversations with an Ethernet drive over Modbus: identification, typed lines, motion, registers and outputs.
+"""Conversations with an Ethernet drive over Modbus: typed lines, motion and flags.
 
-Identification only reads: nothing moves, no error is cleared. A device that does not identify itself as a Lexium drive
+A device that does not identify itself as a Lexium drive
 is a stranger (`DriveState.stranger`): it is sent the request of a typed line, and no request more.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator
 
 from multidrop.base.errors import Inexpressible, NoAnswer, Refused
 from multidrop.dialects.certifying import Certifying
 from multidrop.dialects.codec import End, Kind, Priority, Procedure, Reply, Request
 from multidrop.dialects.exchange import unanswered
-from multidrop.dialects.family import Hints, Motion
+from multidrop.dialects.family import Motion
 from multidrop.dialects.state import who
-from multidrop.families.lexium.host.mcode.classify import starts_motion
-from multidrop.families.lexium.host.mcode.state import described, earlier_error, report_error
+from multidrop.families.lexium.host.classify import starts_motion
+from multidrop.families.lexium.host.errors import described, earlier_error, report_error
 from multidrop.families.lexium.host.modbus import framing, limits, mapping
-from multidrop.families.lexium.host.modbus.codec import UNKNOWN, USER, Modbus, ModbusState, pdu_codec
+from multidrop.families.lexium.host.modbus.codec import USER, ModbusState, pdu_codec
 from multidrop.families.lexium.host.modbus.mapping import Reading
+from multidrop.families.lexium.host.operations import LexiumOperations
 from multidrop.families.lexium.manual import grammar
 from multidrop.families.lexium.manual.errors import BY_ITSELF
 from multidrop.families.lexium.manual.modbus.help import shown as shown_limits
-from multidrop.families.lexium.manual.modbus.registers import ALTERNATIVE, AT, REGISTERS, ROWS, SETUPS
+from multidrop.families.lexium.manual.modbus.registers import ALTERNATIVE, REGISTERS, ROWS, SETUPS
 from multidrop.families.lexium.manual.points import STATUS, in_words
 from multidrop.families.lexium.manual.program_file import commented, spaced
 
@@ -186,26 +187,107 @@ def flagged(state: ModbusState) -> Procedure[bool]:
 OUTPUTS = 3
 OPEN_LOOP = "LMDO"
 """The beginning of the names of products without an encoder and hMT."""
-MOST = 2
-"""Most registers in one request (4.2.4, 4.2.5)."""
 _ESCAPES = {"b": "\b", "c": "\x03", "e": "\x1b", "g": "\a", "n": "\n", "r": "\r", "t": "\t"}
 
 
-def perform(state: ModbusState, text: str) -> Procedure[tuple[str, ...]]:
-    """Carry out a line of MCode; return the printed lines. Raises Refused, NoAnswer, Stopped or Inexpressible."""
-    text = spaced(text)
-    statement = parsed(state, text)
-    if statement is None:
+class ModbusOperations(LexiumOperations):
+    """What an Ethernet drive is asked to do, and what it says of its motion."""
+
+    state: ModbusState
+
+    def check(self, text: str) -> None:
+        """Raise Inexpressible for a line that is wrong in the language, or has a comment."""
+        parsed(text)
+
+    def perform(self, text: str) -> Procedure[tuple[str, ...]]:
+        """Carry out a line of MCode; return the printed lines. Raises Refused, NoAnswer, Stopped or Inexpressible."""
+        text = spaced(text)
+        statement = parsed(text)
+        if statement is None:
+            return ()
+        if not statement.word:
+            raise Inexpressible(f"'{text}' has no register; an answer to IV goes through {ALTERNATIVE}")
+        if statement.word == "PR":
+            return (yield from self._printed(statement))
+        yield from carried_out(self.state, text, mapping.command(statement))
         return ()
-    if not statement.word:
-        raise Inexpressible(f"'{text}' has no register; an answer to IV goes through {ALTERNATIVE}")
-    if statement.word == "PR":
-        return (yield from _printed(state, statement))
-    yield from carried_out(state, text, mapping.command(statement))
-    return ()
+
+    def _printed(self, statement: grammar.Statement) -> Procedure[tuple[str, ...]]:
+        """Print the items of a PR: one request for each name; the host inserts the rest."""
+        state = self.state
+        if [each.word for each in statement.arguments if isinstance(each, grammar.Name)] == ["AL"]:
+            return (yield from self.every_register())
+        pieces = []
+        for item in list(_items(statement)):  # every item is checked before the first request
+            if isinstance(item, str):
+                pieces.append(item)
+                continue
+            word, reading = item
+            answer = yield from answered(state, request(state, f"PR {word}", reading.pdu))
+            pieces.append(shown(state, word, reading, answer))
+            if state.stranger:
+                continue
+            if word == "ER":
+                report_error(state, int(pieces[-1]))
+            elif word == "EF":
+                state.error_flag_read(pieces[-1] == "1")
+        return tuple("".join(pieces).replace("\r", "").split("\n"))
+
+    def every_register(self) -> Procedure[tuple[str, ...]]:
+        """Print every readable register of this drive and the set-ups, in alphabetical order (PR AL).
+
+        It neither clears an error nor raises one, which could start the drive's error subroutine. So it omits ER while
+        EF is 1. It omits V1 to V8 always: reading one is an error unless a program has declared it (over MCode UV
+        prints them).
+        """
+        state = self.state
+        if state.stranger:
+            raise Inexpressible(
+                f"'PR AL' was not sent, as {state.stranger}. Read one register: PR P, or /register 0x57"
+            )
+        if (yield from flagged(state)):
+            state.note(f"{who(state)}: ER is left out, as reading it clears it; its error flag is set (EF=1)")
+        plain = state.product.startswith(OPEN_LOOP)
+        rows = [row for row in ROWS if row.readable and row.name not in USER and not (plain and row.only)]
+        lines: list[str] = []
+        for word in sorted({row.name for row in rows} | {"IS", "OS"}):
+            if word == "ER" and state.error:
+                continue
+            try:
+                text = yield from printed(state, word)
+            except Refused:
+                continue  # this drive lacks the register
+            if word in SETUPS - REGISTERS.keys():  # a set-up has lines of its own
+                lines += [line for line in text.replace("\r", "").split("\n") if line]
+            else:
+                lines.append(f"{word} = {text}")
+        return tuple(lines)
+
+    def motion(self, priority: Priority) -> Procedure[tuple[Motion, ...]]:
+        """Read position and velocity in two requests, since one carries two registers at most."""
+        position = yield from value(self.state, "P", priority)
+        return (Motion(position, (yield from value(self.state, "V", priority))),)
+
+    def flag(self, name: str) -> Procedure[bool]:
+        answer = yield from answered(self.state, request(self.state, f"PR {name}", mapping.read(REGISTERS[name])))
+        return pdu_codec().registers(answer)[0] != 0
+
+    def status(self) -> Procedure[tuple[str, ...]]:
+        """Describe motion, program, error, inputs and outputs; nothing is cleared."""
+        state = self.state
+        values = []
+        for name in STATUS:
+            register = REGISTERS[name]
+            answer = yield from answered(state, request(state, f"PR {name}", mapping.read(register)))
+            values.append(mapping.value_of(register, pdu_codec().registers(answer)))
+        state.error_flag_read(bool(values[STATUS.index("EF")]))
+        asked = request(state, "O1 to O3", pdu_codec().read(framing.READ_COILS, 0, OUTPUTS))
+        outputs = pdu_codec().bits((yield from answered(state, asked)), OUTPUTS)
+        states = ", ".join(f"{n} {'active' if on else 'inactive'}" for n, on in enumerate(outputs, 1))
+        return (*in_words(*values), f"outputs: {states}")
 
 
-def parsed(state: ModbusState, text: str) -> grammar.Statement | None:
+def parsed(text: str) -> grammar.Statement | None:
     """Parse a line of MCode. Raises Inexpressible for one that is wrong in the language, or has a comment."""
     try:
         grammar.check_groups(text, USER)
@@ -214,27 +296,6 @@ def parsed(state: ModbusState, text: str) -> grammar.Statement | None:
         return grammar.parse(text, USER)
     except grammar.LineError as error:
         raise Inexpressible(f"'{text}': {error.why}; nothing was sent") from None
-
-
-def _printed(state: ModbusState, statement: grammar.Statement) -> Procedure[tuple[str, ...]]:
-    """Print the items of a PR: one request for each name; the host inserts the rest."""
-    if [each.word for each in statement.arguments if isinstance(each, grammar.Name)] == ["AL"]:
-        return (yield from every_register(state))
-    pieces = []
-    for item in list(_items(statement)):  # every item is checked before the first request
-        if isinstance(item, str):
-            pieces.append(item)
-            continue
-        word, reading = item
-        answer = yield from answered(state, request(state, f"PR {word}", reading.pdu))
-        pieces.append(shown(state, word, reading, answer))
-        if state.stranger:
-            continue
-        if word == "ER":
-            report_error(state, int(pieces[-1]))
-        elif word == "EF":
-            state.error_flag_read(pieces[-1] == "1")
-    return tuple("".join(pieces).replace("\r", "").split("\n"))
 
 
 def _items(statement: grammar.Statement) -> Iterator[str | tuple[str, Reading]]:
@@ -252,188 +313,6 @@ def _items(statement: grammar.Statement) -> Iterator[str | tuple[str, Reading]]:
                 raise Inexpressible(f"a register has one sensor of IT, the first; {ALTERNATIVE} has others")
         else:
             raise Inexpressible(f"expressions are not evaluated over Modbus; {ALTERNATIVE} prints them")
-
-
-def every_register(state: ModbusState) -> Procedure[tuple[str, ...]]:
-    """Print every readable register of this drive and the set-ups, in alphabetical order (PR AL).
-
-    It neither clears an error nor raises one, which could start the drive's error subroutine. So it omits ER while EF
-    is 1. It omits V1 to V8 always: reading one is an error unless a program has declared it (over MCode UV prints
-    them).
-    """
-    if state.stranger:
-        raise Inexpressible(f"'PR AL' was not sent, as {state.stranger}. Read one register: PR P, or /register 0x57")
-    if (yield from flagged(state)):
-        state.note(f"{who(state)}: ER is left out, as reading it clears it; its error flag is set (EF=1)")
-    plain = state.product.startswith(OPEN_LOOP)
-    rows = [row for row in ROWS if row.readable and row.name not in USER and not (plain and row.only)]
-    lines: list[str] = []
-    for word in sorted({row.name for row in rows} | {"IS", "OS"}):
-        if word == "ER" and state.error:
-            continue
-        try:
-            text = yield from printed(state, word)
-        except Refused:
-            continue  # this drive lacks the register
-        if word in SETUPS - REGISTERS.keys():  # a set-up has lines of its own
-            lines += [line for line in text.replace("\r", "").split("\n") if line]
-        else:
-            lines.append(f"{word} = {text}")
-    return tuple(lines)
-
-
-def motion(state: ModbusState, priority: Priority) -> Procedure[tuple[Motion, ...]]:
-    """Read position and velocity in two requests, since one carries two registers at most."""
-    position = yield from value(state, "P", priority)
-    return (Motion(position, (yield from value(state, "V", priority))),)
-
-
-def flag(state: ModbusState, name: str) -> Procedure[bool]:
-    answer = yield from answered(state, request(state, f"PR {name}", mapping.read(REGISTERS[name])))
-    return pdu_codec().registers(answer)[0] != 0
-
-
-def status(state: ModbusState) -> Procedure[tuple[str, ...]]:
-    """Describe motion, program, error, inputs and outputs; nothing is cleared."""
-    values = []
-    for name in STATUS:
-        register = REGISTERS[name]
-        answer = yield from answered(state, request(state, f"PR {name}", mapping.read(register)))
-        values.append(mapping.value_of(register, pdu_codec().registers(answer)))
-    state.error_flag_read(bool(values[STATUS.index("EF")]))
-    asked = request(state, "O1 to O3", pdu_codec().read(framing.READ_COILS, 0, OUTPUTS))
-    outputs = pdu_codec().bits((yield from answered(state, asked)), OUTPUTS)
-    states = ", ".join(f"{n} {'active' if on else 'inactive'}" for n, on in enumerate(outputs, 1))
-    return (*in_words(*values), f"outputs: {states}")
-
-
-# Raw registers, outputs and identification
-
-
-def read_registers(state: ModbusState, address: int, count: int | None) -> Procedure[tuple[str, ...]]:
-    """Print raw registers, one line each, then the value that they hold where it is known."""
-    row = AT.get(address)
-    if count is None:
-        count = row.count if row is not None and row.address == address else 1
-    if not 1 <= count <= MOST:
-        raise Inexpressible(f"a request carries 1 or {MOST} registers, not {count}")
-    asked = request(
-        state, f"/register 0x{address:04X} {count}", pdu_codec().read(framing.READ_REGISTERS, address, count)
-    )
-    found = pdu_codec().registers((yield from answered(state, asked)))
-    lines = [f"0x{address + at:04X} = {word} (0x{word:04X})" for at, word in enumerate(found)]
-    if row is not None and (row.address, row.count) == (address, count):
-        lines.append(f"{row.name} = {mapping.value_of(row, found)}")
-    return tuple(lines)
-
-
-def write_registers(state: ModbusState, address: int, values: Sequence[int]) -> Procedure[tuple[str, ...]]:
-    """Write one value into its one or two registers, or two words into one register each."""
-    row = AT.get(address)
-    if len(values) == 1 and row is not None and row.address == address:
-        pdu = mapping.write(row, values[0])
-    else:
-        if not 1 <= len(values) <= MOST:
-            raise Inexpressible(f"a request carries 1 or {MOST} registers, not {len(values)}")
-        if wrong := [value for value in values if not -0x8000 <= value <= 0xFFFF]:
-            raise Inexpressible(f"{wrong[0]} does not fit into a register at 0x{address:04X}")
-        pdu = pdu_codec().write_registers(address, [value & 0xFFFF for value in values])
-    text = ",".join(map(str, values))
-    yield from carried_out(state, f"/register 0x{address:04X} ={text}", pdu)
-    return ()
-
-
-def read_coil(state: ModbusState, number: int) -> Procedure[tuple[str, ...]]:
-    asked = request(state, f"/coil {number}", pdu_codec().read(framing.READ_COILS, number - 1, 1))
-    answer = yield from answered(state, asked)
-    return (f"O{number} = {pdu_codec().bits(answer, 1)[0]}",)
-
-
-def write_coil(state: ModbusState, number: int, on: bool) -> Procedure[tuple[str, ...]]:
-    yield from carried_out(state, f"/coil {number} {int(on)}", pdu_codec().write_coil(number - 1, on))
-    return ()
-
-
-def identification(state: ModbusState, code: int = mapping.EVERY_OBJECT) -> Procedure[dict[int, str]]:
-    """Read all objects of the device identification.
-
-    Raises Refused for a device that lacks it, NoAnswer where nothing shows what the device is.
-    """
-    found: dict[int, str] = {}
-    begin: int | None = 0
-    while begin is not None:
-        asked = request(state, "/device", pdu_codec().identify(code, begin))
-        reply = yield asked
-        if reply.end is End.REFUSED:
-            failure = refusal(state, asked, reply, None)
-            lacks = reply.body[1] not in framing.SAY_NOTHING
-            raise Refused(str(failure)) if lacks else NoAnswer(str(failure))
-        try:
-            more, following = pdu_codec().objects(sure(state, asked, reply))
-        except framing.NotModbus:
-            raise NoAnswer(f"{who(state)}: the reply to '/device' is damaged") from None
-        found |= more
-        begin = following if following is not None and following > begin else None
-    return found
-
-
-def device(state: ModbusState) -> Procedure[tuple[str, ...]]:
-    """Print the identification. What it says decides from now on whether the device is a stranger."""
-    found = yield from identification(state)
-    before = state.stranger
-    recognise(state, found)
-    if before and not state.stranger:
-        state.note(f"this device identified itself as {state.product} now, so it is used as a Lexium drive")
-    elif state.stranger and not before:
-        state.note(WARNING)
-    names = dict(enumerate(mapping.OBJECTS))
-    return tuple(f"{names.get(number, f'object {number}')}: {text}" for number, text in sorted(found.items()))
-
-
-BASIC = 1
-"""The first three objects of the identification, which are mandatory."""
-PRODUCT = re.compile(r"\bLMD[A-Z]E")
-PART, VERSION = 1, 6
-WARNING = (
-    f"{UNKNOWN}, so its registers may mean other things. Only what you type is sent to it. Ctrl+X sends it the stop of "
-    f"a Lexium drive: function 65 (E), then 0 to registers 0x{REGISTERS['SL'].address:04X} and "
-    f"0x{REGISTERS['SL'].address + 1:04X}. /device asks it again what it is"
-)
-"""What a person must know of a stranger."""
-
-
-def identify(hints: Hints) -> Procedure[list[ModbusState]]:
-    state = ModbusState(Modbus())
-    recognise(state, (yield from _announced(state)))
-    if state.stranger:
-        state.note(WARNING)
-    elif (yield from flagged(state)):
-        state.note(f"{who(state)}: its error flag is set (EF=1); PR ER shows and clears the error")
-    return [state]
-
-
-def recognise(state: ModbusState, found: Mapping[int, str]) -> None:
-    """Record what a device says of itself; without the name of a Lexium drive it is a stranger."""
-    text = " ".join(found.get(number, "") for number in (VERSION, PART))
-    product, part = PRODUCT.search(text), found.get(PART, "")
-    name, stranger = (product.group(), "") if product else (part, UNKNOWN)
-    state.identified(name, found.get(VERSION, ""), part, stranger)
-
-
-def _announced(state: ModbusState) -> Procedure[dict[int, str]]:
-    """Read the identification, as far as the device supports it: empty where it does not.
-
-    A reply that does not come is asked for once more: without it a drive would be a stranger, or not open.
-    """
-    for code in (mapping.EVERY_OBJECT, BASIC):
-        try:
-            try:
-                return (yield from identification(state, code))
-            except NoAnswer:
-                return (yield from identification(state, code))
-        except Refused:
-            continue
-    return {}
 
 
 class ModbusCertifying(Certifying):

@@ -12,14 +12,11 @@ from dataclasses import replace
 from functools import partial
 
 from multidrop.base.errors import Diagnostic, Inexpressible, NoAnswer, Refused
-from multidrop.dialects.codec import Priority, Procedure, Request
+from multidrop.dialects.codec import Priority, Procedure
 from multidrop.dialects.state import who
-from multidrop.dialects.units import Basis
 from multidrop.dialects.values import (
-    Actions,
     Change,
     Conditions,
-    Controls,
     Facts,
     Parameters,
     Part,
@@ -29,74 +26,33 @@ from multidrop.dialects.values import (
     Readings,
     Snapshot,
     Value,
-    Values,
     number,
     printed_number,
     same,
 )
-from multidrop.families.lexium.host.mcode import units
-from multidrop.families.lexium.host.mcode.motions import cause
-from multidrop.families.lexium.host.mcode.settings import rows_of_list
-from multidrop.families.lexium.host.mcode.values import SNAPSHOT_WORDS, snapshot_of
 from multidrop.families.lexium.host.modbus import framing, mapping
 from multidrop.families.lexium.host.modbus.codec import ModbusState, pdu_codec
+from multidrop.families.lexium.host.modbus.identity import identification
 from multidrop.families.lexium.host.modbus.operations import (
     OUTPUTS,
-    flag,
-    identification,
-    perform,
+    ModbusOperations,
     printed,
     request,
     sure,
     value,
 )
+from multidrop.families.lexium.host.motions import cause
+from multidrop.families.lexium.host.values import SNAPSHOT_WORDS, LexiumValues, rows_of_list
 from multidrop.families.lexium.manual import parameter_plan, points
 from multidrop.families.lexium.manual import parameters as manual
-from multidrop.families.lexium.manual.groups import LISTS, RESTORING, SCALES
+from multidrop.families.lexium.manual.groups import LISTS
 from multidrop.families.lexium.manual.mnemonic import EVERY
-from multidrop.families.lexium.manual.modbus.registers import AT, IDENTITY, REGISTERS, SETUPS
+from multidrop.families.lexium.manual.modbus.registers import IDENTITY, REGISTERS, SETUPS
 from multidrop.families.lexium.manual.parameters import reading_of
 from multidrop.families.lexium.manual.table import words
 
 NO_REGISTER = "no Modbus register; MCode/TCP (tcp://HOST:503) reads it"
 DECLARED = tuple((f"V{n}", "reading it is an error unless a program declares it") for n in range(1, 9))
-
-
-def read_settings(state: ModbusState, progress: Progress) -> Procedure[Readings]:
-    """Read every setting that a register has. Raises NoAnswer; nothing is changed or cleared."""
-    settings = [each.name for each in manual.settings(state.product, state.version, state.part)]
-    names = [name for name in settings if name in REGISTERS and "values" not in REGISTERS[name].differs]
-    lists = {word: rows for word, rows in manual.lists(state.product, state.version).items() if word != "LS"}
-    found: dict[str, Value] = {}
-    unread = [*manual.unread(state.product), *DECLARED]
-    unread += [(name, NO_REGISTER) for name in settings if name not in names]
-    for done, name in enumerate(names):
-        progress(done, len(names) + len(lists))
-        try:
-            text = yield from printed(state, name)
-            if not re.fullmatch(r"-?\d+", text):
-                raise NoAnswer(f"{who(state)}: the reply to 'PR {name}' is damaged")
-            found[name] = int(text)
-        except Refused as refusal:
-            unread.append((name, str(refusal)))
-    for done, (word, numbers) in enumerate(lists.items(), len(names)):
-        progress(done, len(names) + len(lists))
-        found |= _rows(word, numbers, (yield from printed(state, word)))
-    progress(1, 1)
-    counts, table = manual.counting(found), words(state.product)
-    rows = [reading_of(name, value, table.get(name), counts) for name, value in found.items()]
-    return Readings(tuple(rows), tuple(unread))
-
-
-def plan(state: ModbusState, present: Readings, wanted: Mapping[str, Value], allowed: Permission) -> Plan:
-    """Order the steps to the wanted values; a value that its register does not take is left alone."""
-    given = {name.upper(): value for name, value in wanted.items()}
-    changed = {name: value for name, value in given.items() if not same(value, present.values.get(name))}
-    outside = {name: _why_not(name, value) for name, value in changed.items()}
-    aside = {name: reason for name, reason in outside.items() if reason}
-    inside = {name: value for name, value in given.items() if name not in aside}
-    made = parameter_plan.plan(state.product, present, inside, allowed)
-    return Plan(made.changes, made.withheld, (*made.impossible, *aside.items()), made.remarks)
 
 
 def _why_not(name: str, value: Value) -> str:
@@ -111,16 +67,6 @@ def _why_not(name: str, value: Value) -> str:
     return ""
 
 
-def ready(state: ModbusState) -> Procedure[str]:
-    """Return the reason for which settings must not change now; empty: there is none."""
-    if (yield from flag(state, "MV")):
-        return f"{who(state)} moves: stop it first"
-    if (yield from flag(state, "BY")):
-        return f"{who(state)} runs a program: E ends it"
-    armed = yield from value(state, "TE")
-    return f"{who(state)} has armed trips (TE={armed}): TE=0 disarms them" if armed else ""
-
-
 class ModbusParameters(Parameters):
     """The settings of an Ethernet drive."""
 
@@ -129,19 +75,56 @@ class ModbusParameters(Parameters):
     language = "MCode"
 
     def read(self, progress: Progress) -> Procedure[Readings]:
-        return read_settings(self.state, progress)
+        """Read every setting that a register has. Raises NoAnswer; nothing is changed or cleared."""
+        state = self.state
+        settings = [each.name for each in manual.settings(state.product, state.version, state.part)]
+        names = [name for name in settings if name in REGISTERS and "values" not in REGISTERS[name].differs]
+        lists = {word: rows for word, rows in manual.lists(state.product, state.version).items() if word != "LS"}
+        found: dict[str, Value] = {}
+        unread = [*manual.unread(state.product), *DECLARED]
+        unread += [(name, NO_REGISTER) for name in settings if name not in names]
+        for done, name in enumerate(names):
+            progress(done, len(names) + len(lists))
+            try:
+                text = yield from printed(state, name)
+                if not re.fullmatch(r"-?\d+", text):
+                    raise NoAnswer(f"{who(state)}: the reply to 'PR {name}' is damaged")
+                found[name] = int(text)
+            except Refused as refusal:
+                unread.append((name, str(refusal)))
+        for done, (word, numbers) in enumerate(lists.items(), len(names)):
+            progress(done, len(names) + len(lists))
+            found |= _rows(word, numbers, (yield from printed(state, word)))
+        progress(1, 1)
+        counts, table = manual.counting(found), words(state.product)
+        rows = [reading_of(name, value, table.get(name), counts) for name, value in found.items()]
+        return Readings(tuple(rows), tuple(unread))
 
     def plan(self, present: Readings, wanted: Mapping[str, Value], permission: Permission) -> Plan:
-        return plan(self.state, present, wanted, permission)
+        """Order the steps to the wanted values; a value that its register does not take is left alone."""
+        given = {name.upper(): value for name, value in wanted.items()}
+        changed = {name: value for name, value in given.items() if not same(value, present.values.get(name))}
+        outside = {name: _why_not(name, value) for name, value in changed.items()}
+        aside = {name: reason for name, reason in outside.items() if reason}
+        inside = {name: value for name, value in given.items() if name not in aside}
+        made = parameter_plan.plan(self.state.product, present, inside, permission)
+        return Plan(made.changes, made.withheld, (*made.impossible, *aside.items()), made.remarks)
 
     def ready(self) -> Procedure[str]:
-        return ready(self.state)
+        """Return the reason for which settings must not change now; empty: there is none."""
+        state = self.state
+        if (yield from ModbusOperations(state).flag("MV")):
+            return f"{who(state)} moves: stop it first"
+        if (yield from ModbusOperations(state).flag("BY")):
+            return f"{who(state)} runs a program: E ends it"
+        armed = yield from value(state, "TE")
+        return f"{who(state)} has armed trips (TE={armed}): TE=0 disarms them" if armed else ""
 
     def write(self, change: Change) -> Procedure[object]:
-        return perform(self.state, change.text)
+        return ModbusOperations(self.state).perform(change.text)
 
     def save(self) -> Procedure[object]:
-        return perform(self.state, "S")
+        return ModbusOperations(self.state).perform("S")
 
 
 FLAGS = ("EF", "BY", "MV", "DE")
@@ -150,72 +133,11 @@ SIGNS = ("ST", "AF")
 INPUTS = 4
 
 
-def parts(state: ModbusState, facts: Facts) -> Sequence[Part]:
-    table = words(state.product)
-    signs = [n for n in SIGNS if state.product in EVERY and state.product in table[n].products]
-    found = [Part("state", partial(_state, state, names=(*FLAGS, *signs), before=facts))]
-    has = [n for n in points.SETTINGS if state.product not in EVERY or state.product in table[n].products]
-    found += [Part(name, partial(_registers, state, names=(name,)), slow=True) for name in has]
-    lists = manual.lists(state.product, state.version)
-    found += [Part(word, partial(_setups, state, word=word), slow=True) for word in ("IS", "OS") if word in lists]
-    return found
-
-
-def _registers(state: ModbusState, names: Sequence[str]) -> Procedure[Facts]:
-    found = {}
-    for name in names:
-        found[name] = yield from value(state, name, Priority.POLL)
-    if "EF" in found:
-        state.error_flag_read(bool(found["EF"]))
-    return found
-
-
-def _state(state: ModbusState, names: Sequence[str], before: Facts) -> Procedure[Facts]:
-    found = {**(yield from _registers(state, names)), **(yield from _points(state))}
-    found[points.CAUSE] = cause(state.product, found, before)
-    return found
-
-
-def _points(state: ModbusState) -> Procedure[Facts]:
-    """Read all inputs, then all outputs; an input's bit is 1 while it is active."""
-    found: dict[str, int] = {}
-    for letter, function, count in (("I", framing.READ_INPUTS, INPUTS), ("O", framing.READ_COILS, OUTPUTS)):
-        asked = request(state, f"{letter}1 to {letter}{count}", pdu_codec().read(function, 0, count), Priority.POLL)
-        bits = pdu_codec().bits(sure(state, asked, (yield asked)), count)
-        found |= {f"{letter}{n}": bit for n, bit in enumerate(bits, 1)}
-    return found
-
-
-def _setups(state: ModbusState, word: str) -> Procedure[Facts]:
-    return _rows(word, LISTS[word], (yield from printed(state, word, Priority.POLL)))
-
-
 def _rows(word: str, numbers: Sequence[int], text: str) -> Mapping[str, Value]:
     return rows_of_list(word, numbers, text.replace("\r", "").split("\n"))
 
 
-def fold(state: ModbusState, facts: Facts) -> tuple[Conditions, ...]:
-    return (points.conditions(state.product, facts, None),)
-
-
 _NO_NUMBER = IDENTITY.keys() | SETUPS
-
-
-def check(state: ModbusState, word: str) -> str:
-    """Check that a word has a register or an input to read, and that its reading clears nothing."""
-    name = word.upper()
-    try:
-        mapping.reading(name)
-    except (Inexpressible, Refused) as reason:
-        raise Diagnostic(f"{word} cannot be polled: {reason}") from None
-    if name == "ER" or name in _NO_NUMBER:
-        why = "reading it clears it" if name == "ER" else "it is not a number"
-        raise Diagnostic(f"{word} cannot be polled: {why}")
-    return name
-
-
-def again(state: ModbusState, word: str, priority: Priority) -> Procedure[float]:
-    return printed_number(who(state), word, (yield from printed(state, word, priority)))
 
 
 SERIAL = 5
@@ -225,20 +147,7 @@ DIVIDED = 4
 NO_PROGRAM = ("its program and variables", "Modbus reads neither; MCode/TCP (tcp://HOST:503) does")
 
 
-def take(state: ModbusState, progress: Progress) -> Procedure[Snapshot]:
-    readings = yield from read_settings(state, progress)
-    if not state.serial:
-        state.serial_read((yield from identification(state)).get(SERIAL, ""))
-    known, now = words(state.product), {}
-    for word in SNAPSHOT_WORDS:
-        if word in known and state.product in known[word].products:
-            now[word] = int((yield from printed(state, word)))
-    if "I5" in now:
-        now["I5"] *= DIVIDED
-    return snapshot_of(state, replace(readings, unread=(*readings.unread, NO_PROGRAM)), now)
-
-
-class ModbusValues(Values):
+class ModbusValues(LexiumValues):
     """What is read of an Ethernet drive."""
 
     state: ModbusState
@@ -248,46 +157,71 @@ class ModbusValues(Values):
         return ModbusParameters(self.state)
 
     def snapshot(self, progress: Progress) -> Procedure[Snapshot]:
-        return take(self.state, progress)
+        state = self.state
+        readings = yield from ModbusParameters(state).read(progress)
+        if not state.serial:
+            state.serial_read((yield from identification(state)).get(SERIAL, ""))
+        known, now = words(state.product), {}
+        for word in SNAPSHOT_WORDS:
+            if word in known and state.product in known[word].products:
+                now[word] = int((yield from printed(state, word)))
+        if "I5" in now:
+            now["I5"] *= DIVIDED
+        return self.snapshot_of(replace(readings, unread=(*readings.unread, NO_PROGRAM)), now)
 
     def parts(self, facts: Facts) -> Sequence[Part]:
-        return parts(self.state, facts)
+        state = self.state
+        table = words(state.product)
+        signs = [n for n in SIGNS if state.product in EVERY and state.product in table[n].products]
+        found = [Part("state", partial(self._state, names=(*FLAGS, *signs), before=facts))]
+        has = [n for n in points.SETTINGS if state.product not in EVERY or state.product in table[n].products]
+        found += [Part(name, partial(self._registers, names=(name,)), slow=True) for name in has]
+        lists = manual.lists(state.product, state.version)
+        found += [Part(word, partial(self._setups, word=word), slow=True) for word in ("IS", "OS") if word in lists]
+        return found
 
     def fold(self, facts: Facts) -> tuple[Conditions, ...]:
-        return fold(self.state, facts)
+        return (points.conditions(self.state.product, facts, None),)
 
     def check(self, word: str) -> str:
-        return check(self.state, word)
+        """Check that a word has a register or an input to read, and that its reading clears nothing."""
+        name = word.upper()
+        try:
+            mapping.reading(name)
+        except (Inexpressible, Refused) as reason:
+            raise Diagnostic(f"{word} cannot be polled: {reason}") from None
+        if name == "ER" or name in _NO_NUMBER:
+            why = "reading it clears it" if name == "ER" else "it is not a number"
+            raise Diagnostic(f"{word} cannot be polled: {why}")
+        return name
 
     def again(self, word: str, priority: Priority) -> Procedure[float]:
-        return again(self.state, word, priority)
+        return printed_number(who(self.state), word, (yield from printed(self.state, word, priority)))
 
-    def controls(self, axis: str) -> Controls:
-        return points.controls(self.state, axis)
+    def _registers(self, names: Sequence[str]) -> Procedure[Facts]:
+        found = {}
+        for name in names:
+            found[name] = yield from value(self.state, name, Priority.POLL)
+        if "EF" in found:
+            self.state.error_flag_read(bool(found["EF"]))
+        return found
 
-    @property
-    def actions(self) -> Actions:
-        return points.LexiumActions(self.state)
+    def _points(self) -> Procedure[Facts]:
+        """Read all inputs, then all outputs; an input's bit is 1 while it is active."""
+        found: dict[str, int] = {}
+        for letter, function, count in (("I", framing.READ_INPUTS, INPUTS), ("O", framing.READ_COILS, OUTPUTS)):
+            asked = request(
+                self.state, f"{letter}1 to {letter}{count}", pdu_codec().read(function, 0, count), Priority.POLL
+            )
+            bits = pdu_codec().bits(sure(self.state, asked, (yield asked)), count)
+            found |= {f"{letter}{n}": bit for n, bit in enumerate(bits, 1)}
+        return found
 
+    def _state(self, names: Sequence[str], before: Facts) -> Procedure[Facts]:
+        state = self.state
+        found = {**(yield from self._registers(names)), **(yield from self._points())}
+        found[points.CAUSE] = cause(state.product, found, before)
+        return found
 
-class ModbusUnits(units.LexiumUnits):
-    """The quantities in its lines."""
-
-    state: ModbusState
-
-    def basis(self, axis: str, full_steps: int | None) -> Procedure[Basis]:
-        values = {}
-        for word in units.rests_on(self.state.product):
-            if word in REGISTERS:
-                values[word] = str((yield from value(self.state, word)))
-        return units.counted(self.state.product, values, full_steps)
-
-    def recounts(self, request: Request) -> bool:
-        """Whether it writes such a register, or one that restores all of them, by a word or by its number."""
-        if super().recounts(request):
-            return True
-        if request.body[:1] != bytes([framing.WRITE_REGISTERS]):
-            return False
-        first, count = int.from_bytes(request.body[1:3]), int.from_bytes(request.body[3:5])
-        written = (AT.get(address) for address in range(first, first + count))
-        return any(row.name in (*SCALES, *RESTORING) for row in written if row is not None)
+    def _setups(self, word: str) -> Procedure[Facts]:
+        return _rows(word, LISTS[word], (yield from printed(self.state, word, Priority.POLL)))

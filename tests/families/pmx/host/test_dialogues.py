@@ -10,7 +10,7 @@ from multidrop.dialects.motions import Ending, Evidence, Move, MoveKind, Outcome
 from multidrop.dialects.program_files import Held, Stored
 from multidrop.dialects.scanning import Reach
 from multidrop.dialects.values import ORDINARY, Change, Permission, Plan, Readings
-from multidrop.families.pmx.host import codec, family, motions, operations, programs, units, values
+from multidrop.families.pmx.host import codec, family, motions, operations, programs, scan, units, values
 from multidrop.families.pmx.host.codec import Pmx, PmxState
 from multidrop.families.pmx.host.family import PmxFamily
 from multidrop.families.pmx.host.motions import PmxMotions
@@ -22,7 +22,7 @@ from tests.support.dialogues import dialogue_tests
 
 USED = (
     replace, Hints, Kind, Priority, Ending, Evidence, Move, MoveKind, Outcome, family, PmxFamily, codec, motions,
-    operations, programs, units, values, PmxMotions, PmxDebugging, PmxUnits, PmxActions, PmxParameters, PmxValues,
+    operations, programs, scan, units, values, PmxMotions, PmxDebugging, PmxUnits, PmxActions, PmxParameters, PmxValues,
     Held, Stored, Reach, ORDINARY, Change, Permission, Plan, Readings,
 )  # fmt: skip
 """The names that calls in the files use."""
@@ -64,7 +64,7 @@ def download(state, text, shown=None, held=None):
 def searched(found, **reach):
     """A search whose finds are kept; what it shows, and the number of its steps."""
     steps = list[None]()
-    outcome = yield from operations.search(Reach(**reach), found.append, lambda: steps.append(None))
+    outcome = yield from scan.SCAN.search(Reach(**reach), found.append, lambda: steps.append(None))
     return outcome, len(steps)
 
 

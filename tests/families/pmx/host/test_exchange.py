@@ -11,7 +11,6 @@ from multidrop.dialects import End, Hints, Priority, Reply
 from multidrop.dialects.codec import copy_with
 from multidrop.families.pmx.host.codec import Pmx, PmxState
 from multidrop.families.pmx.host.family import PmxFamily
-from multidrop.families.pmx.host.operations import identify
 from multidrop.families.pmx.manual import help, table
 from tests.support.paths import FACTS
 from tests.support.procedure import ProcedureRunner
@@ -271,7 +270,7 @@ def test_status_in_words():
 
 def test_opening_only_asks():
     far = Far("00", "01", MSTX="256", SLSY="9")
-    first, second = say(identify(Hints(drives=("00", "01"))), far)
+    first, second = say(PmxFamily.identify(Hints(drives=("00", "01"))), far)
     assert (first.product, first.version, first.name) == ("PMX-2ED-SA", "V128BL", "2ED00")
     assert "00: X has a minus limit error; CLRX clears it" in first.notes
     assert any("StepNLoop of Y" in note and "too many" in note for note in first.notes)
@@ -281,24 +280,24 @@ def test_opening_only_asks():
 
 
 def test_one_that_is_missing_is_said_and_kept():
-    here, gone = say(identify(Hints(drives=("00", "05"))), Far("00"))
+    here, gone = say(PmxFamily.identify(Hints(drives=("00", "05"))), Far("00"))
     assert here.product and not gone.product and gone.notes == ["05 does not reply"]
 
 
 def test_behind_a_gateway_no_number_is_needed():
-    (known,) = say(identify(Hints(addressed=False)), Far(""))
+    (known,) = say(PmxFamily.identify(Hints(addressed=False)), Far(""))
     assert (known.address, known.codec) == ("", Pmx(addressed=False))
-    (known,) = say(identify(Hints()), far := Far(""))
+    (known,) = say(PmxFamily.identify(Hints()), far := Far(""))
     assert known.codec == Pmx(addressed=False) and far.sent[0] == b"@00ID\r"
 
 
 def test_nobody_there():
     with pytest.raises(NoAnswer, match="no controller replies at 00, 01"):
-        say(identify(Hints(drives=("00", "01"))), Far("99"))
+        say(PmxFamily.identify(Hints(drives=("00", "01"))), Far("99"))
     with pytest.raises(Inexpressible, match="00 to 99"):
-        say(identify(Hints(drives=("a",))), Far())
+        say(PmxFamily.identify(Hints(drives=("a",))), Far())
     with pytest.raises(Inexpressible, match="for MCode"):
-        say(identify(Hints(em=1)), Far())
+        say(PmxFamily.identify(Hints(em=1)), Far())
 
 
 def test_the_stop_aborts_each_and_ends_its_programs_in_pieces():

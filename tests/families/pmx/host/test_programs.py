@@ -11,6 +11,7 @@ from multidrop.base.files import SourceLine, program_text_of
 from multidrop.dialects.codec import End, Reply
 from multidrop.families.pmx.host import programs
 from multidrop.families.pmx.host.codec import Pmx, PmxState
+from multidrop.families.pmx.host.programs import PmxPrograms
 from multidrop.families.pmx.manual import program_file
 from tests.support.pmx_programs import EXAMPLES, TEN_TIMES, plain
 
@@ -107,7 +108,7 @@ def held(talk, far: Far):  # type: ignore[no-untyped-def]
 
 
 def put(far: Far, text: str) -> None:
-    held(programs.download(PmxState(Pmx(), "00"), program_file.read(text, "x"), None, lambda done, total: None), far)
+    held(PmxPrograms(PmxState(Pmx(), "00")).download(program_file.read(text, "x"), None, lambda done, total: None), far)
 
 
 def test_a_script_is_written_and_what_a_longer_one_has_left_is_erased() -> None:
@@ -120,8 +121,8 @@ def test_a_script_is_written_and_what_a_longer_one_has_left_is_erased() -> None:
         "SA2": "XX",
     }
     state = PmxState(Pmx(), "00")
-    assert programs.readable(held(programs.read(state, (), nothing), far)) == ("X1", "END")
-    assert held(programs.PmxPrograms(state).upload(True), far) == ("SA0=CV1", "SA1=&X$1", "SA2=XX")
+    assert PmxPrograms(PmxState(Pmx(), "00")).readable(held(PmxPrograms(state).read((), nothing), far)) == ("X1", "END")
+    assert held(PmxPrograms(state).upload(True), far) == ("SA0=CV1", "SA1=&X$1", "SA2=XX")
 
 
 def test_a_script_is_refused_by_anything_but_the_simulator_before_something_is_written() -> None:
@@ -148,4 +149,7 @@ def test_a_line_that_was_not_kept_names_its_line_of_the_file() -> None:
 def test_a_controller_without_a_program_says_so() -> None:
     with pytest.raises(Refused, match="00 holds no program"):
         held(programs.PmxPrograms(PmxState(Pmx(), "00")).upload(False), Far())
-    assert programs.readable(held(programs.read(PmxState(Pmx(), "00"), (), nothing), Far())) == ()
+    assert (
+        PmxPrograms(PmxState(Pmx(), "00")).readable(held(PmxPrograms(PmxState(Pmx(), "00")).read((), nothing), Far()))
+        == ()
+    )

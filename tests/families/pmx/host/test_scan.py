@@ -1,7 +1,7 @@
 """The search for PMX controllers at one baud rate."""
 
 from multidrop.dialects.scanning import Reach
-from multidrop.families.pmx.host import operations
+from multidrop.families.pmx.host import scan
 
 
 def searched(bench, *numbers, baud=9600, before=b"", **faults):
@@ -9,8 +9,8 @@ def searched(bench, *numbers, baud=9600, before=b"", **faults):
     desk.wire.receive(before, 0.0)
     desk.wait(0.2)
     begun, found, steps = desk.now, [], []
-    outcome = desk.run(operations.search(Reach(), found.append, lambda: steps.append(1)))
-    assert len(steps) == operations.SCAN.places(Reach())
+    outcome = desk.run(scan.SCAN.search(Reach(), found.append, lambda: steps.append(1)))
+    assert len(steps) == scan.SCAN.places(Reach())
     return [(each.address, each.product) for each in found], outcome, desk.now - begun
 
 

@@ -11,7 +11,9 @@ from hypothesis import strategies as st
 from multidrop.base.errors import Inexpressible, NoAnswer, Refused, Stopped
 from multidrop.base.files import SourceLine
 from multidrop.families.tmcl.host import programs
+from multidrop.families.tmcl.host.codec import Tmcl, TmclState
 from multidrop.families.tmcl.host.family import TmclFamily
+from multidrop.families.tmcl.host.programs import TmclPrograms
 from multidrop.families.tmcl.manual import instructions, program_file
 from multidrop.families.tmcl.manual.commands import Call, Command
 from tests.families.tmcl.host.test_exchange import Shop
@@ -36,7 +38,7 @@ def opened() -> tuple[Any, Any]:
 
 
 def load(shop: Any, state: Any, text: str) -> None:
-    shop.run(programs.download(state, lines(text), None, nothing))
+    shop.run(TmclPrograms(state).download(lines(text), None, nothing))
 
 
 def test_a_download_byte_for_byte() -> None:
@@ -53,9 +55,9 @@ def test_a_download_byte_for_byte() -> None:
         "01 00 00 00 00 00 00 00 01",  # nothing after it
         "01 85 00 00 00 00 00 00 86",
     ]
-    held = shop.run(programs.read_held(state, lines(FILE), nothing))
+    held = shop.run(TmclPrograms(state).read(lines(FILE), nothing))
     assert [line.text for line in held.lines] == ["MVP ABS, 0, 1000", "WAIT POS, 0, 0", "JA 0"]
-    assert programs.differences(state, lines(FILE), held) == ()
+    assert TmclPrograms(state).differences(lines(FILE), held) == ()
     assert not state.programming and state.restore is None
 
 
@@ -79,11 +81,11 @@ def test_a_running_program_is_not_overwritten() -> None:
     with pytest.raises(Refused, match="its program runs; 128 0, 0, 0 ends it"):
         load(shop, state, "STOP")
     assert len(shop.devices["1"].program.memory) == 3
-    assert shop.run(programs.end(state)) is True
+    assert shop.run(TmclPrograms(state).end()) is True
     load(shop, state, "STOP")
-    held = shop.run(programs.read_held(state, (), nothing))
+    held = shop.run(TmclPrograms(state).read((), nothing))
     assert [line.text for line in held.lines] == ["STOP", "JA 0"], "what the file does not reach stays"
-    assert programs.differences(state, lines("STOP"), held) == ()
+    assert TmclPrograms(state).differences(lines("STOP"), held) == ()
 
 
 def test_a_motor_that_moves_without_a_program_ends_the_download_before_it_begins() -> None:
@@ -91,7 +93,7 @@ def test_a_motor_that_moves_without_a_program_ends_the_download_before_it_begins
     shop.type(state, "ROR 0, 1000")
     shop.wait(0.5)
     with pytest.raises(Refused, match="moves: stop it first"):
-        shop.run(programs.end(state))
+        shop.run(TmclPrograms(state).end())
 
 
 @pytest.mark.parametrize("lost", range(1, 7))
@@ -116,7 +118,7 @@ def test_a_stop_in_a_download_ends_it_and_is_told() -> None:
             shop.line.stop(shop.now)
 
     with pytest.raises(Stopped, match="lines are stored: the program in module 1 is incomplete"):
-        shop.run(programs.download(state, lines(FILE), None, nothing), at=stop)
+        shop.run(TmclPrograms(state).download(lines(FILE), None, nothing), at=stop)
     assert any("the download was cut off" in note for note in state.notes)
 
 
@@ -130,7 +132,7 @@ def test_routines_at_other_addresses_are_listed_with_a_gap_and_come_back() -> No
     device.program.load({})
     load(shop, state, "\n".join(upload))
     assert list(device.program.memory) == memory
-    assert programs.readable(programs.held_of({0: Call(28), 1: Call(22, value=0)})) == (
+    assert TmclPrograms(TmclState(Tmcl(), "1")).readable(programs.held_of({0: Call(28), 1: Call(22, value=0)})) == (
         "0  Line0: STOP",
         "1         JA Line0",
     )

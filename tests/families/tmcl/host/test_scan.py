@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from multidrop.dialects import End, Kind, Reply
 from multidrop.dialects.scanning import Outcome, Reach
-from multidrop.families.tmcl.host import scan
 from multidrop.families.tmcl.host.codec import call_of
+from multidrop.families.tmcl.host.scan import TmclScan
 from multidrop.families.tmcl.manual.commands import Axis, Command
 from tests.support.procedure import ProcedureRunner
 
@@ -46,7 +46,9 @@ class Bus:
 
 def searched(bus, **reach):
     found, steps = [], []
-    runner = ProcedureRunner(scan.search(Reach(**{"everything": True, **reach}), found.append, lambda: steps.append(0)))
+    runner = ProcedureRunner(
+        TmclScan.search(Reach(**{"everything": True, **reach}), found.append, lambda: steps.append(0))
+    )
     while runner.request is not None:
         runner.answer(bus(runner.request))
     return runner.result, [(state.address, state.product, state.motors) for state in found], len(steps)

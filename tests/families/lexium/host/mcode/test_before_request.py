@@ -7,8 +7,8 @@ import pytest
 
 from multidrop.base.errors import DriveError, NoAnswer
 from multidrop.dialects import Hints, Owed
-from multidrop.families.lexium.host.mcode import identify
 from multidrop.families.lexium.host.mcode.codec import MCode
+from multidrop.families.lexium.host.mcode.family import MCodeFamily
 from multidrop.simulator.cell.spec import Faults
 from tests.support.faults import disturb
 from tests.support.mcode_drives import MODES, Witness
@@ -25,8 +25,8 @@ class Again:
         [self.device] = self.desk.devices.values()
         for text in before:
             assert not self.device.execute(text, 0.0).refused
-        [state] = self.desk.run(identify.identify(hints))
-        self.last = identify.remember(state)
+        [state] = self.desk.run(MCodeFamily.identify(hints))
+        self.last = MCodeFamily(state).remember()
         self.hints = replace(hints, lazy=True, remembered=(self.last,), first_mark=40)
 
     def open(self):
@@ -35,7 +35,7 @@ class Again:
         self.desk.line.events(self.desk.now)
         self.desk.written.clear()
         self.witness = Witness(self.device)
-        [self.state] = self.desk.run(identify.identify(self.hints))
+        [self.state] = self.desk.run(MCodeFamily.identify(self.hints))
         return self.state
 
     def type(self, text):
@@ -65,7 +65,7 @@ def test_a_print_confirms_itself_and_is_sent_once(bench, em, check, party, hints
     assert again.executed("PR VM") == 1 and not again.device.memory.error_flag
     if state.unconfirmed:
         assert state.codec.escape is None and state.settings_unknown  # a stop still takes every form
-        assert identify.remember(state) == again.last
+        assert MCodeFamily(state).remember() == again.last
 
 
 @pytest.mark.parametrize(("party", "hints"), WAYS)
@@ -79,7 +79,7 @@ def test_before_any_other_line_the_drive_prints_what_it_is_and_how_it_is_set(ben
     assert again.executed("VM=300000") == 1 and not again.device.memory.error_flag
     frames = [frame for frame in again.desk.written if b"SN" in frame or b"VM" in frame]
     assert b"SN" in frames[0]
-    assert identify.remember(again.state) == again.last
+    assert MCodeFamily(again.state).remember() == again.last
 
 
 @pytest.mark.parametrize("text", ["PR ER", "PR ST", "PR PN", 'PR "x"', "PR R1;", "PR NOWHERE", "PR P,2", "PR AL"])
@@ -97,7 +97,7 @@ def test_a_print_that_clears_or_may_be_refused_does_not_confirm_itself(bench, te
 
 def test_with_everything_given_nothing_but_the_ping_and_the_print_is_sent(bench):
     desk = bench([table(True)])
-    [state] = desk.run(identify.identify(replace(STATED, checksum=0, em=1, lazy=True)))
+    [state] = desk.run(MCodeFamily.identify(replace(STATED, checksum=0, em=1, lazy=True)))
     assert desk.type(state, "PR P") == ("0",)
     assert desk.written == [b"~\n\n", b"a\n", b'aPR P,"~a1"\n']
 
@@ -108,7 +108,7 @@ def test_with_everything_given_nothing_but_the_ping_and_the_print_is_sent(bench)
 @pytest.mark.parametrize("em", [0, 1])
 def test_a_checksum_that_the_user_states_wrongly_is_no_error_in_the_drive(bench, em, stated, check, lazy, line):
     desk = bench([table(True, em=em, check=check)])
-    [state] = desk.run(identify.identify(replace(STATED, checksum=stated, lazy=lazy)))
+    [state] = desk.run(MCodeFamily.identify(replace(STATED, checksum=stated, lazy=lazy)))
     desk.type(state, line)
     assert not desk.devices["a"].memory.error_flag and state.codec.checksum == (
         check if state.unconfirmed is None else 0
@@ -182,7 +182,7 @@ def test_a_drive_that_is_gone_or_renamed_is_sent_nothing_and_forgotten(bench, pa
     again.open()
     with pytest.raises(NoAnswer, match="does not reply"):
         again.type(line)
-    assert again.executed(line) == 0 and identify.remember(again.state) is None
+    assert again.executed(line) == 0 and MCodeFamily(again.state).remember() is None
     assert not party or not again.device.memory.error_flag
 
 
@@ -264,7 +264,7 @@ def test_on_a_bad_wire_nothing_is_carried_out_twice_and_no_value_is_wrong(bench,
 
 def test_only_the_drive_that_a_line_names_is_found_out(bench):
     desk = bench([{"name": name, "party": True, "set": {"EM": 1}} for name in "abc"])
-    a, b, c = desk.run(identify.identify(Hints(drives=("a", "b", "c"), lazy=True)))
+    a, b, c = desk.run(MCodeFamily.identify(Hints(drives=("a", "b", "c"), lazy=True)))
     assert desk.type(b, "PR P") == ("0",) and desk.type(c, "VM=300000") == ()
     assert desk.written[:2] == [b"~\n\n", b"b\n"] and not any(frame.startswith(b"a") for frame in desk.written)
     assert [state.settings_unknown for state in (a, b, c)] == [True, True, False]

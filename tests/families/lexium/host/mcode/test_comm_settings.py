@@ -7,7 +7,7 @@ import pytest
 
 from multidrop.base.errors import DriveError, NoAnswer, Refused
 from multidrop.dialects import End, Reply
-from multidrop.families.lexium.host.mcode import classify
+from multidrop.families.lexium.host import classify
 from multidrop.families.lexium.host.mcode.codec import MCode
 from multidrop.families.lexium.host.mcode.family import MCodeFamily
 from multidrop.families.lexium.host.mcode.state import MCodeState

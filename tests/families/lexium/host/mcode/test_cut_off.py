@@ -6,7 +6,6 @@ import pytest
 
 from multidrop.base.errors import TransportLost
 from multidrop.dialects import End, Hints, Owed, Reply
-from multidrop.families.lexium.host.mcode import identify
 from multidrop.families.lexium.host.mcode.codec import MCode
 from multidrop.families.lexium.host.mcode.family import MCodeFamily
 from multidrop.families.lexium.host.mcode.operations import put_back_found
@@ -40,7 +39,7 @@ def left(bench, em=1, party=True, check=1, half=b"", program=(), **settings):
 
 def found(desk, party, **hints):
     drives = ("a",) if party else ()
-    return desk.run(identify.identify(Hints(drives=drives, party=party or None, **hints)))
+    return desk.run(MCodeFamily.identify(Hints(drives=drives, party=party or None, **hints)))
 
 
 @pytest.mark.slow
@@ -182,7 +181,7 @@ def test_what_could_not_be_put_back_at_opening_stays_owed_and_is_put_back_before
             disturb(desk.wire, Faults(drop=1.0))
 
     hints = Hints(drives=("a",), party=True, owed=(owed,))
-    [state] = desk.run(identify.identify(hints), at=loses)
+    [state] = desk.run(MCodeFamily.identify(hints), at=loses)
     assert lost and state.restore == owed and any("may be EM=0 now" in note for note in state.notes)
     disturb(desk.wire)
     assert desk.type(state, "PR EM") == ("1",)

@@ -9,7 +9,12 @@ from hypothesis import strategies as st
 from multidrop.dialects.codec import Decoded, End
 from multidrop.dialects.program_files import Stored
 from multidrop.families.lexium.host.mcode.codec import MCode
-from multidrop.families.lexium.host.mcode.debugging import ENTER, SPACE, entry, hold, key, may_follow, traced
+from multidrop.families.lexium.host.mcode.debugging import (
+    ENTER,
+    SPACE,
+    MCodeDebugging,
+    key,
+)
 from multidrop.families.lexium.host.mcode.state import MCodeState
 
 PROGRAM = [
@@ -80,7 +85,7 @@ def test_any_bytes_are_a_line_or_nothing(data: bytes, em: int) -> None:
         found = request.codec.decode(request, data) or request.codec.on_timeout(request, data)
         assert 0 <= found.used <= len(data)
         if body == SPACE and found.reply.end is End.DONE:
-            assert traced(found.reply.text) is not None
+            assert MCodeDebugging(MCodeState(MCode())).traced(found.reply.text) is not None
 
 
 def test_enter_ends_with_quiet_and_prints_are_strays() -> None:
@@ -112,21 +117,33 @@ def test_enter_ends_with_quiet_and_prints_are_strays() -> None:
 )
 def test_what_can_follow_a_line(last: int, place: str, follows: bool) -> None:
     row = next(each for each in PROGRAM if each.at == last)
-    assert may_follow(PROGRAM, row, place) is follows
+    assert MCodeDebugging(MCodeState(MCode())).may_follow(PROGRAM, row, place) is follows
 
 
 def test_a_return_proves_nothing_where_it_may_lead_back_to_a_hold() -> None:
     program = [*PROGRAM, Stored(60, "LB K3"), Stored(65, "H 10000")]
-    assert not may_follow(program, Stored(55, "RT"), "31")
-    assert not may_follow([*PROGRAM[:5], Stored(29, "LK=1"), *PROGRAM[5:]], Stored(29, "LK=1"), "31")
+    assert not MCodeDebugging(MCodeState(MCode())).may_follow(program, Stored(55, "RT"), "31")
+    assert not MCodeDebugging(MCodeState(MCode())).may_follow(
+        [*PROGRAM[:5], Stored(29, "LK=1"), *PROGRAM[5:]], Stored(29, "LK=1"), "31"
+    )
 
 
 def test_the_time_of_a_hold() -> None:
-    assert [hold(text) for text in ("H 250", "H", "H 0", "MR 5", "H Q1")] == [0.25, 0, 0, 0, None]
+    assert [MCodeDebugging(MCodeState(MCode())).hold(text) for text in ("H 250", "H", "H 0", "MR 5", "H Q1")] == [
+        0.25,
+        0,
+        0,
+        0,
+        None,
+    ]
 
 
 def test_a_program_begins_at_su_or_at_address_1() -> None:
-    assert entry(PROGRAM) == "SU" and entry(PROGRAM[1:]) == "1" and entry([]) == "1"
+    assert (
+        MCodeDebugging(MCodeState(MCode())).entry(PROGRAM) == "SU"
+        and MCodeDebugging(MCodeState(MCode())).entry(PROGRAM[1:]) == "1"
+        and MCodeDebugging(MCodeState(MCode())).entry([]) == "1"
+    )
 
 
 @pytest.mark.parametrize(
@@ -141,4 +158,4 @@ def test_a_program_begins_at_su_or_at_address_1() -> None:
     ],
 )
 def test_a_traced_line_is_told_from_a_print(line: str, row: Stored | None) -> None:
-    assert traced(line) == row
+    assert MCodeDebugging(MCodeState(MCode())).traced(line) == row

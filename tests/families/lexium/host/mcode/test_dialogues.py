@@ -13,9 +13,11 @@ from multidrop.dialects.program_files import Held, Stored
 from multidrop.dialects.scanning import Reach
 from multidrop.dialects.state import Remembered
 from multidrop.dialects.values import ORDINARY, Change, Permission, Plan, Readings
+from multidrop.families.lexium.host import classify
+from multidrop.families.lexium.host import motions as lexium_motions
+from multidrop.families.lexium.host import values as lexium_values
 from multidrop.families.lexium.host.mcode import (
     before_request,
-    classify,
     codec,
     debugging,
     download,
@@ -35,8 +37,10 @@ from multidrop.families.lexium.host.mcode import (
     values,
 )
 from multidrop.families.lexium.host.mcode.codec import MCode
+from multidrop.families.lexium.host.mcode.debugging import MCodeDebugging
 from multidrop.families.lexium.host.mcode.family import MCodeFamily
 from multidrop.families.lexium.host.mcode.motions import MCodeMotions
+from multidrop.families.lexium.host.mcode.scan import MCodeScan
 from multidrop.families.lexium.host.mcode.state import MCodeState, Place, Unconfirmed
 from multidrop.families.lexium.host.mcode.units import MCodeUnits
 from multidrop.families.lexium.host.mcode.values import MCodeParameters, MCodeValues
@@ -44,6 +48,7 @@ from multidrop.families.lexium.manual import program_file
 from tests.support.dialogues import dialogue_tests
 
 USED = (
+    lexium_motions, lexium_values, MCodeDebugging,
     replace, Hints, Kind, Owed, Priority, Started, Looking, family, MCodeFamily, before_request, classify, codec,
     debugging, download, exchange, framing, identify, identity, motions, operations, program_readout, programs,
     reply_parser, scan, settings, units, values, MCodeMotions, Place, Unconfirmed, MCodeUnits, MCodeParameters,
@@ -112,7 +117,7 @@ def held(*lines, names=(), locked=False):
 def searched(found, **reach):
     """A search whose finds are kept; what it shows, and the number of its steps."""
     steps = list[None]()
-    outcome = yield from scan.search(Reach(**reach), found.append, lambda: steps.append(None))
+    outcome = yield from MCodeScan.search(Reach(**reach), found.append, lambda: steps.append(None))
     return outcome, len(steps)
 
 

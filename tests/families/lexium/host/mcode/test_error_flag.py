@@ -6,7 +6,6 @@ from hypothesis import strategies as st
 
 from multidrop.base.errors import DriveError, NoAnswer, Refused
 from multidrop.dialects import End, Hints, Priority
-from multidrop.families.lexium.host.mcode import identify
 from multidrop.families.lexium.host.mcode.codec import MCode
 from multidrop.families.lexium.host.mcode.family import MCodeFamily
 from multidrop.families.lexium.host.mcode.framing import sealed
@@ -72,7 +71,7 @@ def test_it_is_opened_while_an_error_stands_and_that_is_said(bench, em, party, c
     device = desk.devices[name]
     device.fail(86, 0.0)
     hints = Hints(drives=("a",), party=True) if party else Hints()
-    [state] = desk.run(identify.identify(hints))
+    [state] = desk.run(MCodeFamily.identify(hints))
     assert state.codec == MCode(em=em, party=party, checksum=check, escape=1)
     assert state.error and device.memory.error_flag and state.product.startswith("MDI")
     assert any("EF=1" in note for note in state.notes)

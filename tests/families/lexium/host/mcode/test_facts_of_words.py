@@ -5,11 +5,13 @@ import csv
 import pytest
 
 from multidrop.dialects.codec import Started
+from multidrop.dialects.families import FAMILIES
 from multidrop.dialects.motions import MoveKind
-from multidrop.families.lexium.host.mcode import classify, motions
+from multidrop.families.lexium.host import classify, motions
 from multidrop.families.lexium.host.mcode.codec import MCode
+from multidrop.families.lexium.host.mcode.motions import known_words
 from multidrop.families.lexium.host.mcode.state import MCodeState
-from multidrop.families.lexium.host.mcode.units import LexiumUnits
+from multidrop.families.lexium.host.units import LexiumUnits
 from multidrop.families.lexium.manual import groups, guards, program_checker, program_file
 from multidrop.families.lexium.manual.mnemonic import (
     LEXIUM,
@@ -126,7 +128,7 @@ def test_a_setting_that_changes_a_count_makes_the_place_of_a_drive_unknown(text:
 @pytest.mark.parametrize("text", ["HM 1", "HI 3", "HF 1"])
 def test_every_homing_is_one(text: str) -> None:
     """(5.1.52 to 5.1.54.)"""
-    referencing = classify.referencing(drive("LMDCM"), text)
+    referencing = FAMILIES["mcode"](drive("LMDCM")).referencing(text)
     assert referencing is not None and referencing.homing
     assert classify.started(text) == Started(None, program=False, lasts=False)
     assert [move.kind for move in motions.effect(drive("LMDCM"), text).begins] == [MoveKind.HOMING]
@@ -137,8 +139,8 @@ def test_the_clock_of_an_mdriveplus_moves_it_without_a_line_and_cm_is_a_free_nam
     assert [move.kind for move in motions.effect(drive("MDIX"), "CM=1").begins] == [MoveKind.VELOCITY]
     assert motions.effect(drive("MDIX"), "CM=0").frees
     assert not motions.effect(drive("LMDCM"), "CM=1").begins
-    assert motions.known_words("MDIX", motions.FREE) == ["TE", "JE", "CM"]
-    assert motions.known_words("LMDCM", motions.FREE) == ["TE", "JE", "FL"]
+    assert known_words("MDIX", motions.FREE) == ["TE", "JE", "CM"]
+    assert known_words("LMDCM", motions.FREE) == ["TE", "JE", "FL"]
 
 
 @pytest.mark.parametrize("text", ["SL 0", "JE=0", "FL=0", "CM=0"])

@@ -7,8 +7,9 @@ import pytest
 from multidrop.base.errors import Inexpressible, NoAnswer
 from multidrop.dialects import Hints, Reply
 from multidrop.drives.line import Line
-from multidrop.families.lexium.host.mcode import identify, identity
+from multidrop.families.lexium.host.mcode import identity
 from multidrop.families.lexium.host.mcode.codec import MCode
+from multidrop.families.lexium.host.mcode.family import MCodeFamily
 from multidrop.simulator.cell.spec import Faults
 from tests.support.faults import disturb
 from tests.support.mcode_drives import MODES, Witness
@@ -21,7 +22,7 @@ def opened(bench, *tables, hints=None, before=()):
     device = next(iter(desk.devices.values()))
     for text in before:
         assert not device.execute(text, 0.0).refused, text
-    found = desk.run(identify.identify(hints or Hints()))
+    found = desk.run(MCodeFamily.identify(hints or Hints()))
     return desk, device, found
 
 
@@ -39,7 +40,7 @@ def test_half_a_line_on_a_party_line_is_not_executed_by_opening(bench):
     desk = bench([{"name": "a", "party": True}])
     desk.wire.receive(b"\n\naMR 51200", 0.0)
     desk.wait(0.1)
-    [state] = desk.run(identify.identify(Hints(drives=("a",), party=True)))
+    [state] = desk.run(MCodeFamily.identify(Hints(drives=("a",), party=True)))
     assert state.product == "LMDCM"
     assert not desk.devices["a"].moving(desk.now) and desk.devices["a"].position(desk.now) == 0
 
@@ -54,7 +55,7 @@ def test_a_lost_answer_does_not_lead_to_a_checksum_that_the_drive_would_refuse(b
         desk = bench([{"name": "a", "party": True, "set": {"EM": 1}}], baud=9600)
         disturb(desk.wire, Faults(drop=0.002), seed)
         try:
-            desk.run(identify.identify(Hints(drives=("a",))))
+            desk.run(MCodeFamily.identify(Hints(drives=("a",))))
         except NoAnswer:
             continue
         assert [frame for frame in desk.written if frame[:1] == b"a" and max(frame) > 0x7F] == [], seed
@@ -68,7 +69,7 @@ def test_a_name_of_two_characters_is_refused_before_anything_is_sent(bench):
     for cut in (False, True):
         desk = bench([{"name": "a", "party": True}, {"name": "b", "party": True}])
         with pytest.raises(Inexpressible, match="no drive name 'ab'"):
-            desk.run(identify.identify(Hints(drives=("a", "ab"), cut=cut)))
+            desk.run(MCodeFamily.identify(Hints(drives=("a", "ab"), cut=cut)))
         assert desk.written == [] and not any(device.memory.error_flag for device in desk.devices.values())
 
 
@@ -81,7 +82,7 @@ def test_several_drives_are_found_as_each_is_set_and_only_print(bench, names, em
     devices = list(desk.devices.values())
     witnesses = [Witness(device) for device in devices]
     before = [(dict(device.memory.values), repr(device.nvm.store)) for device in devices]
-    found = desk.run(identify.identify(Hints(drives=tuple(names))))
+    found = desk.run(MCodeFamily.identify(Hints(drives=tuple(names))))
     expected = [MCode(em=em, party=True, checksum=check, escape=i) for i in range(len(names))]
     assert [state.codec for state in found] == expected
     assert [(dict(device.memory.values), repr(device.nvm.store)) for device in devices] == before
@@ -97,7 +98,7 @@ def test_a_drive_named_like_a_command_is_found_on_a_party_line(bench, name, part
     desk.wire.receive(b"\n\n", 0.0)
     [device] = desk.devices.values()
     witness = Witness(device)
-    [state] = desk.run(identify.identify(Hints(drives=(name,), party=party)))
+    [state] = desk.run(MCodeFamily.identify(Hints(drives=(name,), party=party)))
     assert (state.address, state.product, device.memory.error_flag) == (name, "LMDCM", False)
     assert all(text.startswith("PR ") for text, _, _ in witness.lines)
 
@@ -105,7 +106,7 @@ def test_a_drive_named_like_a_command_is_found_on_a_party_line(bench, name, part
 @pytest.mark.parametrize("name", "PES")
 def test_a_drive_named_like_a_command_that_is_alone_is_found(bench, name):
     desk = bench([{"name": name}])
-    [state] = desk.run(identify.identify(Hints(drives=(name,), party=False)))
+    [state] = desk.run(MCodeFamily.identify(Hints(drives=(name,), party=False)))
     assert (state.address, state.name, state.product) == ("", name, "LMDCM")
     assert not desk.devices[name].memory.error_flag
 
@@ -113,7 +114,7 @@ def test_a_drive_named_like_a_command_that_is_alone_is_found(bench, name):
 def test_what_helps_where_a_single_drive_named_p_is_not_in_party_mode_is_said(bench):
     desk = bench([{"name": "P"}])
     with pytest.raises(NoAnswer, match="party=0"):
-        desk.run(identify.identify(Hints(drives=("P",))))
+        desk.run(MCodeFamily.identify(Hints(drives=("P",))))
     assert not desk.devices["P"].memory.error_flag
 
 
@@ -122,7 +123,7 @@ def test_what_helps_where_a_single_drive_named_p_is_not_in_party_mode_is_said(be
 def test_a_slow_line_behind_a_gateway_is_opened_though_its_baud_rate_is_not_known(bench, em, check, name):
     desk = bench([{"name": name or "!", "party": bool(name), "set": {"EM": em, "CK": check}}], baud=1200)
     desk.line = Line(MCode())
-    [state] = desk.run(identify.identify(Hints(drives=("a",), party=True) if name else Hints()))
+    [state] = desk.run(MCodeFamily.identify(Hints(drives=("a",), party=True) if name else Hints()))
     assert (state.product, state.codec.em, state.codec.checksum) == ("LMDCM", em, check)
     assert not next(iter(desk.devices.values())).memory.error_flag
 
@@ -140,7 +141,7 @@ def test_nothing_is_misread_on_a_bad_wire_and_nothing_but_prints_is_executed(ben
         witnesses = [Witness(device) for device in desk.devices.values()]
         disturb(desk.wire, Faults(flip=3e-3, drop=1e-3, delay=(0.0, 0.01)), number)
         try:
-            knowns = desk.run(identify.identify(Hints(drives=tuple(names) if party else ())))
+            knowns = desk.run(MCodeFamily.identify(Hints(drives=tuple(names) if party else ())))
         except NoAnswer:
             knowns = []
         for i, state in enumerate(knowns):
@@ -165,7 +166,7 @@ def test_nothing_is_misread_on_a_bad_wire_and_nothing_but_prints_is_executed(ben
     ],
 )
 def test_a_version_that_lost_its_head_is_not_taken_for_an_older_product(said, version):
-    talk = identify.identify(Hints(party=False))
+    talk = MCodeFamily.identify(Hints(party=False))
     request = next(talk)
     mark = request.text.rpartition(",")[2].strip('"').encode()
     following = talk.send(Reply(raw=said + b">LMDCM853>110>110" + mark + b"\r\n"))
@@ -185,7 +186,7 @@ def test_another_host_on_the_line_does_not_mislead(bench, offset):
             due.pop(0)
             desk.wire.receive(b'bPR P,"b ",V\n', desk.now)
 
-    found = desk.run(identify.identify(Hints(drives=("a", "b"))), at=poll)
+    found = desk.run(MCodeFamily.identify(Hints(drives=("a", "b"))), at=poll)
     for i, state in enumerate(found):
         assert state.settings_unknown or state.codec == MCode(em=1, party=True, escape=i)
         assert state.product in ("", "LMDCM")
@@ -199,7 +200,7 @@ def test_a_name_that_a_stop_needs_and_that_could_not_be_read_is_said(bench):
         if b"DN" in desk.written[-1]:
             disturb(desk.wire, Faults(drop=1.0), 0)
 
-    [state] = desk.run(identify.identify(Hints()), at=cut)
+    [state] = desk.run(MCodeFamily.identify(Hints()), at=cut)
     assert state.codec.escape == 3 and state.name == ""
     assert any("its name could not be read" in note and "ES=3" in note for note in state.notes)
 
@@ -217,7 +218,7 @@ def test_half_a_line_in_a_drives_buffer_becomes_no_command_by_opening(bench, hal
     witness = Witness(device)
     desk.wire.receive((b"\n\n" if name else b"") + (name + half).encode(), 0.0)
     desk.wait(0.1)
-    [state] = desk.run(identify.identify(Hints(drives=(name,) if name else ())))
+    [state] = desk.run(MCodeFamily.identify(Hints(drives=(name,) if name else ())))
     assert state.product == "LMDCM"
     assert {text[:3] for text, refused, _ in witness.lines if not refused} == {"PR "}
 
@@ -231,7 +232,7 @@ def test_a_drive_that_prints_all_the_time_is_not_mistaken_for_one_that_is_not_th
     device = desk.devices["b"]
     for text in ("PG 1", "LB G1", line, f"H {every}", "BR G1", "E", "PG", "EX G1"):
         assert not device.execute(text, 0.0).refused
-    absent, present = desk.run(identify.identify(Hints(drives=("a", "b"))))
+    absent, present = desk.run(MCodeFamily.identify(Hints(drives=("a", "b"))))
     assert (absent.product, absent.settings_unknown, absent.notes) == ("", True, ["a does not reply"])
     assert (present.product, present.settings_unknown, device.memory.error_flag) == ("LMDCM", False, False)
 
@@ -250,7 +251,7 @@ def test_version_and_part_number_tell_an_mdriveplus_from_another(bench, personal
     desk = bench([table])
     (device,) = desk.devices.values()
     witness = Witness(device)
-    (state,) = desk.run(identify.identify(hints))
+    (state,) = desk.run(MCodeFamily.identify(hints))
     assert (state.product, state.version) == (personality, "3.010") and state.part.endswith(device.memory.model.part)
     assert all(text.startswith("PR ") and not refused for text, refused, _ in witness.lines)
 
@@ -272,18 +273,18 @@ def test_names_that_are_likely_are_tried_before_anything_is_absent_and_nothing_m
     desk, _, [state] = opened(bench, *tables, hints=Hints(tried=("b", "left")))
     assert (state.address, state.product) == ("b", "LMDCM")
     assert not any(device.memory.error_flag or device.moving(desk.now) for device in desk.devices.values())
-    last = identify.remember(state)
+    last = MCodeFamily(state).remember()
     both = (replace(last, address="z", name="z"), last, replace(last, address="a", name="a"))
-    found = desk.run(identify.identify(Hints(remembered=both)))
+    found = desk.run(MCodeFamily.identify(Hints(remembered=both)))
     assert [each.address for each in found] == ["a", "b", "z"]  # the first is selected, whichever was used last
     assert [each.unconfirmed is None for each in found] == [True, True, False]
-    assert identify.remember(found[2]) == both[0] and "z replied here last time" in found[2].notes[0]
+    assert MCodeFamily(found[2]).remember() == both[0] and "z replied here last time" in found[2].notes[0]
     assert not any(device.memory.error_flag for device in desk.devices.values())
 
 
 def test_a_drive_alone_is_found_though_the_line_was_a_party_line_last_time(bench):
     desk, _, [state] = opened(bench, {"name": "b", "party": True}, hints=Hints(tried=("b",)))
-    alone, device, [found] = opened(bench, {"set": {"EM": 1}}, hints=Hints(remembered=(identify.remember(state),)))
+    alone, device, [found] = opened(bench, {"set": {"EM": 1}}, hints=Hints(remembered=(MCodeFamily(state).remember(),)))
     assert (found.address, found.product, device.memory.error_flag) == ("", "LMDCM", False)
     assert alone.devices
 

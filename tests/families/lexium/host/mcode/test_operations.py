@@ -6,7 +6,6 @@ import pytest
 
 from multidrop.base.errors import NoAnswer, Refused, Stopped
 from multidrop.dialects import DriveState, End, Kind, Owed, Priority, Reply
-from multidrop.families.lexium.host.mcode import identify
 from multidrop.families.lexium.host.mcode.codec import MCode
 from multidrop.families.lexium.host.mcode.exchange import answered, take_out
 from multidrop.families.lexium.host.mcode.family import MCodeFamily
@@ -445,7 +444,7 @@ def test_how_a_drive_is_set_is_found_out_and_nothing_moves(bench, em, party, che
 
     desk = bench([{"name": "a" if party else "!", "party": party, "set": {"EM": em, "CK": check, "ES": 1}}])
     hints = Hints(drives=("a",), party=True) if party else Hints()
-    [state] = desk.run(identify.identify(hints))
+    [state] = desk.run(MCodeFamily.identify(hints))
     assert state.codec == MCode(em=em, party=party, checksum=check, escape=1)
     assert (state.product, state.name) == ("LMDCM", "a" if party else "!")
     device = next(iter(desk.devices.values()))
@@ -457,7 +456,7 @@ def test_several_names_imply_party_mode_and_a_missing_drive_is_told(bench):
     from multidrop.dialects import Hints
 
     desk = bench([{"name": n, "party": True, "set": {"EM": 1, "CK": 1}} for n in "ab"], baud=9600)
-    a, b, c = desk.run(identify.identify(Hints(drives=("a", "b", "c"))))
+    a, b, c = desk.run(MCodeFamily.identify(Hints(drives=("a", "b", "c"))))
     assert (a.product, b.product, c.product) == ("LMDCM", "LMDCM", "")
     assert c.notes == ["c does not reply"]
     assert c.codec.checksum == 1
@@ -467,7 +466,7 @@ def test_an_ethernet_drive_is_not_asked_what_it_would_refuse(bench):
     from multidrop.dialects import Hints
 
     desk = bench([{"personality": "LMDCE"}])
-    [state] = desk.run(identify.identify(Hints()))
+    [state] = desk.run(MCodeFamily.identify(Hints()))
     assert (state.product, state.address) == ("LMDCE", "")
     assert not desk.devices["!"].memory.error_flag
     assert not any(word in frame for frame in desk.written for word in (b"PY", b"CK", b"DN", b"BD"))
@@ -480,7 +479,7 @@ def test_a_drive_left_in_program_mode_is_taken_out_and_that_is_said(bench, em, p
     desk = bench([{"name": "a" if party else "!", "party": party, "set": {"EM": em, "CK": check}}])
     next(iter(desk.devices.values())).execute("PG 1", 0.0)
     hints = Hints(drives=("a",), party=True) if party else Hints()
-    [state] = desk.run(identify.identify(hints))
+    [state] = desk.run(MCodeFamily.identify(hints))
     assert next(iter(desk.devices.values())).programming is None
     assert any("was in program mode" in note for note in desk.notes + state.notes)
 
@@ -490,7 +489,7 @@ def test_nobody_there_is_told(bench):
 
     desk = bench([{"name": "a", "party": True}])
     with pytest.raises(NoAnswer, match="none of the drives x, y replies"):
-        desk.run(identify.identify(Hints(drives=("x", "y"))))
+        desk.run(MCodeFamily.identify(Hints(drives=("x", "y"))))
 
 
 def test_a_standing_error_is_found_without_clearing_it(bench):
@@ -498,7 +497,7 @@ def test_a_standing_error_is_found_without_clearing_it(bench):
 
     desk = bench([{}])
     desk.devices["!"].fail(86, 0.0)
-    [state] = desk.run(identify.identify(Hints()))
+    [state] = desk.run(MCodeFamily.identify(Hints()))
     assert state.error
     assert desk.devices["!"].memory.error_flag
 

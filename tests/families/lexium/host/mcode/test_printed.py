@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from multidrop.base.errors import NoAnswer
 from multidrop.dialects import DriveState
-from multidrop.families.lexium.host.mcode import classify
+from multidrop.families.lexium.host import classify
 from multidrop.families.lexium.host.mcode.codec import MCode
 from multidrop.families.lexium.host.mcode.exchange import sign, signed
 from multidrop.families.lexium.host.mcode.family import MCodeFamily
@@ -187,11 +187,10 @@ def test_one_that_is_deaf_to_its_name_is_not_believed(bench):
 @pytest.mark.parametrize(("em", "is_party", "check"), MODES)
 def test_opening_sees_whether_a_drive_prints_its_name(bench, em, is_party, check):
     from multidrop.dialects import Hints
-    from multidrop.families.lexium.host.mcode import identify
 
     desk = bench([{"name": "a" if is_party else "!", "party": is_party, "set": {"EM": em, "CK": check}}])
     hints = Hints(drives=("a",), party=True) if is_party else Hints()
-    [state] = desk.run(identify.identify(hints))
+    [state] = desk.run(MCodeFamily.identify(hints))
     assert state.signs
     assert desk.type(state, "PR P") == ("0",)
     assert (b"aPR P,DN" in desk.written[-1]) is is_party

@@ -13,6 +13,7 @@ from multidrop.families.lexium.host.modbus import (
     codec,
     family,
     framing,
+    identity,
     limits,
     mapping,
     motions,
@@ -23,12 +24,14 @@ from multidrop.families.lexium.host.modbus import (
 from multidrop.families.lexium.host.modbus.codec import Modbus, ModbusState, pdu_codec
 from multidrop.families.lexium.host.modbus.family import ModbusFamily
 from multidrop.families.lexium.host.modbus.motions import ModbusMotions
+from multidrop.families.lexium.host.modbus.registers import ModbusRegisters
 from multidrop.families.lexium.host.modbus.values import ModbusParameters, ModbusUnits, ModbusValues
 from multidrop.families.lexium.manual.grammar import parse
 from multidrop.families.lexium.manual.modbus.registers import REGISTERS
 from tests.support.dialogues import dialogue_tests
 
 USED = (
+    identity, ModbusRegisters,
     replace, Hints, Kind, Priority, mcode_units, family, ModbusFamily, codec, framing, limits, mapping, motions,
     operations, pdu, values, ModbusMotions, ModbusParameters, ModbusUnits, ModbusValues, REGISTERS, Evidence,
     Move, MoveKind, ORDINARY, Change, Permission, Readings, pdu_codec,

@@ -11,7 +11,6 @@ from multidrop.dialects import End, Hints, Kind, Priority, Procedure, Reply
 from multidrop.families.lexium.host.modbus import framing, mapping
 from multidrop.families.lexium.host.modbus.codec import Modbus, ModbusState
 from multidrop.families.lexium.host.modbus.family import ModbusFamily
-from multidrop.families.lexium.host.modbus.operations import identify
 from multidrop.families.lexium.manual.modbus.registers import REGISTERS
 from multidrop.families.lexium.simulator.ports.modbus import ModbusPort
 from tests.support.cases import for_each
@@ -308,7 +307,7 @@ def test_a_gateway_that_replies_in_place_of_a_drive_makes_no_stranger_of_it(numb
         return Reply(end=End.REFUSED, body=bytes((asked.body[0] | 0x80, number)))
 
     with pytest.raises(NoAnswer, match=f"exception {number:02}"):
-        say(identify(Hints()), answer)
+        say(ModbusFamily.identify(Hints()), answer)
 
 
 @pytest.mark.parametrize("number", [1, 2, 3, 4, 6, 8])
@@ -316,7 +315,7 @@ def test_a_device_without_an_identification_is_a_stranger(number):
     def answer(asked):
         return Reply(end=End.REFUSED, body=bytes((asked.body[0] | 0x80, number)))
 
-    [found] = say(identify(Hints()), answer)
+    [found] = say(ModbusFamily.identify(Hints()), answer)
     assert found.stranger
 
 
@@ -483,7 +482,7 @@ def test_programs_are_for_mcode():
 
 def test_opening_only_reads_and_clears_nothing():
     far = Far(EF=1, ER=86)
-    (drive,) = say(identify(Hints()), far)
+    (drive,) = say(ModbusFamily.identify(Hints()), far)
     assert (drive.product, drive.version, drive.part) == ("LMDCE", "LMDCE 6.002, Hw: 3.2", "LMDCE571")
     assert drive.error and "EF=1" in drive.notes[0]
     assert far.sent == [(0x2B, "0e0300"), LOOK] and far.get("ER") == 86
@@ -494,7 +493,7 @@ def test_a_device_that_does_not_identify_itself_is_opened_and_said_so():
         code = request.body[0] | 0x80
         return Reply(end=End.REFUSED, body=bytes((code, 1)))
 
-    (drive,) = say(identify(Hints()), far)
+    (drive,) = say(ModbusFamily.identify(Hints()), far)
     assert drive.product == "" and "did not identify itself as a Lexium drive" in drive.notes[0] and not drive.error
 
 
@@ -508,13 +507,13 @@ def test_an_identification_in_two_parts_is_put_together():
         listed = b"".join(bytes((n, len(text))) + text.encode() for n, text in held.items())
         return Reply(body=request.body[:3] + bytes((0x83, 255 * more, following, len(held))) + listed)
 
-    (drive,) = say(identify(Hints()), far)
+    (drive,) = say(ModbusFamily.identify(Hints()), far)
     assert (drive.product, drive.version) == ("LMDOE", "LMDOE 6.0")
 
 
 def test_silence_while_opening_is_no_drive():
     with pytest.raises(NoAnswer):
-        say(identify(Hints()), lambda request: Reply(end=End.TIMEOUT))
+        say(ModbusFamily.identify(Hints()), lambda request: Reply(end=End.TIMEOUT))
 
 
 # Raw registers

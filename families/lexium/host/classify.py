@@ -7,8 +7,6 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 from multidrop.dialects.codec import Kind, Started
-from multidrop.dialects.family import Referencing
-from multidrop.dialects.state import DriveState
 from multidrop.families.lexium.manual import errors
 from multidrop.families.lexium.manual.errors import ErrorNumber as E
 from multidrop.families.lexium.manual.grammar import (
@@ -56,14 +54,6 @@ def word_of(text: str) -> tuple[str, str]:
     """Split a line into its mnemonic, in capitals, and the rest."""
     found = WORD.match(text)
     return (found.group(1).upper(), found.group(2).strip()) if found else ("", text.strip())
-
-
-def referencing(state: DriveState, text: str) -> Referencing | None:
-    """Find out whether a line homes the axis or sets its position; the same over Modbus."""
-    word, rest = word_of(text)
-    if word in HOMINGS or (word == "P" and rest):
-        return Referencing("", word in HOMINGS)
-    return None
 
 
 @lru_cache(maxsize=256)
