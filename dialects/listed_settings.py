@@ -10,14 +10,11 @@ from multidrop.dialects.values import (
     Change,
     Pairs,
     Parameters,
-    Permission,
-    Plan,
     Progress,
     Reading,
     Readings,
     Value,
     read_each,
-    reference_lost,
     same,
 )
 
@@ -36,14 +33,6 @@ class ListedParameters(Parameters, ABC):
     def read_one(self, name: str) -> Procedure[Reading]:
         """Read a setting. Raises Refused or NoAnswer."""
 
-    def spelled(self, name: str) -> str:
-        """A name that a person wrote, as the list has it."""
-        return name.upper()
-
-    @abstractmethod
-    def risk(self, name: str, value: Value, now: Mapping[str, Value], allowed: Permission) -> str:
-        """The reason for which a setting waits for a person's word; empty: there is none."""
-
     @abstractmethod
     def checked(self, name: str, value: Value) -> Value:
         """Return a value as it is written. Raises Diagnostic for an unknown setting, or a value out of range."""
@@ -51,10 +40,6 @@ class ListedParameters(Parameters, ABC):
     @abstractmethod
     def line(self, name: str, value: Value) -> str:
         """The line that gives a setting a value."""
-
-    @abstractmethod
-    def rescales(self, name: str) -> bool:
-        """Whether positions count another distance or direction after it changed."""
 
     def ordered(self, names: list[str], now: Mapping[str, Value], goal: Mapping[str, Value]) -> list[str]:
         """The order in which the drive refuses none of the values."""
@@ -64,13 +49,14 @@ class ListedParameters(Parameters, ABC):
         """Read every setting; a refused one is listed. Raises NoAnswer. Nothing is changed."""
         return (yield from read_each(self.names(), self.read_one, progress, self.unread))
 
-    def plan(self, present: Readings, wanted: Mapping[str, Value], permission: Permission) -> Plan:
+    def steps(
+        self, present: Readings, wanted: Mapping[str, Value], withheld: Mapping[str, str], cannot: dict[str, str]
+    ) -> Sequence[Change]:
         now = present.values
-        spelled = self.spelled
-        changed = {spelled(name): value for name, value in wanted.items() if not same(value, now.get(spelled(name)))}
-        withheld = {name: reason for name in changed if (reason := self.risk(name, changed[name], now, permission))}
-        goal = {name: self.checked(name, value) for name, value in changed.items() if name not in withheld}
+        goal = {
+            name: self.checked(name, value)
+            for name, value in wanted.items()
+            if name not in withheld and name not in cannot and not same(value, now.get(name))
+        }
         order = self.ordered([name for name in self.names() if name in goal], now, goal)
-        steps = tuple(Change(name, now.get(name), goal[name], self.line(name, goal[name])) for name in order)
-        scale = [name for name in goal if self.rescales(name)]
-        return Plan(steps, tuple(withheld.items()), remarks=reference_lost(steps, scale))
+        return [Change(name, now.get(name), goal[name], self.line(name, goal[name])) for name in order]

@@ -152,17 +152,55 @@ class Parameters(OfDrive):
         yield  # a conversation
 
     def plan(self, present: Readings, wanted: Mapping[str, Value], permission: Permission) -> Plan:
-        """Order the steps from the present to the wanted values. Raises Diagnostic for a value that it refuses."""
-        return Plan()
+        """Plan the steps from the present to the wanted values. Raises Diagnostic for a value that it refuses."""
+        now = present.values
+        given = {self.spelled(name): value for name, value in wanted.items()}
+        changed = {name: value for name, value in given.items() if not same(value, now.get(name))}
+        cannot = {name: why for name, value in changed.items() if (why := self.impossible(name, value, present))}
+        named = {self.spelled(name) for name in permission.named}
+        withheld: dict[str, str] = {}
+        for name, value in changed.items():
+            if name in cannot or name in named or (permission.communication and self.communicates(name)):
+                continue
+            if why := COMMUNICATION if self.communicates(name) else self.risk(name, value, now):
+                withheld[name] = why
+        steps = self.steps(present, given, withheld, cannot)
+        rescaled = [step.name for step in steps if self.rescales(step.name)]
+        return Plan(tuple(steps), tuple(withheld.items()), tuple(cannot.items()), reference_lost(steps, rescaled))
+
+    def spelled(self, name: str) -> str:
+        """A name that a person wrote, as the drive has it."""
+        return name.upper()
+
+    def impossible(self, name: str, value: Value, present: Readings) -> str:
+        """The reason for which the drive cannot get a value now; empty: it can."""
+        return ""
+
+    def communicates(self, name: str) -> bool:
+        """Whether it is a setting of communication, which waits for a person's word."""
+        return False
+
+    def risk(self, name: str, value: Value, now: Mapping[str, Value]) -> str:
+        """Another reason for which a setting waits for a person's word; empty: there is none."""
+        return ""
+
+    def rescales(self, name: str) -> bool:
+        """Whether positions count another distance or direction after it changed."""
+        return False
+
+    def steps(
+        self, present: Readings, wanted: Mapping[str, Value], withheld: Mapping[str, str], cannot: dict[str, str]
+    ) -> Sequence[Change]:
+        """Order the steps so that the drive refuses none. Raises Diagnostic for a value that it refuses.
+
+        `wanted`: all values, as `spelled`. `withheld` and `cannot`: the settings that are left alone, each with the
+        reason; a family may add to `cannot`.
+        """
+        return ()
 
     def ready(self) -> Procedure[str]:
         """Return the reason for which settings must not be changed now: it moves, a program runs; empty: none."""
         return ""
-        yield
-
-    def write(self, change: Change) -> Procedure[object]:
-        """Carry out a step, and make sure of it."""
-        raise Inexpressible(f"{who(self.state)}: no settings of such drives are known; nothing was sent")
         yield
 
     def save(self) -> Procedure[object]:

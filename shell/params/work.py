@@ -316,7 +316,7 @@ async def send(session: Session, drive: Drive, plan: Plan, options: Options, wha
         for number, change in enumerate(plan, 1):
             named = change.name in options.named
             async with session.path.starting(drive, change.text) if named else contextlib.nullcontext():
-                await transferring(drive, drive.family.values.parameters.write(change))
+                await transferring(drive, drive.family.perform(change.text))
             written.append(change)
             progress(number, len(plan))
 

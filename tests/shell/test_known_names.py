@@ -9,7 +9,9 @@ from prompt_toolkit.document import Document
 from multidrop.dialects import Priority
 from multidrop.dialects.program_files import Held
 from multidrop.drives.events import Ended
-from multidrop.families.lexium.host.mcode.program_readout import offered
+from multidrop.families.lexium.host.mcode.codec import MCode
+from multidrop.families.lexium.host.mcode.programs import MCodePrograms
+from multidrop.families.lexium.host.mcode.state import MCodeState
 from multidrop.shell.events import OnBus
 from multidrop.shell.prompt.complete import complete, names_of
 from multidrop.shell.prompt.view import SessionCompleter
@@ -50,11 +52,11 @@ async def cell(tmp_path):
     ],
 )
 def test_labels_are_offered_after_jumps_and_variables_elsewhere(line: str, names: list[str]) -> None:
-    assert [name for name, _ in offered(HELD, line)] == names
+    assert [name for name, _ in MCodePrograms(MCodeState(MCode())).offered(HELD, line)] == names
 
 
 def test_a_name_comes_with_what_it_is() -> None:
-    assert dict(offered(HELD, "PR C")) == {
+    assert dict(MCodePrograms(MCodeState(MCode())).offered(HELD, "PR C")) == {
         "COUNT": "variable, 7 when it was read",
         "CLAMP": "variable, -3 when it was read",
         "C9": "label at 212",

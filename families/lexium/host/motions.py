@@ -80,9 +80,6 @@ RUNS = ("BY", "TE")
 """Not 0: a program runs, or a trip may start one; a trip disarms itself (5.1.125)."""
 
 
-# What a line does
-
-
 def effect(state: DriveState, text: str) -> Effect:
     """What a typed line of MCode does to the motion of its drive."""
     statement = parsed(text)
@@ -131,9 +128,6 @@ def _of_instruction(row: Mnemonic, statement: Statement, value: int | None) -> E
 def _whole(statement: Statement) -> int | None:
     first = statement.arguments[0] if statement.arguments else None
     return int(first.value) if isinstance(first, Number) and first.value == int(first.value) else None
-
-
-# Before a motion, and at its end
 
 
 class LexiumMotions(Motions, ABC):

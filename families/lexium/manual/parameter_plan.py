@@ -12,14 +12,10 @@ from math import ceil
 
 from multidrop.base.errors import Diagnostic
 from multidrop.dialects.values import (
-    COMMUNICATION,
     Change,
-    Permission,
-    Plan,
     Readings,
     Value,
     number,
-    reference_lost,
     same,
 )
 from multidrop.families.lexium.manual import groups
@@ -290,26 +286,21 @@ STEPS_PER_TURN = 200
 """Full steps."""
 
 
-def plan(product: str, present: Readings, wanted: Mapping[str, Value], allowed: Permission) -> Plan:
-    """Plan the steps. Raises Diagnostic for values that the drive refuses."""
-    given = {name.upper(): value for name, value in wanted.items()}
-    changed = {name: value for name, value in given.items() if not same(value, present.values.get(name))}
-    now: Mapping[str, Value | None] = {**present.values}
-    reasons = {name: impossible(name, value, now, present.labels) for name, value in changed.items()}
-    cannot = {name: reason for name, reason in reasons.items() if reason}
-    asked = {name: value for name, value in changed.items() if name not in cannot and name not in allowed.named}
-    reasons = {name: risk(name, value, now) for name, value in asked.items()}
-    withheld = {
-        name: why for name, why in reasons.items() if why and not (name in groups.WIRE and allowed.communication)
-    }
-    goal = _goal(product, present, given, withheld, cannot)
-    steps = Steps(product, present.values, goal)
+def steps(
+    product: str,
+    present: Readings,
+    wanted: Mapping[str, Value],
+    withheld: Mapping[str, str],
+    impossible: dict[str, str],
+) -> list[Change]:
+    """Order the steps, and add to `impossible`. Raises Diagnostic for values that the drive refuses."""
+    goal = _goal(product, present, wanted, withheld, impossible)
+    made = Steps(product, present.values, goal)
     for order in (_leave_counts, _speeds, _resolution, _enter_counts, _velocities, _pairs, _points):
-        order(steps)
-    steps.reach(*(name for name in goal if name not in groups.RESTORED_LAST))
-    steps.reach(*groups.RESTORED_LAST)
-    remarks = reference_lost(steps.changes, groups.SCALES)
-    return Plan(tuple(steps.changes), tuple(withheld.items()), tuple(cannot.items()), remarks)
+        order(made)
+    made.reach(*(name for name in goal if name not in groups.RESTORED_LAST))
+    made.reach(*groups.RESTORED_LAST)
+    return made.changes
 
 
 def _goal(
@@ -462,8 +453,6 @@ def risk(name: str, value: Value, now: Mapping[str, Value | None]) -> str:
     `now` has the drive's present values.
     """
     torque = now.get("AS") == TORQUE
-    if name in groups.WIRE:
-        return COMMUNICATION
     if name in groups.UNIT:
         return "it belongs to the motor unit"
     if name == "LK":

@@ -46,9 +46,6 @@ RUNNING, FAILED_PROGRAM = 1, 4
 """The values of SASTAT of a program that runs, and of one that an error has ended."""
 
 
-# What a line does
-
-
 def _effect(line: str) -> Effect:
     if (found := PLACE.fullmatch(line)) is not None:
         targets = zip("xyxy", found.groups(), strict=True)
@@ -80,15 +77,6 @@ def _without_target(axes: frozenset[str], endless: bool = False) -> tuple[Move, 
 
 def _axes(named: str) -> frozenset[str]:
     return frozenset(named.lower()) or BOTH
-
-
-# Before a motion
-
-
-# nothing is asked
-
-
-# At its end
 
 
 def _program_runs(state: PmxState) -> Procedure[bool]:
@@ -160,7 +148,7 @@ class PmxMotions(Motions):
             if words:
                 self.state.note(f"{who(self.state)}: {axis} has an error from before: {words}; CLR{axis} clears it")
         return signs
-        yield
+        yield  # nothing is asked
 
     def place(self, signs: Signs, axis: str) -> int | None:
         """Where the distance of a move counts from: from 0 with ABS, from the axis at rest with INC; None: not read."""

@@ -22,10 +22,8 @@ from multidrop.dialects.codec import Priority, Procedure, Request
 from multidrop.dialects.listed_settings import ListedParameters
 from multidrop.dialects.state import who
 from multidrop.dialects.values import (
-    COMMUNICATION,
     VARIABLES,
     Actions,
-    Change,
     Conditions,
     Controls,
     Facts,
@@ -34,7 +32,6 @@ from multidrop.dialects.values import (
     Pace,
     Parameters,
     Part,
-    Permission,
     Plan,
     Progress,
     Reading,
@@ -150,13 +147,11 @@ class PmxParameters(ListedParameters):
         )
         return reading(name, reply.text if name == "DN" else float(reply.text) if ratio else int(reply.text))
 
-    def risk(self, name: str, value: Value, now: Mapping[str, Value], allowed: Permission) -> str:
-        """The reason for which a setting waits for a person's word; empty: there is none."""
+    def communicates(self, name: str) -> bool:
+        return name in WIRE
+
+    def risk(self, name: str, value: Value, now: Mapping[str, Value]) -> str:
         word, on = base(name), now.get(f"SL{axis(name)}")
-        if name in allowed.named or (name in WIRE and allowed.communication):
-            return ""
-        if name in WIRE:
-            return COMMUNICATION
         if word == "SL" and value:
             return "StepNLoop corrects the position by moves"
         if word in JOYSTICK:
@@ -201,9 +196,6 @@ class PmxParameters(ListedParameters):
         if (yield from PmxOperations(self.state).busy()):
             return f"{who(self.state)} runs a program: SR0=0 and SR1=0 end them"
         return ""
-
-    def write(self, change: Change) -> Procedure[object]:
-        return PmxOperations(self.state).perform(change.text)
 
     def save(self) -> Procedure[object]:
         return PmxOperations(self.state).perform("STORE")

@@ -42,9 +42,6 @@ REASONS: Mapping[int, tuple[Outcome, str]] = {
 """Bits of parameter 207."""
 
 
-# What a line does
-
-
 def _begins(move: Move) -> Effect:
     return Effect(begins=(move,))
 
@@ -53,17 +50,11 @@ def _axis(state: TmclState, motor: int) -> str:
     return str(motor) if state.motors > 1 else ""
 
 
-# Before a motion
-
-
 def _flags(state: TmclState, motor: int) -> Procedure[int]:
     try:
         return (yield from read(state, Call(Command.GAP, Axis.DRIVER_FLAGS, motor)))
     except Refused:  # not every module has them
         return 0
-
-
-# At its end
 
 
 def _short(state: TmclState, ending: Ending, motor: int, way: int, evidence: Evidence) -> Procedure[Ending]:

@@ -80,9 +80,6 @@ def calls_of(held: Held) -> dict[int, Call]:
     return {line.at: placed.call for line, placed in zip(held.lines, made.lines, strict=True)}
 
 
-# Download
-
-
 def _line(state: TmclState, call: Call) -> tuple[Any, Call]:
     return state.codec.request(state.address, spelled(call), call), call
 

@@ -17,10 +17,8 @@ from multidrop.dialects.program_files import Held
 from multidrop.dialects.state import who
 from multidrop.dialects.values import (
     BY,
-    COMMUNICATION,
     UNREAD,
     Actions,
-    Change,
     Conditions,
     Controls,
     Facts,
@@ -28,7 +26,6 @@ from multidrop.dialects.values import (
     Pace,
     Parameters,
     Part,
-    Permission,
     Plan,
     Progress,
     Reading,
@@ -122,14 +119,12 @@ class TmclParameters(ListedParameters):
     def spelled(self, name: str) -> str:
         return setting_name(name)
 
-    def risk(self, name: str, value: Value, now: Mapping[str, Value], allowed: Permission) -> str:
-        """The reason for which a setting waits for a person's word; empty: there is none."""
+    def communicates(self, name: str) -> bool:
         of_module, number, _ = _parts(name)
-        communicates = of_module and number in WIRE
-        if name in map(setting_name, allowed.named) or (communicates and allowed.communication):
-            return ""
-        if communicates:
-            return COMMUNICATION
+        return of_module and number in WIRE
+
+    def risk(self, name: str, value: Value, now: Mapping[str, Value]) -> str:
+        of_module, number, _ = _parts(name)
         if of_module and number == Global.AUTOSTART and value:
             return "the stored program starts at power-up"
         if not of_module and number in (Axis.RIGHT_LIMIT_OFF, Axis.LEFT_LIMIT_OFF) and value:
@@ -153,9 +148,6 @@ class TmclParameters(ListedParameters):
 
     def ready(self) -> Procedure[str]:
         return f"{who(self.state)} moves: stop it first" if (yield from TmclOperations(self.state).moving()) else ""
-
-    def write(self, change: Change) -> Procedure[object]:
-        return TmclOperations(self.state).perform(change.text)
 
     def save(self) -> Procedure[None]:
         """Store the axis parameters in EEPROM, one by one; a module may lack some."""

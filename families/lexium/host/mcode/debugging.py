@@ -100,9 +100,6 @@ FIRST = "1"
 BEGIN = "/step LABEL begins single step, /break now breaks a program that runs"
 
 
-# Starting
-
-
 def _waits_now(state: MCodeState) -> Procedure[None]:
     """Record that the drive waits for a key, after a line that leads there was accepted."""
     if not (yield from MCodeOperations(state).flag("BY")):
@@ -126,17 +123,11 @@ def _check_keys(state: MCodeState) -> None:
         )
 
 
-# Keys
-
-
 def _check_steps(state: MCodeState) -> None:
     """Raise unless it is known that the drive waits, and a key can be sent."""
     _check_keys(state)
     if not state.stepping:
         raise Refused(f"{who(state)}: it is not known that it waits for a key, so none was sent; {BEGIN}")
-
-
-# Break points
 
 
 def _places(program: Sequence[Stored]) -> Mapping[str, int]:
@@ -168,9 +159,6 @@ def _settled(state: MCodeState) -> Procedure[bool]:
     said = yield from printed_value(state, 'MV," ",MP," ",MT', r"[01] [01] \d{1,5}")
     moving, positioning, settling = said.split()
     return moving == "0" and "0" in (positioning, settling)
-
-
-# What is read
 
 
 class MCodeDebugging(Debugging):

@@ -12,6 +12,7 @@ local variable without deleting other variables. The host refuses that before it
 
 from __future__ import annotations
 
+from abc import ABC
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 
@@ -42,13 +43,13 @@ from multidrop.families.lexium.host.mcode.program_readout import (
     GLOBAL,
     LABEL,
     LOCAL,
+    MCodeReadout,
     Program,
     declared,
     immediate_lines,
     names_of,
     programs,
     programs_of,
-    read,
     size,
 )
 from multidrop.families.lexium.host.mcode.state import MCodeState
@@ -213,58 +214,6 @@ class _Memory:
         return held if self.ended == self.programs else f"{held}: the program in {who(state)} is incomplete"
 
 
-def download(
-    state: MCodeState, lines: Sequence[SourceLine], held: Held | None, progress: Progress
-) -> Procedure[Sequence[SourceLine]]:
-    """Send the lines of a program file. Raises Refused or NoAnswer with the line's number and what is stored.
-
-    `held`: what was just read from the drive; None: the host reads it now. Always leaves program mode. Returns the
-    lines that it sent: programs of the drive that stay (lines of number 0), and the file.
-    """
-    for line in lines:
-        try:
-            state.codec.request(state.address, line.text, Kind.PROGRAM)
-        except Inexpressible as error:
-            raise Inexpressible(f"{_where(line)}: {error}") from error
-    if state.programming:
-        raise Refused(f"{who(state)} is in program mode: leave it with PG first")
-    if not lines:
-        return ()
-    yield from before_request(state, state.codec.request(state.address, lines[0].text))
-    if held is None:
-        concerned = any(declared(line.text) or classify.enters_program(line.text) for line in lines)
-        held = (yield from read(state, lines, progress)) if concerned else Held()
-    lines = yield from prepare(state, lines, held)
-    memory, fate = _Memory(sum(classify.enters_program(line.text) for line in lines)), ""
-    try:
-        for done, line in enumerate(lines):
-            progress(done, len(lines))
-            fate = "cut off"
-            try:
-                yield from _one(state, line, memory)
-            except DriveError as error:
-                if isinstance(error, Stopped):  # its caller may have gone
-                    _note_cut_off(state, memory)
-                fate, error.args = "told", (f"{_where(line)}: {error}; {memory.told(state)}",)
-                raise
-        progress(len(lines), len(lines))
-        fate = "done"
-        return lines
-    finally:
-        if fate == "cut off":
-            _note_cut_off(state, memory)
-        # Leave program mode and restore the echo mode.
-        done_all = fate == "done"
-        try:
-            if state.programming:
-                yield from take_out(state, "taken out of program mode; the program in it is incomplete")
-            yield from restore_echo(state) if done_all else put_back(state)
-        except DriveError as error:
-            if done_all:
-                raise
-            state.note(str(error))  # the download's own failure is the one to raise
-
-
 def _note_cut_off(state: MCodeState, memory: _Memory) -> None:
     state.note(f"{who(state)}: the download was cut off: {memory.told(state)}")
 
@@ -351,3 +300,59 @@ def _again_at(state: MCodeState, request: Request) -> Procedure[None]:
     reply = yield state.codec.request(state.address, f"PG {address}")
     if not ends_in_program_mode(reply):
         raise NoAnswer(f"{who(state)} did not go back into program mode at {address}")
+
+
+class MCodeDownload(MCodeReadout, ABC):
+    """The program in an MCode drive: how a file is sent to it."""
+
+    def download(
+        self, lines: Sequence[SourceLine], held: Held | None, progress: Progress
+    ) -> Procedure[Sequence[SourceLine]]:
+        """Send the lines of a program file. Raises Refused or NoAnswer with the line's number and what is stored.
+
+        `held`: what was just read from the drive; None: the host reads it now. Always leaves program mode. Returns the
+        lines that it sent: programs of the drive that stay (lines of number 0), and the file.
+        """
+        state = self.state
+        for line in lines:
+            try:
+                state.codec.request(state.address, line.text, Kind.PROGRAM)
+            except Inexpressible as error:
+                raise Inexpressible(f"{_where(line)}: {error}") from error
+        if state.programming:
+            raise Refused(f"{who(state)} is in program mode: leave it with PG first")
+        if not lines:
+            return ()
+        yield from before_request(state, state.codec.request(state.address, lines[0].text))
+        if held is None:
+            concerned = any(declared(line.text) or classify.enters_program(line.text) for line in lines)
+            held = (yield from self.read(lines, progress)) if concerned else Held()
+        lines = yield from prepare(state, lines, held)
+        memory, fate = _Memory(sum(classify.enters_program(line.text) for line in lines)), ""
+        try:
+            for done, line in enumerate(lines):
+                progress(done, len(lines))
+                fate = "cut off"
+                try:
+                    yield from _one(state, line, memory)
+                except DriveError as error:
+                    if isinstance(error, Stopped):  # its caller may have gone
+                        _note_cut_off(state, memory)
+                    fate, error.args = "told", (f"{_where(line)}: {error}; {memory.told(state)}",)
+                    raise
+            progress(len(lines), len(lines))
+            fate = "done"
+            return lines
+        finally:
+            if fate == "cut off":
+                _note_cut_off(state, memory)
+            # Leave program mode and restore the echo mode.
+            done_all = fate == "done"
+            try:
+                if state.programming:
+                    yield from take_out(state, "taken out of program mode; the program in it is incomplete")
+                yield from restore_echo(state) if done_all else put_back(state)
+            except DriveError as error:
+                if done_all:
+                    raise
+                state.note(str(error))  # the download's own failure is the one to raise

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from abc import ABC
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
@@ -11,7 +12,7 @@ from typing import TypeVar
 from multidrop.base.errors import Diagnostic, NoAnswer, Refused
 from multidrop.base.files import SourceLine, split_lines
 from multidrop.dialects.codec import Procedure
-from multidrop.dialects.family import Progress
+from multidrop.dialects.family import Printed, Programs, Progress
 from multidrop.dialects.program_files import Held, Stored
 from multidrop.dialects.state import who
 from multidrop.families.lexium.host import classify
@@ -164,19 +165,6 @@ def declared(text: str) -> tuple[str, str] | None:
 T = TypeVar("T")
 
 
-def read(state: MCodeState, _: Sequence[SourceLine], progress: Progress) -> Procedure[Held]:
-    """Read the program as listed, and labels and variables; no lines from a drive that is locked."""
-    progress(0, 1)
-    locked = yield from _again(state, lambda: MCodeOperations(state).flag("LK"))
-    listed = () if locked else (yield from _again(state, lambda: MCodeOperations(state).listing("")))
-    names = yield from _again(state, lambda: MCodeOperations(state).perform("PR UV"))
-    held = Held(stored(listed), tuple(name.strip() for name in names if name.strip()), locked)
-    labels = any(each.kind == LABEL for each in names_of(held).values())
-    if labels and not (held.lines or locked):  # the L was lost on the line
-        held = replace(held, lines=stored((yield from _again(state, lambda: MCodeOperations(state).listing("")))))
-    return held
-
-
 def _again(state: MCodeState, ask: Callable[[], Procedure[T]]) -> Procedure[T]:
     """Ask again after a damaged reply: these questions change nothing. A drive that is silent is not asked again."""
     for _ in range(REPEATS):
@@ -188,81 +176,6 @@ def _again(state: MCodeState, ask: Callable[[], Procedure[T]]) -> Procedure[T]:
     return (yield from ask())
 
 
-def start_line(lines: Sequence[SourceLine], label: str) -> str:
-    """Return the line that executes a program of a file. Raises Diagnostic where the file has no such label."""
-    found = programs_of(lines)
-    inside = [declared(line.text) for program in found for line in program.lines]
-    labels = [name for word, name in filter(None, inside) if word == "LB"]
-    if label.upper() not in (*labels, *(program.place for program in found)):
-        hint = f"labels: {', '.join(labels)}" if labels else "the file has no labels"
-        raise Diagnostic(f"no label {label} in the file", "", hint)
-    return f"EX {label.upper()}"
-
-
-def end_program(state: MCodeState) -> Procedure[bool]:
-    """End the running program with E, and the motion that it has begun with SL 0; return whether one ran.
-
-    Both take a while. Raises Refused where the motor moves without a program.
-    """
-    if not (yield from _again(state, lambda: MCodeOperations(state).flag("BY"))):
-        if (yield from _again(state, lambda: MCodeOperations(state).flag("MV"))):
-            raise Refused(f"{who(state)} moves: stop it first (nothing was sent)")
-        return False
-    yield from MCodeOperations(state).immediate(state.codec.request(state.address, "E"))
-    if (yield from _again(state, lambda: MCodeOperations(state).flag("MV"))):
-        yield from MCodeOperations(state).immediate(state.codec.request(state.address, "SL 0"))
-    return True
-
-
-# The program of an MCode drive as a file, with the remarks of the file that it came from.
-
-
-def file_of(state: MCodeState, held: Held, raw: bool) -> tuple[str, ...]:
-    """Return a file that reproduces what a drive holds: VA, PG, the lines, PG, S; none where that is nothing."""
-    made = [f"VA {name}={called.value}" for name, called in names_of(held).items() if called.kind == GLOBAL]
-    for program in programs(held.lines, state.product, fine=True):
-        made += [f"PG {program.start}", *(line.text for line in program.lines), "PG"]
-    return (*made, "S") if made else ()
-
-
-def readable(held: Held) -> tuple[str, ...]:
-    return tuple(f"{line.at}  {line.text}" for line in held.lines)
-
-
-def refreshed(text: str, held: Held) -> tuple[str, ...]:
-    """Return a file's lines with the present values of the variables that it declares, and those that it lacks."""
-    missing = {name: called.value for name, called in names_of(held).items() if called.kind == GLOBAL}
-    made: list[str] = []
-    at: int | None = None
-    for line, sent in _sent_lines(text):
-        if sent is not None and sent.section == "program":
-            at = len(made) if at is None else at
-        elif sent is not None and (found := declared(sent.text)) is not None and found[1] in missing:
-            value = missing.pop(found[1])
-            if (sent.text.partition("=")[2].strip() or "0") != value:
-                line = line.replace(sent.text, f"VA {found[1]}={value}", 1)
-        made.append(line)
-    more = [f"VA {name}={value}" for name, value in missing.items()]
-    return (*made[:at], *more, *made[at:]) if at is not None else (*made, *more)
-
-
-def annotated(text: str, held: Held) -> tuple[str, ...]:
-    addresses = iter(held.lines)
-    width = max((len(str(line.at)) for line in held.lines), default=0)
-    made: list[str] = []
-    rest: list[str] = []
-    for line, sent in _sent_lines(text):
-        if sent is None:
-            rest.append(f"{'':{width}}  {line}".rstrip())
-        elif sent.section == "program" and sent.mark is None:
-            at = next(addresses).at
-            made += [*(rest if made else []), f"{at:<{width}}  {line}"]
-            rest = []
-        else:
-            rest = []
-    return tuple(made)
-
-
 def _sent_lines(text: str) -> Iterator[tuple[str, program_file.ProgramLine | None]]:
     sent: Sequence[program_file.ProgramLine] = program_file.scan(text)[0]
     by_number = {line.number: line for line in sent}
@@ -270,29 +183,120 @@ def _sent_lines(text: str) -> Iterator[tuple[str, program_file.ProgramLine | Non
         yield line, by_number.get(number)
 
 
-# The user's labels and variables in a drive, for the completion of a line that is being typed.
+class MCodeReadout(Programs, ABC):
+    """The program in an MCode drive: what is read of it, the files that are made of that, and its end."""
 
+    state: MCodeState
 
-def read_names(state: MCodeState) -> Procedure[Held]:
-    """Read labels and variables. Raises Refused where that would be stored, or answered by several drives."""
-    if state.programming or state.address in EVERY_DRIVE:
-        raise Refused(f"{who(state)} does not print its names now")
-    names = yield from listed(state, "PR UV")
-    return Held(names=tuple(name.strip() for name in names if name.strip()))
+    def listing(self, place: str) -> Printed:
+        return MCodeOperations(self.state).listing(place)
 
+    def readable(self, held: Held) -> Sequence[str]:
+        return tuple(f"{line.at}  {line.text}" for line in held.lines)
 
-def offered(held: Held, line: str) -> list[tuple[str, str]]:
-    """The names that may end a line: labels where a line takes one, variables elsewhere, both after PR."""
-    word = help.typing(line)
-    head = line[: len(line) - len(word)]
-    in_text = head.count('"') % 2 == 1
-    begun = bool(word or (head.strip() and head.endswith((" ", ",", "="))))
-    if in_text or not begun:
-        return []
-    names = names_of(held)
-    return [
-        (name, f"label at {called.value}" if called.kind == LABEL else f"variable, {called.value} when it was read")
-        for labels in editing.LABELS_AT[editing.expected(head)]
-        for name, called in names.items()
-        if (called.kind == LABEL) is labels and name.startswith(word.upper())
-    ]
+    def read(self, lines: Sequence[SourceLine], progress: Progress) -> Procedure[Held]:
+        """Read the program as listed, and labels and variables; no lines from a drive that is locked."""
+        state = self.state
+        progress(0, 1)
+        locked = yield from _again(state, lambda: MCodeOperations(state).flag("LK"))
+        listed = () if locked else (yield from _again(state, lambda: MCodeOperations(state).listing("")))
+        names = yield from _again(state, lambda: MCodeOperations(state).perform("PR UV"))
+        held = Held(stored(listed), tuple(name.strip() for name in names if name.strip()), locked)
+        labels = any(each.kind == LABEL for each in names_of(held).values())
+        if labels and not (held.lines or locked):  # the L was lost on the line
+            held = replace(held, lines=stored((yield from _again(state, lambda: MCodeOperations(state).listing("")))))
+        return held
+
+    def file(self, held: Held, raw: bool) -> Sequence[str]:
+        """Return a file that reproduces what a drive holds: VA, PG, the lines, PG, S; none where that is nothing."""
+        made = [f"VA {name}={called.value}" for name, called in names_of(held).items() if called.kind == GLOBAL]
+        for program in programs(held.lines, self.state.product, fine=True):
+            made += [f"PG {program.start}", *(line.text for line in program.lines), "PG"]
+        return (*made, "S") if made else ()
+
+    def executed(self, lines: Sequence[SourceLine]) -> Sequence[SourceLine]:
+        return immediate_lines(lines)
+
+    def size(self, lines: Sequence[SourceLine]) -> int:
+        return size_of_file(lines)
+
+    def end(self) -> Procedure[bool]:
+        """End the running program with E, and the motion that it has begun with SL 0; return whether one ran.
+
+        Both take a while. Raises Refused where the motor moves without a program.
+        """
+        state = self.state
+        if not (yield from _again(state, lambda: MCodeOperations(state).flag("BY"))):
+            if (yield from _again(state, lambda: MCodeOperations(state).flag("MV"))):
+                raise Refused(f"{who(state)} moves: stop it first (nothing was sent)")
+            return False
+        yield from MCodeOperations(state).immediate(state.codec.request(state.address, "E"))
+        if (yield from _again(state, lambda: MCodeOperations(state).flag("MV"))):
+            yield from MCodeOperations(state).immediate(state.codec.request(state.address, "SL 0"))
+        return True
+
+    def start(self, lines: Sequence[SourceLine], label: str) -> str:
+        """Return the line that executes a program of a file. Raises Diagnostic where the file has no such label."""
+        found = programs_of(lines)
+        inside = [declared(line.text) for program in found for line in program.lines]
+        labels = [name for word, name in filter(None, inside) if word == "LB"]
+        if label.upper() not in (*labels, *(program.place for program in found)):
+            hint = f"labels: {', '.join(labels)}" if labels else "the file has no labels"
+            raise Diagnostic(f"no label {label} in the file", "", hint)
+        return f"EX {label.upper()}"
+
+    def refreshed(self, text: str, held: Held) -> Sequence[str]:
+        """Return a file's lines with the present values of the variables that it declares, and those that it lacks."""
+        missing = {name: called.value for name, called in names_of(held).items() if called.kind == GLOBAL}
+        made: list[str] = []
+        at: int | None = None
+        for line, sent in _sent_lines(text):
+            if sent is not None and sent.section == "program":
+                at = len(made) if at is None else at
+            elif sent is not None and (found := declared(sent.text)) is not None and found[1] in missing:
+                value = missing.pop(found[1])
+                if (sent.text.partition("=")[2].strip() or "0") != value:
+                    line = line.replace(sent.text, f"VA {found[1]}={value}", 1)
+            made.append(line)
+        more = [f"VA {name}={value}" for name, value in missing.items()]
+        return (*made[:at], *more, *made[at:]) if at is not None else (*made, *more)
+
+    def annotated(self, text: str, held: Held) -> Sequence[str]:
+        addresses = iter(held.lines)
+        width = max((len(str(line.at)) for line in held.lines), default=0)
+        made: list[str] = []
+        rest: list[str] = []
+        for line, sent in _sent_lines(text):
+            if sent is None:
+                rest.append(f"{'':{width}}  {line}".rstrip())
+            elif sent.section == "program" and sent.mark is None:
+                at = next(addresses).at
+                made += [*(rest if made else []), f"{at:<{width}}  {line}"]
+                rest = []
+            else:
+                rest = []
+        return tuple(made)
+
+    def names(self) -> Procedure[Held]:
+        """Read labels and variables. Raises Refused where that would be stored, or answered by several drives."""
+        state = self.state
+        if state.programming or state.address in EVERY_DRIVE:
+            raise Refused(f"{who(state)} does not print its names now")
+        names = yield from listed(state, "PR UV")
+        return Held(names=tuple(name.strip() for name in names if name.strip()))
+
+    def offered(self, held: Held, line: str) -> Sequence[tuple[str, str]]:
+        """The names that may end a line: labels where a line takes one, variables elsewhere, both after PR."""
+        word = help.typing(line)
+        head = line[: len(line) - len(word)]
+        in_text = head.count('"') % 2 == 1
+        begun = bool(word or (head.strip() and head.endswith((" ", ",", "="))))
+        if in_text or not begun:
+            return []
+        names = names_of(held)
+        return [
+            (name, f"label at {called.value}" if called.kind == LABEL else f"variable, {called.value} when it was read")
+            for labels in editing.LABELS_AT[editing.expected(head)]
+            for name, called in names.items()
+            if (called.kind == LABEL) is labels and name.startswith(word.upper())
+        ]

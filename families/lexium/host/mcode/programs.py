@@ -12,13 +12,12 @@ from multidrop.base.files import SourceLine
 from multidrop.base.text import counted, real
 from multidrop.dialects.certifying import Certifying, Occupied
 from multidrop.dialects.codec import Procedure
-from multidrop.dialects.family import Printed, Programs, Progress
 from multidrop.dialects.program_files import Difference, Held, Stored, first_difference
 from multidrop.dialects.state import who
 from multidrop.families.lexium.host import classify
 from multidrop.families.lexium.host.mcode import program_readout
 from multidrop.families.lexium.host.mcode.before_request import value_of
-from multidrop.families.lexium.host.mcode.download import clears_itself, download
+from multidrop.families.lexium.host.mcode.download import MCodeDownload, clears_itself
 from multidrop.families.lexium.host.mcode.operations import MCodeOperations
 from multidrop.families.lexium.host.mcode.program_readout import FileProgram
 from multidrop.families.lexium.host.mcode.state import MCodeState
@@ -32,26 +31,6 @@ HOLDING = ("variable", "flag")
 """The kinds of words that hold a value."""
 STEADY = {"S", "CP", "PG"}
 """Words of a file that leave nothing to compare beside the programs."""
-
-
-def differences(
-    state: MCodeState, lines: Sequence[SourceLine], held: Held, before: Held | None = None
-) -> tuple[Difference, ...]:
-    """Return where the programs of a file differ from those that a drive holds; other programs do not count.
-
-    `before`: what the drive held before the file was sent. A line of that after a program is another program's.
-    """
-    names = program_readout.names_of(held)
-    found = program_readout.programs_of(lines)
-    starts = {start for each in found if (start := each.start(names)) is not None}
-    known = {*names, *(each[1] for line in lines if (each := program_readout.declared(line.text)) is not None)}
-    made: list[Difference] = []
-    for program in found:
-        start = program.start(names)
-        own = program if start is None else _not_replaced(program, start, starts, state.product)
-        made += _compared(own.lines, _there(own, start, starts, held, state.product), known)
-    old = set(before.lines) if before is not None else set()
-    return tuple(each for each in made if each.number or (each.at, each.there) not in old)
 
 
 def _not_replaced(program: FileProgram, start: int, starts: set[int], product: str) -> FileProgram:
@@ -101,18 +80,6 @@ def _compared(here: Sequence[SourceLine], there: Sequence[Stored], names: set[st
             number, text = (source.number, source.text) if source else (0, "")
             at, listed = (stored.at, stored.text) if stored else (None, "")
             yield Difference(number, text, at, listed)
-
-
-def to_send(state: MCodeState, lines: Sequence[SourceLine], held: Held) -> Procedure[str]:
-    """Return why a file must be sent; empty where the drive holds its programs, variables and settings already."""
-    if why := first_difference(differences(state, lines, held)):
-        return why
-    if clears_itself(lines) and program_readout.size_of_file(lines) != len(held.lines):
-        return "the drive holds other programs, which the file clears"
-    for line in program_readout.immediate_lines(lines):
-        if why := (yield from _unlike(state, line, held)):
-            return why
-    return ""
 
 
 def _unlike(state: MCodeState, line: SourceLine, held: Held) -> Procedure[str]:
@@ -169,7 +136,7 @@ def _read_setting(state: MCodeState, name: str, values: Sequence[float | None]) 
     return next((row for row in rows if row[:1] == list(values[:1])), [])
 
 
-class MCodePrograms(Programs):
+class MCodePrograms(MCodeDownload):
     """The program in an MCode drive."""
 
     state: MCodeState
@@ -179,55 +146,36 @@ class MCodePrograms(Programs):
     clearing = "CP"
     begins = ("PG", "FD")
 
-    def listing(self, place: str) -> Printed:
-        return MCodeOperations(self.state).listing(place)
+    def differences(self, lines: Sequence[SourceLine], held: Held, before: Held | None = None) -> Sequence[Difference]:
+        """Return where the programs of a file differ from those that a drive holds; other programs do not count.
 
-    def readable(self, held: Held) -> Sequence[str]:
-        return program_readout.readable(held)
-
-    def read(self, lines: Sequence[SourceLine], progress: Progress) -> Procedure[Held]:
-        return program_readout.read(self.state, lines, progress)
-
-    def file(self, held: Held, raw: bool) -> Sequence[str]:
-        return program_readout.file_of(self.state, held, raw)
-
-    def executed(self, lines: Sequence[SourceLine]) -> Sequence[SourceLine]:
-        return program_readout.immediate_lines(lines)
-
-    def size(self, lines: Sequence[SourceLine]) -> int:
-        return program_readout.size_of_file(lines)
-
-    def end(self) -> Procedure[bool]:
-        return program_readout.end_program(self.state)
-
-    def download(
-        self, lines: Sequence[SourceLine], held: Held | None, progress: Progress
-    ) -> Procedure[Sequence[SourceLine]]:
-        return download(self.state, lines, held, progress)
-
-    def differences(self, lines: Sequence[SourceLine], held: Held, before: Held | None) -> Sequence[Difference]:
-        return differences(self.state, lines, held, before)
+        `before`: what the drive held before the file was sent. A line of that after a program is another program's.
+        """
+        names = program_readout.names_of(held)
+        found = program_readout.programs_of(lines)
+        starts = {start for each in found if (start := each.start(names)) is not None}
+        known = {*names, *(each[1] for line in lines if (each := program_readout.declared(line.text)) is not None)}
+        made: list[Difference] = []
+        for program in found:
+            start = program.start(names)
+            own = program if start is None else _not_replaced(program, start, starts, self.state.product)
+            made += _compared(own.lines, _there(own, start, starts, held, self.state.product), known)
+        old = set(before.lines) if before is not None else set()
+        return tuple(each for each in made if each.number or (each.at, each.there) not in old)
 
     def to_send(self, lines: Sequence[SourceLine], held: Held) -> Procedure[str]:
-        return to_send(self.state, lines, held)
-
-    def start(self, lines: Sequence[SourceLine], label: str) -> str:
-        return program_readout.start_line(lines, label)
-
-    def refreshed(self, text: str, held: Held) -> Sequence[str]:
-        return program_readout.refreshed(text, held)
-
-    def annotated(self, text: str, held: Held) -> Sequence[str]:
-        return program_readout.annotated(text, held)
+        """Return why a file must be sent; empty where the drive holds its programs, variables and settings already."""
+        if why := first_difference(self.differences(lines, held)):
+            return why
+        if clears_itself(lines) and program_readout.size_of_file(lines) != len(held.lines):
+            return "the drive holds other programs, which the file clears"
+        for line in program_readout.immediate_lines(lines):
+            if why := (yield from _unlike(self.state, line, held)):
+                return why
+        return ""
 
     def acts(self, line: str) -> bool:
         return guards.acts(line)
-
-    def names(self) -> Procedure[Held]:
-        return program_readout.read_names(self.state)
-
-    def offered(self, held: Held, line: str) -> Sequence[tuple[str, str]]:
-        return program_readout.offered(held, line)
 
 
 # The questions of a certificate.

@@ -11,9 +11,6 @@ from multidrop.dialects.codec import End, Kind, Priority, Procedure, Request
 from multidrop.dialects.state import who
 from multidrop.dialects.values import (
     VARIABLES,
-    Change,
-    Parameters,
-    Permission,
     Plan,
     Progress,
     Reading,
@@ -35,8 +32,8 @@ from multidrop.families.lexium.host.mcode.exchange import (
 )
 from multidrop.families.lexium.host.mcode.operations import MCodeOperations
 from multidrop.families.lexium.host.mcode.state import MCodeState, refuse_in_program
+from multidrop.families.lexium.host.parameters import LexiumParameters
 from multidrop.families.lexium.host.values import rows_of_list
-from multidrop.families.lexium.manual import parameter_plan
 from multidrop.families.lexium.manual import parameters as manual
 from multidrop.families.lexium.manual.groups import BANKED, COUNTED, LISTS
 from multidrop.families.lexium.manual.mnemonic import ENCODER, MDRIVE_ENCODER, Mnemonic
@@ -191,12 +188,11 @@ def listed(state: MCodeState, text: str) -> Procedure[tuple[str, ...]]:
     raise NoAnswer(f"{who(state)}: the list of '{text}' may be incomplete ({reply.end.value}); ask again")
 
 
-class MCodeParameters(Parameters):
+class MCodeParameters(LexiumParameters):
     """The settings of an MCode drive."""
 
     state: MCodeState
 
-    language = "MCode"
     later = frozenset({"BD"})
 
     def read(self, progress: Progress) -> Procedure[Readings]:
@@ -232,9 +228,6 @@ class MCodeParameters(Parameters):
         progress(total, total)
         return _readings(state, values, unread, users)
 
-    def plan(self, present: Readings, wanted: Mapping[str, Value], permission: Permission) -> Plan:
-        return parameter_plan.plan(self.state.product, present, wanted, permission)
-
     def ready(self) -> Procedure[str]:
         """Return the reason for which settings must not change now; empty: there is none."""
         state = self.state
@@ -249,9 +242,6 @@ class MCodeParameters(Parameters):
         if said[2:] not in ("", "0"):
             return f"{who(state)} has armed trips (TE={said[2:]}): TE=0 disarms them"
         return ""
-
-    def write(self, change: Change) -> Procedure[object]:
-        return MCodeOperations(self.state).perform(change.text)
 
     def save(self) -> Procedure[None]:
         state = self.state

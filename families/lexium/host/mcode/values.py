@@ -61,17 +61,8 @@ STATE = ("EF", "BY", "MV", "VC", "MP", "DE", "ST", "P", "IN", "I5", "AF")
 SETTLED = "IS1"
 """Among the facts once the set-ups were read."""
 REFUSAL = "refuses to print its conditions"
-
-
-# Values for plots: one signed print each, and never a word whose reading clears it.
-
-
 NUMBER = r"-?\d{1,10}(?:\.\d+)?"
-
-
-# A snapshot. A locked program is not asked for, as the refusal would run a resident OE subroutine (5.1.75).
-
-
+"""What a value for a plot prints: one signed print each, and never a word whose reading clears it."""
 BAUDS = {48: 4800, 96: 9600, 19: 19200, 38: 38400, 11: 115200}
 """By BD (5.1.9)."""
 _LISTED = re.compile(r"(\d+)\s+(\S.*)")
@@ -207,7 +198,10 @@ class MCodeValues(LexiumValues):
         return rows
 
     def _program(self, readings: Readings, running: bool) -> Procedure[tuple[tuple[tuple[int, str], ...], list[str]]]:
-        """Read the listing; one that a running program's prints may have come into is read twice."""
+        """Read the listing; one that a running program's prints may have come into is read twice.
+
+        A locked program is not asked for, as the refusal would run a resident OE subroutine (5.1.75).
+        """
         if number_in(readings, "LK"):
             return (), [f"not read: {LOCKED}"]
         first = yield from listed(self.state, "L")

@@ -15,7 +15,6 @@ from multidrop.base.errors import Diagnostic, Inexpressible, NoAnswer, Refused
 from multidrop.dialects.codec import Priority, Procedure
 from multidrop.dialects.state import who
 from multidrop.dialects.values import (
-    Change,
     Conditions,
     Facts,
     Parameters,
@@ -42,9 +41,10 @@ from multidrop.families.lexium.host.modbus.operations import (
     value,
 )
 from multidrop.families.lexium.host.motions import cause
+from multidrop.families.lexium.host.parameters import LexiumParameters
 from multidrop.families.lexium.host.values import SNAPSHOT_WORDS, LexiumValues, rows_of_list
-from multidrop.families.lexium.manual import parameter_plan, points
 from multidrop.families.lexium.manual import parameters as manual
+from multidrop.families.lexium.manual import points
 from multidrop.families.lexium.manual.groups import LISTS
 from multidrop.families.lexium.manual.mnemonic import EVERY
 from multidrop.families.lexium.manual.modbus.registers import IDENTITY, REGISTERS, SETUPS
@@ -67,12 +67,10 @@ def _why_not(name: str, value: Value) -> str:
     return ""
 
 
-class ModbusParameters(Parameters):
+class ModbusParameters(LexiumParameters):
     """The settings of an Ethernet drive."""
 
     state: ModbusState
-
-    language = "MCode"
 
     def read(self, progress: Progress) -> Procedure[Readings]:
         """Read every setting that a register has. Raises NoAnswer; nothing is changed or cleared."""
@@ -107,7 +105,7 @@ class ModbusParameters(Parameters):
         outside = {name: _why_not(name, value) for name, value in changed.items()}
         aside = {name: reason for name, reason in outside.items() if reason}
         inside = {name: value for name, value in given.items() if name not in aside}
-        made = parameter_plan.plan(self.state.product, present, inside, permission)
+        made = super().plan(present, inside, permission)
         return Plan(made.changes, made.withheld, (*made.impossible, *aside.items()), made.remarks)
 
     def ready(self) -> Procedure[str]:
@@ -119,9 +117,6 @@ class ModbusParameters(Parameters):
             return f"{who(state)} runs a program: E ends it"
         armed = yield from value(state, "TE")
         return f"{who(state)} has armed trips (TE={armed}): TE=0 disarms them" if armed else ""
-
-    def write(self, change: Change) -> Procedure[object]:
-        return ModbusOperations(self.state).perform(change.text)
 
     def save(self) -> Procedure[object]:
         return ModbusOperations(self.state).perform("S")

@@ -6,7 +6,8 @@ from hypothesis import strategies as st
 
 from multidrop.base.errors import Diagnostic
 from multidrop.dialects.values import Permission, differing
-from multidrop.families.lexium.host.mcode.values import MCodeParameters
+from multidrop.families.lexium.host.mcode.family import MCodeFamily
+from multidrop.families.lexium.host.mcode.settings import MCodeParameters
 from tests.support.direct_drive import DirectDrive
 from tests.support.examples import examples
 from tests.support.random_settings import PROGRAM, lines
@@ -35,7 +36,7 @@ def steps(product, wanted, *present, named=(), program=PROGRAM):
     one = DirectDrive(product, *present, program=program)
     plan = MCodeParameters(one.state).plan(settings_of(one), wanted, Permission(frozenset(named)))
     for change in plan:
-        one.run(MCodeParameters(one.state).write(change))
+        one.run(MCodeFamily(one.state).perform(change.text))
     return [change.text for change in plan], dict(plan.withheld + plan.impossible)
 
 
@@ -53,7 +54,7 @@ def test_no_step_between_any_two_settings_is_refused(random, product):
         assume(whole and "with MS" not in str(error))  # a drive rounds VM up beyond what it takes
         raise
     for change in plan:
-        here.run(MCodeParameters(here.state).write(change))
+        here.run(MCodeFamily(here.state).perform(change.text))
         here.device.advance(here.device.now + 1.0)
     left = {name for name, *_ in differing(settings_of(here).values, wanted) if name in wanted}
     assert left <= {name for name, _ in plan.withheld + plan.impossible}
