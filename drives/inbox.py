@@ -55,13 +55,13 @@ class _Late:
 
     until: float
     request: Request
-    nak: bool = False
+    nak: bool
+    begun: bool
+    """Its reply had begun as the wait for it ended: the rest may come, and look like another value."""
     taken: bool = False
     """Its reply may have been taken for another drive's."""
     came: bool = False
     """A line came that seems to be its reply."""
-    begun: bool = False
-    """Its reply had begun as the wait for it ended: the rest may come, and look like another value."""
 
 
 class Doubt:
@@ -110,10 +110,10 @@ class Doubt:
             self._late = others
             return Weight(doubtful or any(late.taken for late in own), request.gather and bool(own))
         if _outstanding(request, reply, doubtful):
-            late = _Late(now + LATE, request, nak=reply.end is End.NAK)
-            own = [replace(each, until=late.until, nak=late.nak, taken=False) for each in own]  # none before the first
             cut = reply.end in (End.DAMAGED, End.STOPPED) and heard != b"" and not heard.endswith(TERMINATORS)
-            self._late = [*others, *own, replace(late, begun=cut)]
+            late = _Late(now + LATE, request, nak=reply.end is End.NAK, begun=cut)
+            own = [replace(each, until=late.until, nak=late.nak, taken=False) for each in own]  # none before the first
+            self._late = [*others, *own, late]
         return Weight(doubtful)
 
     def with_evidence(self, request: Request, reply: Reply) -> Reply:

@@ -15,6 +15,7 @@ from dataclasses import dataclass, field
 from random import Random
 from unittest import mock
 
+from multidrop.families.pmx.simulator.device import PmxDevice
 from multidrop.features.usb import libusb
 from multidrop.features.usb.controllers import Found, chosen
 from multidrop.features.usb.device import UsbController, sides
@@ -92,7 +93,9 @@ class Plugged(Listener):
     @property
     def found(self) -> Found:
         """The entry of the list of controllers."""
-        return Found(f"2ED{self.controller.device.controller.settings.number}", self.place, "", self)
+        device = self.controller.device
+        assert isinstance(device, PmxDevice)  # only these have a USB side
+        return Found(f"2ED{device.controller.settings.number}", self.place, "", self)
 
 
 class Sockets:

@@ -20,9 +20,10 @@ from multidrop.dialects.codec import Kind, Priority, Procedure, Reply, Request
 from multidrop.dialects.state import who
 from multidrop.families.lexium.host import classify
 from multidrop.families.lexium.host.classify import NOTHING, Setting
-from multidrop.families.lexium.host.mcode.codec import NOBODY, PONG, SLOWEST, MCode, pongs
+from multidrop.families.lexium.host.mcode.codec import NOBODY, MCode
 from multidrop.families.lexium.host.mcode.exchange import answered, as_printed, fresh, refused, take_out
 from multidrop.families.lexium.host.mcode.framing import NAK, sealed
+from multidrop.families.lexium.host.mcode.quiet import PONG, SLOWEST, pongs
 from multidrop.families.lexium.host.mcode.state import MCodeState, Place
 from multidrop.families.lexium.manual.mnemonic import ETHERNET
 from multidrop.families.lexium.manual.program_file import LONGEST

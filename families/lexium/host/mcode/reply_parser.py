@@ -1,263 +1,14 @@
-"""The lines and signs of an MCode drive's reply, and the outcome that they prove (`ReplyParser` has the theory)."""
+"""The parser of an MCode drive's reply: it finds the reply in the bytes that follow a request."""
 
 from __future__ import annotations
 
-import re
-from collections.abc import Sequence
 from dataclasses import replace
 
-from multidrop.dialects.codec import Decoded, End, Kind, Reply, Request
+from multidrop.dialects.codec import Decoded, End, Kind, Request
 from multidrop.families.lexium.host import classify
-from multidrop.families.lexium.host.mcode.framing import (
-    ADDRESS_PROMPT,
-    SIGN_ON,
-    UNPRINTED,
-    Piece,
-    after_echo,
-    checksum,
-    pieces,
-    printable,
-    stripped,
-    unsealed,
-)
+from multidrop.families.lexium.host.mcode.framing import ADDRESS_PROMPT, Piece, after_echo, pieces, printable, unsealed
+from multidrop.families.lexium.host.mcode.reply_lines import ENDLESS, ReplyLines
 
-SIGNED = re.compile(r'["~]')
-"""The sign of a signature: the quotation marks of a drive's name, or the host's own mark."""
-NAME = re.compile(r'"([!-~])"')
-"""A drive's name, as it prints it."""
-ENDLESS = {Kind.LIST, Kind.SETTING, Kind.QUIET}
-"""Kinds whose reply has no end of its own."""
-
-
-def divided(request: Request, strays: Sequence[str], whole: bool) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Divide lines that are not the reply into programs' prints and pieces of the reply that a print ran into.
-
-    `whole`: the reply was received, so there are no pieces: a line that looks like it is a print all the same.
-    """
-    if request.kind is not Kind.PRINT or not request.expect or whole:
-        return tuple(strays), ()
-    own = [line for line in strays if _is_piece(request, line)]
-    return tuple(line for line in strays if line not in own), tuple(own)
-
-
-def _is_piece(request: Request, line: str) -> bool:
-    """Whether a line may be the destroyed reply, or a part of it. One with another drive's name is none."""
-    if request.text in line or re.fullmatch(request.expect or "", line):
-        return True
-    named = NAME.search(line)
-    return request.signed and SIGNED.search(line) is not None and (named is None or named[1] == request.address)
-
-
-class ReplyLines:
-    """What a drive with these settings has sent since a request: printed lines, strays, ACKs and NAKs."""
-
-    def __init__(self, request: Request, echo: int, sealed: int, frame: bytes) -> None:
-        self.request, self.echo, self.sealed, self.frame = request, echo, sealed, frame
-        self.signs_off = sealed > 0 and echo != 2
-        """The drive sends ACK or NAK with its reply."""
-        self.lines: list[str] = []
-        self.strays: list[str] = []
-        self.collided: list[str] = []
-        self.glued: list[str] = []
-        """Text without an end before an ACK or NAK: a print that ends in a semicolon, or a piece of a destroyed one."""
-        self.damaged = ""
-        self.acks = self.naks = self.blanks = 0
-        self.answered = self.repeated = self.mixed = self.restarted = False
-
-    # Collecting
-
-    def add_earlier(self, data: bytes) -> None:
-        """Add a line from before the reply: part of it where the request gathers it, otherwise a stray."""
-        plain = unsealed(data) if self.sealed else stripped(data)
-        if plain is None:
-            self.collided.append(printable(data))
-        else:
-            self._add_stray(printable(plain))
-
-    def _add_stray(self, line: str) -> None:
-        request = self.request
-        if UNPRINTED.search(line):
-            self.collided.append(line)
-        elif request.gather and not self.answered and (request.rows is None or re.fullmatch(request.rows, line)):
-            self.lines.append(line)
-        else:
-            self.strays.append(line)
-
-    def add_glued(self, piece: Piece) -> None:
-        """Sort text before an ACK or NAK: EM=3's repetition of the request, or an incomplete line."""
-        if self.echo == 3 and not self.repeated and self.repetition(piece.shown) == len(piece.shown):
-            self.repeated = True
-            return
-        self.mixed = True
-        if self.request.kind is Kind.QUIET:
-            self.lines.append(printable(piece.data))
-        else:
-            self.glued.append(printable(piece.data))
-
-    def add_line(self, data: bytes) -> None:
-        """Sort a line without its line end: blank, sign-on, EM=3's repetition, or printed text."""
-        plain = data.replace(b"\r", b"")
-        if not plain:
-            self.blanks += 1
-            if self.request.kind is Kind.PRINT and self.blanks == 2 and not self.request.expect:
-                self.answer("")
-            return
-        before, _, rest = data.rpartition(b"\r")
-        own = self.request.kind is Kind.PRINT and r"\r" not in self.request.text
-        if own and before.strip(b"\r") and rest:  # the line feed of an earlier, unrelated line was lost
-            self.add_earlier(before)
-            data = rest
-        plain = data.replace(b"\r", b"")
-        line = printable(data).lstrip(">?")  # a prompt may precede it
-        if SIGN_ON.match(line) and "opyright" not in self.request.text:
-            self.restarted = True
-            self.strays.append(line)
-            return
-        if self.echo == 3 and not self.repeated and (size := self.repetition(plain)):
-            self.repeated, data = True, plain[size:]
-            if not data:
-                return
-        found = unsealed(data) if self.sealed else stripped(data)
-        if found is None:
-            self.damaged = f"checksum of {printable(data)!r} is wrong"
-            self.collided.append(printable(data))
-            return
-        self._sort(printable(found))
-
-    def add_unended(self, data: bytes) -> None:
-        """Add a print that ends in a semicolon: it has neither line end nor check byte."""
-        if self.request.text.endswith(";"):
-            self._sort(printable(data))
-        else:
-            self.add_line(data)
-
-    def repetition(self, data: bytes) -> int:
-        """Length of the request that EM=3 repeats at the head of a line; 0 for any other text.
-
-        The repetition has a name and a check byte, or lacks them. Where neither ACK nor CRLF separates them (CK=2 while
-        a program runs), printed text follows on the same line.
-        """
-        text = (self.request.spoken or self.request.text).encode("latin-1")
-        whole = [words + self.check_byte(frame) for words in (self.frame, text) for frame in (self.frame, text)]
-        if self.sealed:
-            return next((len(each) for each in whole if data.startswith(each)), 0)
-        return len(data) if data in whole else 0
-
-    def _sort(self, line: str) -> None:
-        kind, expect = self.request.kind, self.request.expect
-        matches = re.fullmatch(expect, line) is not None if expect is not None else not self.naks
-        if kind is Kind.LIST and not self.announced:
-            self.strays.append(line)
-        elif kind in ENDLESS:
-            self.lines.append(line)
-            self.answered = self.answered or (expect is not None and matches)
-        elif kind is not Kind.PRINT or self.answered or self.repetition_missing or not matches or not self.announced:
-            self._add_stray(line)
-        else:
-            self.answer(line)
-
-    def answer(self, line: str) -> None:
-        self.lines.append(line)
-        self.answered = True
-
-    # The outcome
-
-    @property
-    def announced(self) -> bool:
-        """Whether the reply can have begun: with CK=1 it follows ACK or NAK."""
-        return self.sealed != 1 or self.echo == 2 or self.signed_off
-
-    @property
-    def signed_off(self) -> bool:
-        return self.acks + self.naks > 0
-
-    @property
-    def repetition_missing(self) -> bool:
-        """Whether the repetition of the request (EM=3) is still missing."""
-        return self.echo == 3 and not self.repeated
-
-    def complete(self) -> bool:
-        kind = self.request.kind
-        if kind in ENDLESS or self.echo == 0:
-            return False
-        if kind is Kind.PRINT:
-            return self.answered and (self.signed_off or not self.signs_off)
-        if self.naks or self.repetition_missing:
-            return False
-        if self.signs_off:
-            return self.acks > 0
-        return {1: self.blanks > 0, 3: True}.get(self.echo, False)
-
-    def silence_is_success(self, rest: bytes) -> bool:
-        """Whether a drive with these settings may execute a command without any sign, while its program runs."""
-        if self.echo == 3:
-            return self.sealed == 2 and (self.repeated or 0 < len(rest) == self.repetition(rest))
-        return self.echo == 2 or self.sealed != 1
-
-    def decoded(self, end: End, used: int, prompt: str = "") -> Decoded:
-        """Return the reply as collected, with its end after a last check."""
-        kind = self.request.kind
-        if end is not End.NAK and kind is not Kind.QUIET:
-            end = self._doubted(end)
-        done = end is End.DONE and (prompt not in ("", "?") or (kind is Kind.QUIET and self.answered))
-        flagged = self.answered and self.naks > 0
-        acknowledged, surplus = done or self.acks > 0, self.acks + self.naks > 1
-        (self.collided if self.collided else self.strays).extend(self.glued)
-        if kind is Kind.QUIET:
-            self._divide_collected()
-        strays, pieces = divided(self.request, self.strays, end is End.DONE or not self.request.signed)
-        reply = Reply(
-            tuple(self.lines),
-            end,
-            prompt,
-            acknowledged,
-            self.damaged,
-            flagged=flagged,
-            surplus=surplus,
-            collided=tuple(each for each in (*self.collided, *pieces) if each.strip(">?")),  # a prompt is no print
-        )
-        return Decoded(reply, used, strays)
-
-    def _divide_collected(self) -> None:
-        """Set apart the prints in a collection that gathers certain rows only; their check bytes may be unexpected."""
-        request = self.request
-        if request.rows is None:
-            self.collided.clear()
-            return
-        collected, self.lines = self.lines, []
-        for line in collected:
-            data = line.lstrip(">?\x06\x15").encode("latin-1")
-            plain = printable(stripped(data))
-            if re.fullmatch(request.expect or "", plain) or request.text in plain:
-                self.lines.append(line)
-            else:
-                self._add_stray(plain)
-
-    def _doubted(self, end: End) -> End:
-        """Return DAMAGED where the reply may not be what it seems to be."""
-        kind = self.request.kind
-        if self.restarted and kind is not Kind.SETTING:
-            self.damaged = "the drive was restarted"
-            return End.DAMAGED
-        if end is not End.DONE:
-            return end
-        # A damaged line may belong to the reply; one with its expected print is complete without it.
-        doubtful = not (self.answered and self.request.expect) if kind is Kind.PRINT else kind in ENDLESS
-        if self.damaged and doubtful:
-            return End.DAMAGED
-        missing = kind is Kind.PRINT and not self.answered
-        if missing and not classify.may_be_blank(self.request.text, self.request.expect):
-            self.damaged = "nothing was printed that was asked for"
-            return End.DAMAGED
-        return end
-
-    def check_byte(self, frame: bytes) -> bytes:
-        """The check byte of a frame; empty where the drive uses none."""
-        return bytes([checksum(frame)]) if self.sealed else b""
-
-
-# The parser of an MCode drive's reply: it finds the reply in the bytes that follow a request.
-#
 # Theory of operation. A reply depends on three settings: the echo mode EM, party mode PY and the checksum mode CK
 # (MCode reference 7.1, tables 7.1 to 7.4; rulings in docs/rulings.md). The reliable part is:
 #
@@ -432,51 +183,72 @@ class ReplyParser:
         """Return the outcome after a quiet time; None: wait for the timeout."""
         if (done := self.whole()) is not None:
             return done
-        got, kind, used = self.got, self.request.kind, len(self.buffer)
+        kind = self.request.kind
+        if kind is Kind.LIST:
+            return self._quiet_list()
         if kind in ENDLESS:
-            # End a list, a setting or a collection when the wire is quiet.
-            if self.echo == 3 and kind is Kind.LIST and not got.repeated:
-                return None
-            prompt = printable(self.rest) if self.echo == 0 and self._is_prompt(self.rest) else ""
-            listing = kind is Kind.LIST and classify.word_of(self.request.text)[0] == "L"
-            if prompt not in ("", ">", "?") and (got.lines or listing):
-                prompt = ""  # the address of a listed line, whose rest is late
-            unended = self.echo == 0 or bool(self.rest and not self.request.text.endswith(";"))
-            if kind is Kind.LIST and not prompt and unended:  # its prompt is missing, or the end of a line
-                return None
-            stored = self.request.rows is not None and ADDRESS_PROMPT.fullmatch(self.rest)  # the prompt of program mode
-            if self.rest and not prompt and not stored:
-                got.add_line(self.rest)
-            end = End.REFUSED if prompt == "?" and not got.lines and not got.acks else End.DONE
-            if got.naks:
-                end = End.NAK if kind is Kind.QUIET else self._after_nak()
-            elif end is End.DONE and not self.buffer:
-                end = End.SILENT
-            return got.decoded(end, used, prompt)
+            return self._ended_by_quiet(self._quiet_prompt())
         if self.echo == 0:
-            return self._settled_prompt(used) if self.began else None
-        if kind is Kind.PRINT:
-            # Decide with EM 1 to 3: a reply without ACK, without a line end, damaged, or none.
-            if not got.answered and self.rest and (not self.request.expect or self.request.text.endswith(";")):
-                got.add_unended(self.rest)
-            if got.naks:
-                return got.decoded(self._after_nak(), used)
-            if not got.answered and got.blanks and self.echo in (2, 3) and not self.request.expect:
-                got.answer("")
-            if got.answered:
-                return got.decoded(End.DONE, used)
-            if got.damaged:
-                return got.decoded(End.DAMAGED, used)
-            if got.blanks or got.acks or got.repeated:
-                heard = " ".join((*got.collided, *got.glued))
-                got.damaged = f"heard {heard[:48]!r}" if got.collided else ""
-                return got.decoded(End.DAMAGED if got.collided else End.SILENT, used)
+            return self._settled_prompt(len(self.buffer)) if self.began else None
+        return self._quiet_print() if kind is Kind.PRINT else self._quiet_command()
+
+    def _quiet_prompt(self) -> str:
+        """The prompt that came last with EM=0; empty: none, or the address of a listed line, whose rest is late."""
+        if self.echo != 0 or not self._is_prompt(self.rest):
+            return ""
+        listing = self.request.kind is Kind.LIST and classify.word_of(self.request.text)[0] == "L"
+        return "" if self.rest not in PROMPTS and (self.got.lines or listing) else printable(self.rest)
+
+    def _quiet_list(self) -> Decoded | None:
+        """Decide a list: its prompt ends it with EM=0, a quiet wire after a whole line otherwise."""
+        if self.echo == 3 and not self.got.repeated:
             return None
+        prompt = self._quiet_prompt()
+        unended = self.echo == 0 or bool(self.rest and not self.request.text.endswith(";"))
+        if not prompt and unended:  # its prompt is missing, or the end of a line
+            return None
+        return self._ended_by_quiet(prompt)
+
+    def _ended_by_quiet(self, prompt: str) -> Decoded:
+        """End a list, a setting or a collection where the wire is quiet."""
+        got = self.got
+        stored = self.request.rows is not None and ADDRESS_PROMPT.fullmatch(self.rest)  # the prompt of program mode
+        if self.rest and not prompt and not stored:
+            got.add_line(self.rest)
+        end = End.REFUSED if prompt == "?" and not got.lines and not got.acks else End.DONE
+        if got.naks:
+            end = End.NAK if self.request.kind is Kind.QUIET else self._after_nak()
+        elif end is End.DONE and not self.buffer:
+            end = End.SILENT
+        return got.decoded(end, len(self.buffer), prompt)
+
+    def _quiet_print(self) -> Decoded | None:
+        """Decide a print with EM 1 to 3: a reply without ACK, without a line end, damaged, or none."""
+        got, request, used = self.got, self.request, len(self.buffer)
+        if not got.answered and self.rest and (not request.expect or request.text.endswith(";")):
+            got.add_unended(self.rest)
         if got.naks:
             return got.decoded(self._after_nak(), used)
+        if not got.answered and got.blanks and self.echo in (2, 3) and not request.expect:
+            got.answer("")
+        if got.answered:
+            return got.decoded(End.DONE, used)
+        if got.damaged:
+            return got.decoded(End.DAMAGED, used)
+        if got.blanks or got.acks or got.repeated:
+            heard = " ".join((*got.collided, *got.glued))
+            got.damaged = f"heard {heard[:48]!r}" if got.collided else ""
+            return got.decoded(End.DAMAGED if got.collided else End.SILENT, used)
+        return None
+
+    def _quiet_command(self) -> Decoded | None:
+        """Decide a command with EM 1 to 3, which prints nothing: a NAK, or silence where that means success."""
+        used = len(self.buffer)
+        if self.got.naks:
+            return self.got.decoded(self._after_nak(), used)
         if self.rest and self.echo != 3:
             used = self.rest_at  # half a line of another drive or a program, still to be completed
-        return got.decoded(End.SILENT, used) if got.silence_is_success(self.rest) else None
+        return self.got.decoded(End.SILENT, used) if self.got.silence_is_success(self.rest) else None
 
     @staticmethod
     def _is_prompt(rest: bytes) -> bool:

@@ -9,9 +9,10 @@ from dataclasses import dataclass, field
 from multidrop.base.errors import NoAnswer
 from multidrop.dialects.codec import Kind, Procedure, Request
 from multidrop.dialects.scanning import Found, Outcome, Reach, Scan, Step
-from multidrop.families.lexium.host.mcode.codec import NOBODY, MCode, pongs
+from multidrop.families.lexium.host.mcode.codec import NOBODY, MCode
 from multidrop.families.lexium.host.mcode.framing import NAK, sealed
 from multidrop.families.lexium.host.mcode.identity import BRIEF, PROGRAM_PROMPT, find, overflow, write_stop
+from multidrop.families.lexium.host.mcode.quiet import pongs
 from multidrop.families.lexium.host.mcode.state import MCodeState, Place
 from multidrop.families.lexium.manual.statements import NAMES
 

@@ -30,6 +30,7 @@ from multidrop.families.lexium.host.mcode import (
     operations,
     program_readout,
     programs,
+    quiet,
     reply_parser,
     scan,
     settings,
@@ -50,7 +51,7 @@ from tests.support.dialogues import dialogue_tests
 USED = (
     lexium_motions, lexium_values, MCodeDebugging,
     replace, Hints, Kind, Owed, Priority, Started, Looking, family, MCodeFamily, before_request, classify, codec,
-    debugging, download, exchange, framing, identify, identity, motions, operations, program_readout, programs,
+    debugging, download, exchange, framing, identify, identity, motions, operations, program_readout, programs, quiet,
     reply_parser, scan, settings, units, values, MCodeMotions, Place, Unconfirmed, MCodeUnits, MCodeParameters,
     MCodeValues, Ending, Evidence, Move, MoveKind, Outcome, Held, Stored, Reach, Remembered, ORDINARY, Change,
     Permission, Plan, Readings,

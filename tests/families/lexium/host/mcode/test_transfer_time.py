@@ -5,8 +5,9 @@ import pytest
 from multidrop.dialects import Kind, Request
 from multidrop.dialects.program_files import Held
 from multidrop.families.lexium.host.mcode import codec as codecs
-from multidrop.families.lexium.host.mcode.codec import BETWEEN, EXECUTED, EXECUTING, LIST_QUIET, PATIENT, SHORT, MCode
+from multidrop.families.lexium.host.mcode.codec import MCode
 from multidrop.families.lexium.host.mcode.family import MCodeFamily
+from multidrop.families.lexium.host.mcode.quiet import BETWEEN, EXECUTED, EXECUTING, LIST_QUIET, PATIENT, SHORT
 from multidrop.families.lexium.manual import program_file
 from tests.support.mcode_drives import one_drive
 
