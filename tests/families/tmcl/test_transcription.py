@@ -1,6 +1,6 @@
 """The numbers of the table of parameters, compared with a second transcription of what is public, made independently.
 
-`facts/parameters.csv` has numbers, access, units, ranges and defaults only: `-` is none, `?` is not public. A difference
+`facts/parameters.csv` has numbers, access, units, ranges and defaults only: `-` is none, `?` not public. A difference
 is an error in one of the two: look it up in the firmware manual, and correct the wrong one.
 """
 
