@@ -1,25 +1,23 @@
-"""Settings, conditions and other values of drives, a snapshot, the controls of an axis; the family's record of these.
+"""Settings, conditions and other values of drives, and a snapshot; what a family says of these.
 
 A reading has no side effect: it starts and clears nothing, and asks no word that the product refuses. A plan of changes
 is computed from the present values, so that the drive refuses none of its steps. Conditions beyond position and
 velocity are read in parts, each a short conversation: a typed line for a drive waits for one part at most. A part that
-is `slow` reads settings, which change only when a line was sent. Every move among the controls is bounded: it ends by
-itself. A line of a control holds `{by}` for a distance and `{to}` for a position.
+is `slow` reads settings, which change only when a line was sent.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cache
 from math import isclose
 from types import MappingProxyType
 from typing import ClassVar
 
 from multidrop.base.errors import Diagnostic, Inexpressible, Refused
-from multidrop.base.files import rows
 from multidrop.base.text import real
 from multidrop.dialects.codec import Priority, Procedure
+from multidrop.dialects.controls import NAMES, Control, Controls
 from multidrop.dialects.state import OfDrive, who
 
 # Settings, and the steps that change them
@@ -383,46 +381,6 @@ class Snapshot:
     """Analog inputs, one for each axis."""
     remarks: tuple[str, ...] = ()
     """What a person must know of it: it moves, its program is locked."""
-
-
-BY, TO, HOME_MINUS, HOME_PLUS = "by", "to", "home-", "home+"
-STOP, ENABLE, DISABLE = "stop", "enable", "disable"
-NAMES = (BY, TO, HOME_MINUS, HOME_PLUS, STOP, ENABLE, DISABLE)
-LOW, HIGH = -(2**31), 2**31 - 1
-"""The range of positions of every family."""
-
-
-@dataclass(frozen=True)
-class Control:
-    """One control. `about`: what it does, where its lines do not say it."""
-
-    lines: tuple[str, ...] = ()
-    about: str = ""
-    absent: str = ""
-    """The reason for which the family has no such control; it has no lines then."""
-
-    def filled(self, by: int = 0, to: int = 0) -> tuple[str, ...]:
-        return tuple(line.format(by=by, to=to) for line in self.lines)
-
-    def shown(self, by: str = "", to: str = "") -> str:
-        return ", ".join(line.format(by=by, to=to) for line in self.lines)
-
-
-Controls = Mapping[str, Control]
-"""Controls by name; every name of `NAMES` is there."""
-
-
-@cache
-def controls_of(module: str, axis: str = "", number: int = 1) -> Controls:
-    """Read the controls of an axis: `controls.csv` beside a module, whose `__file__` is given.
-
-    Its lines are divided by ` // `; in them `{axis}` is the name of the axis, and `{number}` its number.
-    """
-    found = {}
-    for row in rows(module, "controls.csv"):
-        lines = row["lines"].replace("{axis}", axis).replace("{number}", str(number)).split(" // ")
-        found[row["name"]] = Control(tuple(filter(None, lines)), row["about"], row.get("absent", ""))
-    return found
 
 
 class Actions(OfDrive):

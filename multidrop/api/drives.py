@@ -19,8 +19,9 @@ from multidrop.api.values import seconds, short_text_of, text_of
 from multidrop.base.errors import Diagnostic, DriveError, Inexpressible, Refused
 from multidrop.base.text import visible
 from multidrop.dialects import Motion
+from multidrop.dialects.controls import DISABLE, ENABLE
 from multidrop.dialects.units import QUANTITY
-from multidrop.dialects.values import DISABLE, ENABLE, Conditions
+from multidrop.dialects.values import Conditions
 from multidrop.dialects.values import Value as Fact
 from multidrop.drives.drive import still
 from multidrop.shell import stop_report, waits

@@ -11,8 +11,9 @@ from hypothesis import strategies as st
 from textual import events
 from textual.pilot import Pilot
 
+from multidrop.dialects.controls import BY, NAMES, TO
 from multidrop.dialects.families import FAMILIES
-from multidrop.dialects.values import BY, NAMES, TO, Conditions
+from multidrop.dialects.values import Conditions
 from multidrop.drives.events import Conditioned, Sample, Silent
 from multidrop.shell.events import OnBus
 from multidrop.tui.readout import Readout, State

@@ -19,7 +19,19 @@ from typing import ClassVar
 from textual.binding import Binding, BindingType
 
 from multidrop.base.text import counted
-from multidrop.dialects.values import BY, DISABLE, ENABLE, HIGH, HOME_MINUS, HOME_PLUS, LOW, STOP, TO, Control, Controls
+from multidrop.dialects.controls import (
+    BY,
+    DISABLE,
+    ENABLE,
+    HIGH,
+    HOME_MINUS,
+    HOME_PLUS,
+    LOW,
+    STOP,
+    TO,
+    Control,
+    Controls,
+)
 from multidrop.tui.panels.drive import drive_rows, unit_of
 from multidrop.tui.panels.view import Glance, View, name_of
 from multidrop.tui.readout import READ, Readout, State

@@ -5,16 +5,8 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 
-from multidrop.dialects.values import (
-    Actions,
-    Controls,
-    Levels,
-    Readings,
-    Snapshot,
-    Value,
-    Values,
-    controls_of,
-)
+from multidrop.dialects.controls import Controls, controls_of
+from multidrop.dialects.values import Actions, Levels, Readings, Snapshot, Value, Values
 from multidrop.families.lexium.manual import points
 from multidrop.families.lexium.manual.mnemonic import EXPANDED
 from multidrop.families.lexium.manual.points import EXPANDED_INPUTS, INPUTS

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 
+from multidrop.dialects.controls import Controls, controls_of
 from multidrop.dialects.state import DriveState
-from multidrop.dialects.values import UNREAD, Actions, Conditions, Controls, Facts, Lamp, Pace, controls_of, number
+from multidrop.dialects.values import UNREAD, Actions, Conditions, Facts, Lamp, Pace, number
 from multidrop.families.lexium.manual.mnemonic import EXPANDED
 from multidrop.families.lexium.manual.parameters import counting
 

@@ -19,13 +19,13 @@ from functools import partial
 
 from multidrop.base.errors import Diagnostic, Inexpressible
 from multidrop.dialects.codec import Priority, Procedure, Request
+from multidrop.dialects.controls import Controls, controls_of
 from multidrop.dialects.listed_settings import ListedParameters
 from multidrop.dialects.state import who
 from multidrop.dialects.values import (
     VARIABLES,
     Actions,
     Conditions,
-    Controls,
     Facts,
     Lamp,
     Levels,
@@ -38,7 +38,6 @@ from multidrop.dialects.values import (
     Snapshot,
     Value,
     Values,
-    controls_of,
     printed_number,
 )
 from multidrop.dialects.values import number as number_of

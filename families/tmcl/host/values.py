@@ -12,15 +12,14 @@ from functools import partial
 
 from multidrop.base.errors import Diagnostic, Refused
 from multidrop.dialects.codec import Priority, Procedure
+from multidrop.dialects.controls import BY, Controls, controls_of
 from multidrop.dialects.listed_settings import ListedParameters
 from multidrop.dialects.program_files import Held
 from multidrop.dialects.state import who
 from multidrop.dialects.values import (
-    BY,
     UNREAD,
     Actions,
     Conditions,
-    Controls,
     Facts,
     Lamp,
     Pace,
@@ -33,7 +32,6 @@ from multidrop.dialects.values import (
     Snapshot,
     Value,
     Values,
-    controls_of,
     number,
 )
 from multidrop.families.tmcl.host.codec import TmclState

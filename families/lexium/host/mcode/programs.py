@@ -184,14 +184,6 @@ class MCodePrograms(MCodeDownload):
 # read before that: a drive that is locked refuses L with an error. (MCode reference 5.1.40, 5.1.75, 5.1.94.)
 
 
-def _masked(address: str, raw: bytes) -> str:
-    """Replace the drive's name, and check bytes, which depend on it."""
-    text, name = raw.decode("latin-1"), re.escape(address)
-    if name:
-        text = re.sub(rf'(?m)^{name}(?=[A-Z])|(?<="){name}(?=")|(?<=~){name}', "NAME", text)
-    return re.sub("[\x80-\xff]", "<check>", text)
-
-
 _SUBROUTINE = "an error would run its subroutine for errors (OE)"
 
 
@@ -231,4 +223,8 @@ class MCodeCertifying(Certifying):
         return Occupied(errors=f"a program is stored ({counted(len(lines), 'line')}); {_SUBROUTINE}" if lines else "")
 
     def masked(self, raw: bytes) -> str:
-        return _masked(self.state.address, raw)
+        """Replace the drive's name, and check bytes, which depend on it."""
+        text, name = raw.decode("latin-1"), re.escape(self.state.address)
+        if name:
+            text = re.sub(rf'(?m)^{name}(?=[A-Z])|(?<="){name}(?=")|(?<=~){name}', "NAME", text)
+        return re.sub("[\x80-\xff]", "<check>", text)

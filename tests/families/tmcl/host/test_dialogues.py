@@ -11,12 +11,11 @@ from multidrop.dialects.motions import Ending, Evidence, Move, MoveKind, Outcome
 from multidrop.dialects.program_files import Held, Stored
 from multidrop.dialects.scanning import Reach
 from multidrop.dialects.values import ORDINARY, Change, Permission, Plan, Readings
-from multidrop.families.tmcl.host import codec, family, motions, operations, programs, units, values
+from multidrop.families.tmcl.host import codec, family, motions, operations, programs, scan, units, values
 from multidrop.families.tmcl.host.codec import Tmcl, TmclState
 from multidrop.families.tmcl.host.family import TmclFamily
 from multidrop.families.tmcl.host.motions import TmclMotions
 from multidrop.families.tmcl.host.programs import TmclDebugging, TmclPrograms
-from multidrop.families.tmcl.host.scan import TmclScan
 from multidrop.families.tmcl.host.units import TmclUnits
 from multidrop.families.tmcl.host.values import TmclActions, TmclParameters, TmclValues
 from multidrop.families.tmcl.manual import commands, program_file
@@ -78,7 +77,7 @@ def download(state, text, shown=None, held=None):
 def searched(found, **reach):
     """A search whose finds are kept; what it shows, and the number of its steps."""
     steps = list[None]()
-    outcome = yield from TmclScan.search(Reach(**reach), found.append, lambda: steps.append(None))
+    outcome = yield from scan.SCAN.search(Reach(**reach), found.append, lambda: steps.append(None))
     return outcome, len(steps)
 
 

@@ -8,9 +8,9 @@ from hypothesis import strategies as st
 
 from multidrop.base.errors import Diagnostic, Inexpressible, NoAnswer, Refused, Stopped
 from multidrop.dialects.codec import Priority
+from multidrop.dialects.controls import BY
 from multidrop.dialects.family import Hints
 from multidrop.dialects.state import Owed
-from multidrop.dialects.values import BY
 from multidrop.drives.line import Line
 from multidrop.families.tmcl.host.codec import Tmcl
 from multidrop.families.tmcl.host.family import TmclFamily

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from multidrop.dialects import End, Kind, Reply
 from multidrop.dialects.scanning import Outcome, Reach
+from multidrop.families.tmcl.host import scan
 from multidrop.families.tmcl.host.codec import call_of
-from multidrop.families.tmcl.host.scan import TmclScan
 from multidrop.families.tmcl.manual.commands import Axis, Command
 from tests.support.procedure import ProcedureRunner
 
@@ -47,7 +47,7 @@ class Bus:
 def searched(bus, **reach):
     found, steps = [], []
     runner = ProcedureRunner(
-        TmclScan.search(Reach(**{"everything": True, **reach}), found.append, lambda: steps.append(0))
+        scan.SCAN.search(Reach(**{"everything": True, **reach}), found.append, lambda: steps.append(0))
     )
     while runner.request is not None:
         runner.answer(bus(runner.request))

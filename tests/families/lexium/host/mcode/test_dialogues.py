@@ -41,7 +41,6 @@ from multidrop.families.lexium.host.mcode.codec import MCode
 from multidrop.families.lexium.host.mcode.debugging import MCodeDebugging
 from multidrop.families.lexium.host.mcode.family import MCodeFamily
 from multidrop.families.lexium.host.mcode.motions import MCodeMotions
-from multidrop.families.lexium.host.mcode.scan import MCodeScan
 from multidrop.families.lexium.host.mcode.state import MCodeState, Place, Unconfirmed
 from multidrop.families.lexium.host.mcode.units import MCodeUnits
 from multidrop.families.lexium.host.mcode.values import MCodeParameters, MCodeValues
@@ -118,7 +117,7 @@ def held(*lines, names=(), locked=False):
 def searched(found, **reach):
     """A search whose finds are kept; what it shows, and the number of its steps."""
     steps = list[None]()
-    outcome = yield from MCodeScan.search(Reach(**reach), found.append, lambda: steps.append(None))
+    outcome = yield from scan.SCAN.search(Reach(**reach), found.append, lambda: steps.append(None))
     return outcome, len(steps)
 
 

@@ -3,7 +3,7 @@
 import pytest
 
 from multidrop.dialects.scanning import Reach
-from multidrop.families.lexium.host.mcode.scan import MCodeScan
+from multidrop.families.lexium.host.mcode import scan
 from tests.support.mcode_drives import MODES
 
 PRINTS = ("PG 1", "LB G1", 'PR "tick ",R3', "IC R3", "BR G1", "E", "PG", "EX G1")
@@ -28,10 +28,10 @@ def freed(bench, table, before, half):
     desk.wire.receive(start + half if half else b"", desk.now)
     desk.wait(0.1)
     found = []
-    desk.run(MCodeScan.search(Reach(hasty=True), found.append, lambda: None))
+    desk.run(scan.SCAN.search(Reach(hasty=True), found.append, lambda: None))
     if not found:
-        desk.run(MCodeScan.clear())
-        desk.run(MCodeScan.search(Reach(), found.append, lambda: None))
+        desk.run(scan.SCAN.clear())
+        desk.run(scan.SCAN.search(Reach(), found.append, lambda: None))
     return desk, device, [(each.address, each.codec.em, each.codec.party, each.codec.checksum) for each in found]
 
 
@@ -65,7 +65,7 @@ def test_a_program_that_floods_the_line_hides_no_drive(bench, em, party, check):
 @pytest.mark.parametrize(("em", "party", "check"), MODES)
 def test_factory_defaults_reach_a_drive_in_every_mode(bench, em, party, check):
     desk = bench([{"name": "k", "party": party, "set": {"EM": em, "CK": check}}], baud=9600)
-    desk.run(MCodeScan.erase())
+    desk.run(scan.SCAN.erase())
     [device] = [placed.device for placed in desk.floor.drives]
     assert (device.memory.echo_mode, device.memory.party, device.memory.checksum, device.memory.name) == (
         0,

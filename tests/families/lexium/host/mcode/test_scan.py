@@ -8,7 +8,6 @@ from multidrop.dialects.codec import copy_with
 from multidrop.dialects.scanning import Outcome, Reach
 from multidrop.families.lexium.host.mcode import scan
 from multidrop.families.lexium.host.mcode.codec import MCode
-from multidrop.families.lexium.host.mcode.scan import MCodeScan
 from tests.support.examples import examples
 from tests.support.mcode_drives import MODES, Witness
 
@@ -30,7 +29,7 @@ class Searched:
         self.desk.wire.receive(half, 0.0)
         self.desk.wait(0.2)
         self.begun, self.found, self.steps = self.desk.now, [], 0
-        self.outcome = self.desk.run(MCodeScan.search(Reach(cut=cut), self.found.append, self._step))
+        self.outcome = self.desk.run(scan.SCAN.search(Reach(cut=cut), self.found.append, self._step))
 
     def _step(self):
         self.steps += 1
@@ -110,7 +109,7 @@ def test_a_new_drive_outside_of_party_mode_is_found_on_a_party_line_and_harms_no
     new.execute("PY=0", 0.0)
     desk.wait(0.2)
     found = []
-    desk.run(MCodeScan.search(Reach(), found.append, lambda: None))
+    desk.run(scan.SCAN.search(Reach(), found.append, lambda: None))
     desk.wire.receive(b"\n", desk.now)
     desk.wait(0.5)
     assert [(each.address, each.name, each.codec) for each in found] == [("", "V", MCode(em, False, check, 1))]
@@ -147,7 +146,7 @@ def test_two_drives_with_one_name_are_a_remark(bench):
 
 def test_a_controller_of_another_family_is_a_remark(bench):
     desk = bench([{"personality": "PMX", "name": "00"}], baud=9600)
-    outcome = desk.run(MCodeScan.search(Reach(), lambda state: None, lambda: None))
+    outcome = desk.run(scan.SCAN.search(Reach(), lambda state: None, lambda: None))
     assert outcome.remarks == ("something replies as a PMX does; --dialect pmx searches for one",)
 
 
@@ -175,7 +174,7 @@ PIECES = (
 @examples(8, nightly=100)
 @given(st.randoms(use_true_random=False), st.booleans())
 def test_a_search_ends_whatever_is_received(random, hasty):
-    conversation = MCodeScan.search(Reach(hasty=hasty), lambda state: None, lambda: None)
+    conversation = scan.SCAN.search(Reach(hasty=hasty), lambda state: None, lambda: None)
     request = next(conversation)
     for _ in range(5000):
         request.codec.encode(request)

@@ -25,7 +25,8 @@ from multidrop.families.lexium.host.modbus.codec import Modbus, ModbusState, pdu
 from multidrop.families.lexium.host.modbus.family import ModbusFamily
 from multidrop.families.lexium.host.modbus.motions import ModbusMotions
 from multidrop.families.lexium.host.modbus.registers import ModbusRegisters
-from multidrop.families.lexium.host.modbus.values import ModbusParameters, ModbusUnits, ModbusValues
+from multidrop.families.lexium.host.modbus.units import ModbusUnits
+from multidrop.families.lexium.host.modbus.values import ModbusParameters, ModbusValues
 from multidrop.families.lexium.manual.grammar import parse
 from multidrop.families.lexium.manual.modbus.registers import REGISTERS
 from tests.support.dialogues import dialogue_tests
