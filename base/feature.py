@@ -20,6 +20,8 @@ from typing import NamedTuple
 NAME = re.compile(r"[a-z][a-z0-9_]*")
 Kinds = tuple[type[BaseException], ...]
 """Kinds of what a function may raise."""
+GUARD = "guarded_by"
+"""The attribute of a function of a feature by others with its `base.foreign.Guard`."""
 
 
 class Feature(NamedTuple):

@@ -31,6 +31,21 @@ GROUP, FAMILY_GROUP = "multidrop.features", "multidrop.families"
 """The entry points of features and of families, and the packages of the wheel's."""
 RECORDS = {GROUP: "FEATURE", FAMILY_GROUP: "FAMILY"}
 """The name of the record in a module."""
+OPERATIONS: tuple[str, ...] = (
+    "multidrop.commands.operations",
+    "multidrop.shell.verbs.buses",
+    "multidrop.shell.verbs.units",
+    "multidrop.shell.verbs.raw",
+    "multidrop.shell.verbs.sim",
+    "multidrop.shell.verbs.settings",
+    "multidrop.shell.verbs.values",
+    "multidrop.shell.verbs.programs",
+    "multidrop.shell.verbs.macros",
+    "multidrop.shell.verbs.waiting",
+    "multidrop.shell.verbs.session",
+    "multidrop.shell.verbs.scripts",
+)
+"""The modules that declare the core's own operations: each has a tuple `OPERATIONS`."""
 WHEEL = "multidrop"
 KEPT = "features.json"
 
@@ -104,8 +119,13 @@ class Attempt:
     def __exit__(
         self, kind: type[BaseException] | None, failure: BaseException | None, _: TracebackType | None
     ) -> bool:
-        if failure is None or isinstance(failure, KeyboardInterrupt):
+        if failure is None:
             return False
+        if isinstance(failure, KeyboardInterrupt):
+            from multidrop.base.isolation import takes_signals
+
+            if not takes_signals():
+                return False  # Ctrl+C
         self._failed.append(str(failure) if isinstance(failure, Diagnostic) else kind_and_text(failure))
         return True
 

@@ -12,6 +12,7 @@ import os
 import sys
 from collections.abc import Mapping, Sequence
 from contextvars import copy_context
+from functools import partial
 from importlib.machinery import PathFinder
 from typing import TYPE_CHECKING, Any, NoReturn
 
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
     from _typeshed import SupportsWrite
 
     from multidrop.shell.operations.operation import Operation
+    from multidrop.shell.operations.parameter import Parameter
 
 URLS = """A URL is {}; sim: alone is the demo cell. Keys after a ?: dialect, drives=a,b,c, baud,
 party=0|1, checksum=0|1|2, em=0..3, echo=local, address=none, timeout=SECONDS, relay=multidrop|socat."""
@@ -75,24 +77,30 @@ class Parser(argparse.ArgumentParser):
         """Add the arguments of the command, or its parts. One with both is a part if the first word names one."""
         if self.operation is None or self.complete:
             return
-        from multidrop.shell.hooks import with_options
-        from multidrop.shell.operations.operation import add_arguments
         from multidrop.shell.operations.table import COMMANDS
 
         self.complete = True
         own = COMMANDS.parts(self.operation.command)
         named = given[:1] and given[0] in own
         if self.operation.run and not named:
-            _check_options(self.operation.command, given)
-            arguments = with_options(self.operation.command, self.operation.arguments)
-            if _unknown(given, arguments):
-                _load_others(given)
-                arguments = with_options(self.operation.command, self.operation.arguments)
-            add_arguments(self, arguments)
-            _add_no_config(self)
-            self.set_defaults(run_by=self.operation, command=self.operation.command)
+            self._add_own(self.operation, given)
         if own and (named or not self.operation.run):
             self.add_commands(own, given, "|".join(own), required=True)
+
+    def _add_own(self, operation: Operation, given: Sequence[str]) -> None:
+        """Add the arguments of the command, with the options of features."""
+        from multidrop.shell import hooks
+
+        added: Sequence[Parameter] = ()
+        if operation.open:
+            _check_options(operation.command, given)
+            added = hooks.added_to(operation.command)
+            if _has_others(given, (*operation.command_arguments, *added)):
+                _load_others(given)
+                added = hooks.added_to(operation.command)
+        operation.add_to(self, added)
+        _add_no_config(self)
+        self.set_defaults(run_by=operation, command=operation.command)
 
     def add_commands(
         self, commands: Mapping[str, Operation], given: Sequence[str], metavar: str, *, required: bool
@@ -144,13 +152,10 @@ class _Version(argparse.Action):
         parser.exit()
 
 
-def _unknown(given: Sequence[str], arguments: Mapping[str, Any]) -> bool:
+def _has_others(given: Sequence[str], known: Sequence[Parameter]) -> bool:
     """Whether a line has an option that no feature of the wheel declares, or asks for help: others may add one."""
-    known = {"--no-config"}
-    for notation, about in arguments.items():
-        inner = about if " | " in notation else [notation]
-        known |= {name for each in inner for name in each.partition(" ")[0].split("|")}
-    return any(each.startswith("-") and each.partition("=")[0] not in known for each in given)
+    names = {"--no-config", *(name for each in known if each.option for name in each.names)}
+    return any(each.startswith("-") and each.partition("=")[0] not in names for each in given)
 
 
 def _load_others(given: Sequence[str]) -> None:
@@ -209,13 +214,15 @@ def run(chosen: argparse.Namespace) -> int:
     command = chosen.run_by.command_work
     from multidrop.base import registry
     from multidrop.base.errors import Diagnostic, TransportLost
+    from multidrop.shell.hooks import Added
     from multidrop.shell.streams.stdout import fail
 
     context = copy_context()
     if hasattr(chosen, "no_config"):
         context.run(imported("multidrop.commands.machine:ignore"))
     try:
-        code: int = context.run(command, chosen)
+        more = {"added": Added(chosen.command, chosen)} if getattr(chosen.run_by, "open", False) else {}
+        code: int = context.run(partial(command, **more), chosen)
         return code
     except (Diagnostic, TransportLost) as problem:
         return fail(problem)
@@ -245,10 +252,10 @@ def build(given: Sequence[str] = ()) -> Parser:
     parser.add_argument("--version", action=_Version, nargs=0, help="show the version and exit")
     _add_no_config(parser)
     if given[:1] != ["--version"]:
-        from multidrop.shell.operations.operation import Operation
+        from multidrop.commands.operations import START
         from multidrop.shell.operations.table import COMMANDS
 
-        parser.set_defaults(run_by=Operation(run="lines.start"))
+        parser.set_defaults(run_by=START)
         parser.add_commands(COMMANDS.parts(""), given, "COMMAND", required=False)
     return parser
 
@@ -275,6 +282,6 @@ def _epilog(operation: Operation) -> str:
         lines = ["also:", *(f"  {each.command:<15} {each.meaning}" for each in own.values()), "", *lines]
     if operation.own_urls:
         lines += ["", *textwrap.wrap(operation.own_urls, WIDTH, break_on_hyphens=False, break_long_words=False)]
-    elif operation.urls or "URL" in str([*operation.arguments.items()]):
+    elif operation.takes_urls:
         lines += ["", *textwrap.wrap(urls(), WIDTH, break_on_hyphens=False, break_long_words=False)]
     return "\n".join(lines)

@@ -27,23 +27,14 @@ from multidrop.cli import build, urls
 from multidrop.commands.serving import FILES
 from multidrop.shell.connect.scheme import NoLine
 from multidrop.shell.connect.schemes import schemes
+from multidrop.shell.operations.parameter import Listed
 
 SHIPPED = ROOT / "multidrop" / "shipped"
-PATH = re.compile(r"(FILE|SCRIPT|CELL|PATH)\b")
-"""The beginning of the metavars of arguments that are files."""
 BRACKETED = re.compile(r"\[(?:[^\[\]]|\[[^\[\]]*\])*\]\S*|\((?:[^()]|\([^()]*\))*\)\S*|\S+")
 """One part of a usage line: an option with its value, a group, or a word."""
 USAGE_WIDTH = 77
-VALUES = {
-    "BROKER-URL": "broker",
-    "URL": "url",
-    "URL2": "url",
-    "PORT-OR-URL": "url",
-    "ADDR": "drive",
-    "NAME": "macro",
-    "NAME|off": "macro",
-}
-"""What is listed for a metavar; NAME in the commands on macros only."""
+VALUES = {Listed.URL: "url", Listed.BROKER: "broker", Listed.DRIVE: "drive", Listed.MACRO: "macro"}
+"""The list of what completion offers for an argument."""
 
 # Connections, ports and simulated buses; drives of saved connections; macros: listed without a start of Python.
 BEGINNINGS = " ".join(
@@ -254,12 +245,13 @@ def completion(shell: str) -> str:
     parser.add_all()
     take_parts(parser)
     for action, command in actions(parser):
-        kind = VALUES.get(action.metavar) if isinstance(action.metavar, str) else None
+        listed = getattr(action, "listed", ())
+        kind = next((VALUES[each] for each in listed if each in VALUES), None)
         kind = command.split()[1] if kind == "url" and command.split()[1] in PARTS else kind
-        if kind and (kind != "macro" or " macro " in command):
+        if kind:
             name = f"_multidrop_{kind}"
             action.complete = {**dict.fromkeys(FILES, name), "fish": f"({name})"}  # type: ignore[attr-defined]
-        elif isinstance(action.metavar, str) and PATH.match(action.metavar):
+        elif Listed.FILE in listed:
             action.complete = shtab.FILE  # type: ignore[attr-defined]
     text = shtab.complete(parser, shell, preamble=PREAMBLE[shell])
     if shell == "powershell":

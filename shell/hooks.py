@@ -8,13 +8,16 @@ from __future__ import annotations
 import argparse
 from collections.abc import Awaitable, Callable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, ExitStack, contextmanager, nullcontext
+from dataclasses import replace
 from itertools import takewhile
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from multidrop.base import registry
 from multidrop.base.errors import Diagnostic
 from multidrop.base.feature import Kinds
-from multidrop.shell.operations.operation import TYPE_RAISES, Examples
+from multidrop.shell.operations.operation import Examples
+from multidrop.shell.operations.parameter import Parameter, guarded_as, of_fields
+from multidrop.shell.operations.parsing import values
 
 if TYPE_CHECKING:
     from multidrop.shell.session import Session
@@ -51,33 +54,74 @@ COMMANDS = ("shell", "tui")
 class Options(NamedTuple):
     """Options of a command that is there already, one of `COMMANDS`.
 
-    `prepare` and `opened` take the session and the parsed arguments: `prepare` before a URL is opened, `opened` once
-    all are, in a command that is not for a person. `instead` and `around` are of the options of `tui`.
+    The functions take what was given, an instance of the data class `options`. `prepare` takes the session before a URL
+    is opened, `opened` once all are, in a command that is not for a person. `instead` and `around` are of `tui`.
     """
 
     command: str
-    arguments: Mapping[str, Any]
-    """As those of an Operation."""
-    excludes: str = ""
-    """The option of the command that these exclude."""
-    prepare: Callable[[Session, argparse.Namespace], None] = lambda session, chosen: None
-    opened: Callable[[Session, argparse.Namespace], Awaitable[None]] | None = None
-    instead: Callable[[argparse.Namespace], int | None] = lambda chosen: None
-    """Runs something in place of the command and returns the exit code; None: its option was not given."""
-    around: Callable[[App, argparse.Namespace], AbstractContextManager[object]] = lambda app, chosen: nullcontext()
+    options: type
+    """A data class, whose fields are the options: `shell.operations.parameter`."""
+    prepare: Callable[[Session, Any], None] = lambda session, given: None
+    opened: Callable[[Session, Any], Awaitable[None]] | None = None
+    instead: Callable[[Any, bool], int | None] = lambda given, more: None
+    """Runs something in place of the command and returns the exit code; None: its option was not given. `more`: URLs or
+    other options were given, too."""
+    around: Callable[[App, Any], AbstractContextManager[object]] = lambda app, given: nullcontext()
     """What is entered before the screen runs, and left after that."""
     examples: Sequence[str] = ()
     """Further examples of the command."""
-
-    def passes(self) -> Mapping[str, Kinds]:
-        """What its callers expect to be raised, besides what a person reads; see `base.foreign`."""
-        return {"type": TYPE_RAISES}
 
     def claims(self) -> tuple[str, ...]:
         """What only one feature can add. Raises Diagnostic for a command that takes no options of features."""
         if self.command not in COMMANDS:
             raise Diagnostic(f"{self.command} takes no options of features; {' and '.join(COMMANDS)} do")
-        return tuple(f"{self.command} {each.partition(' ')[0]}" for each in self.arguments)
+        return tuple(f"{self.command} {name}" for each in self.parameters for name in each.names)
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        """The options. Raises Diagnostic where they cannot be read."""
+        found = (replace(each, holder=(self.options.__name__, self.options)) for each in of_fields(self.options))
+        return guarded_as(self.prepare, found)
+
+
+class Added:
+    """The options of features that were given to a command."""
+
+    def __init__(self, command: str, chosen: argparse.Namespace) -> None:
+        self._given: list[tuple[Options, Any]] = []
+        for each in options(command):
+            found = values(each.parameters, chosen)
+            self._given.append((each, each.options(**{one.name: found[one.name] for one in each.parameters})))
+
+    def prepare(self, session: Session) -> None:
+        """Do what the options ask for before a URL is opened."""
+        for each, given in self._given:
+            each.prepare(session, given)
+
+    async def opened(self, session: Session) -> None:
+        """Do what the options ask for once all URLs are open. Raises what they raise."""
+        for each, given in self._given:
+            if each.opened is not None:
+                await each.opened(session, given)
+
+    def instead(self, more: bool) -> int | None:
+        """Run what an option asks for in place of its command, and return the exit code; None: no option does.
+
+        `more`: URLs or options of the command itself were given.
+        """
+        for each, given in self._given:
+            besides = any(other != one.options() for one, other in self._given if one is not each)
+            if (code := each.instead(given, more or besides)) is not None:
+                return code
+        return None
+
+    @contextmanager
+    def around(self, app: App) -> Iterator[None]:
+        """What the options ask for while a screen runs. Raises what they raise as they begin."""
+        with ExitStack() as stack:
+            for each, given in self._given:
+                stack.enter_context(each.around(app, given))
+            yield
 
 
 class Switch(NamedTuple):
@@ -115,6 +159,19 @@ class Switch(NamedTuple):
         return "off" if self.is_on(session) else "on"
 
 
+class Predicting(NamedTuple):
+    """A feature that predicts where drives go (`Workspace.predicted`): the difference to that can be plotted."""
+
+    missing: str
+    """What is said of a drive whose positions it does not predict now."""
+    begin: str
+    """What to type, so that it does."""
+
+    def claims(self) -> tuple[str, ...]:
+        """What only one feature can add."""
+        return ("predicted positions",)
+
+
 def switches() -> Iterator[Switch]:
     """All switches of features."""
     return registry.added(Switch)
@@ -125,6 +182,7 @@ def begin(session: Session) -> list[str]:
 
     Return a warning for each that cannot be loaded or cannot begin; the others and the session go on.
     """
+    from multidrop.base.isolation import at_once
     from multidrop.shell.operations.table import load_others
 
     warnings = load_others()
@@ -132,6 +190,7 @@ def begin(session: Session) -> list[str]:
         for each in registry.records((feature,), AtSession):
             why: list[str] = []
             with registry.Attempt(why):
+                at_once(each.begin)
                 each.begin(session)
             warnings += [f"the feature {feature.name} cannot begin: {text}" for text in why]
     return warnings
@@ -150,55 +209,9 @@ def check(command: str, given: Sequence[str]) -> None:
             registry.with_word(f"{command} {each.partition('=')[0]}")
 
 
-def with_options(command: str, arguments: Mapping[str, Any]) -> dict[str, Any]:
-    """The arguments of a command, and those that features add."""
-    found = dict(arguments)
-    for each in options(command):
-        if each.excludes not in found:
-            found |= each.arguments
-            continue
-        group = {each.excludes: found[each.excludes], **each.arguments}
-        named = {f"[{' | '.join(group)}]": group}
-        found = {
-            name: about
-            for key, given in found.items()
-            for name, about in (named if key == each.excludes else {key: given}).items()
-        }
-    return found
-
-
-def asked_for(chosen: argparse.Namespace, besides: str) -> bool:
-    """Whether any option of a feature was given, besides one in its notation."""
-    notations = (name for each in options(chosen.command) for name in each.arguments if name != besides)
-    return any(getattr(chosen, each.partition(" ")[0].strip("-").replace("-", "_")) for each in notations)
-
-
-def prepare(session: Session, chosen: argparse.Namespace) -> None:
-    """Do what the options of features ask for before a URL is opened."""
-    for each in options(chosen.command):
-        each.prepare(session, chosen)
-
-
-async def opened(session: Session, chosen: argparse.Namespace) -> None:
-    """Do what the options of features ask for once all URLs are open. Raises what they raise."""
-    for each in options(chosen.command):
-        if each.opened is not None:
-            await each.opened(session, chosen)
-
-
-def instead(chosen: argparse.Namespace) -> int | None:
-    """Run what an option asks for in place of its command, and return the exit code; None: no option does."""
-    codes = (each.instead(chosen) for each in options(chosen.command))
-    return next((code for code in codes if code is not None), None)
-
-
-@contextmanager
-def around(app: App, chosen: argparse.Namespace) -> Iterator[None]:
-    """What the options of features ask for while a screen runs. Raises what they raise as they begin."""
-    with ExitStack() as stack:
-        for each in options(chosen.command):
-            stack.enter_context(each.around(app, chosen))
-        yield
+def added_to(command: str) -> tuple[Parameter, ...]:
+    """The options that features add to a command."""
+    return tuple(one for each in options(command) for one in each.parameters)
 
 
 def examples(command: str) -> list[str]:

@@ -11,6 +11,7 @@ grammar keeps the texts that it has read.
 from __future__ import annotations
 
 import re
+import shlex
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, NamedTuple
@@ -125,6 +126,16 @@ def divided(line: str) -> tuple[str, str]:
     """Divide a line at its first blanks: its first word, and all that follows it."""
     word, *rest = re.split(r"[ \t]+", line, maxsplit=1)
     return word, "".join(rest).strip(ENDS)
+
+
+def split(text: str, where: str) -> list[str]:
+    """Split text into words, without their quotation marks. Raises Diagnostic for a mark that is not closed."""
+    splitter = shlex.shlex(text, posix=True)
+    splitter.whitespace_split, splitter.escape, splitter.commenters = True, "", ""
+    try:
+        return list(splitter)
+    except ValueError:
+        raise Diagnostic("a quotation mark is not closed", where) from None
 
 
 def split_target(target: str) -> tuple[str, str]:

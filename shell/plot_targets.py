@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Awaitable, Callable, Mapping, Sequence
+from collections.abc import Awaitable, Callable
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from multidrop.base import registry
@@ -12,29 +12,18 @@ if TYPE_CHECKING:
 
     from multidrop.shell.plots.batch import Batch
 
-Call = Any
-"""`shell.verbs.call.Call`: verbs know this module. A feature's function names it, and mypy checks its body."""
 _PLOT = "/plot "
 
 
 class PlotTargets(NamedTuple):
     """Files, and programs that show plots."""
 
-    options: tuple[str, ...]
-    """The options of a line of `/plot` with which a plot goes elsewhere; each has a value.
-
-    The first one takes a file or an address, and may be left out before these.
-    """
-    endings: tuple[str, ...]
-    """The ends of the names of files."""
     valid: str
     """The options of `/plot` that are valid where there is no screen."""
     files: str
     """What a person types who saves what the page of plots shows."""
     stream: str
     """The end of the line of `/plot` that the page of plots types to show the same in a viewer."""
-    begin: Callable[[Call, Mapping[str, str], Sequence[str]], Awaitable[None]]
-    """Begin a plot from a line of `/plot`: its options, and the texts of what it plots. Raises what the verb raises."""
     save: Callable[[str], tuple[str, Callable[[Batch], Awaitable[None]]]]
     """From the name of a new file that was typed: the file, and what writes samples into it. Both raise Diagnostic."""
     read: Callable[[str | Path, bool], Any]
@@ -48,12 +37,6 @@ class PlotTargets(NamedTuple):
 def offered() -> PlotTargets | None:
     """The targets; None where no feature adds any."""
     return next(registry.added(PlotTargets), None)
-
-
-def options() -> tuple[str, ...]:
-    """The options of a line of `/plot` with which a plot goes elsewhere, also where their feature is gone."""
-    targets = offered()
-    return targets.options if targets is not None else tuple(each.removeprefix(_PLOT) for each in _words())
 
 
 def needed(word: str = "") -> PlotTargets:

@@ -170,7 +170,12 @@ async def read(workspace: Workspace, drive: Drive, what: str, lines: Sequence[So
 def check_one(drive: Drive) -> None:
     """Raise Diagnostic for an address that means several drives."""
     if drive.address in EVERYONE:
-        raise Diagnostic("programs are those of one drive (nothing was sent)", drive.address, "name one")
+        raise of_one(drive.address)
+
+
+def of_one(target: str) -> Diagnostic:
+    """The error for a target that means several drives."""
+    return Diagnostic("programs are those of one drive (nothing was sent)", target, "name one")
 
 
 def save_new(workspace: Workspace, drive: Drive, file: str, lines: Sequence[str]) -> None:

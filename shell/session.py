@@ -274,12 +274,12 @@ class LinePath:
         verb = find(parsed.name)
         call = imported(CALL)(session, verb, parsed.rest, by, parsed.shown)
         self._allow(by)
-        if verb.changes is not None and (not verb.changes or [*parsed.rest.split(), ""][0] in verb.changes):
+        if call.changes:
             await self._undoubted([*session.buses.values()], by)
-        if verb.recorded and by is not By.MACRO:
-            session.recorder.record(call.recorded(), session.now())
+        if by is not By.MACRO and (line := call.recorded()) is not None:
+            session.recorder.record(line, session.now())
         work = call.work()
-        await (work if verb.immediate else session.tasks.run(work))
+        await (work if call.immediate else session.tasks.run(work))
 
     async def text(self, parsed: DriveLine, by: By) -> None:
         """Send a text to its drive and publish what it prints; on a bus in raw mode send it with its terminator."""

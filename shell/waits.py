@@ -79,8 +79,8 @@ def condition(text: str) -> Condition | None:
     return Condition(target, match["word"], match["sign"], int(match["value"] or 0), quantity)
 
 
-def seconds(text: str, wrong: Callable[[str], Diagnostic]) -> float:
-    """Parse a time, s: 0 to a day. Raises the Diagnostic that `wrong` returns."""
+def seconds(text: str, wrong: Callable[[str], Exception]) -> float:
+    """Parse a time, s: 0 to a day. Raises what `wrong` returns."""
     if not re.fullmatch(r"\d+(\.\d*)?|\.\d+", text, re.ASCII) or float(text) > 86400:
         raise wrong(f"no time {text}; valid: 0 to 86400 seconds")
     return float(text)

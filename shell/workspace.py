@@ -114,6 +114,8 @@ class Workspace(Channel):
         self._open: dict[Bus, OpenBus] = {}
         self.tabs = Tabs(self)
         self.selected_bus = ""
+        self.deselected = False
+        """The selected bus was closed, and no other one was selected since."""
         """The name of the selected bus; empty while nothing is open."""
         self.latched = False
         """After a stop: macros and scripts are refused until `resume`."""
@@ -212,7 +214,7 @@ class Workspace(Channel):
         if not self.buses:
             raise Diagnostic("nothing is open", hint="/open URL opens a line of drives")
         found = self.buses.get(name or self.selected_bus)
-        if found is None and not name and not self.opening:
+        if found is None and not name and self.deselected:
             hint = f"/use selects one: {', '.join(self.buses)}"
             raise Diagnostic("no bus is selected since the selected one was closed", hint=hint)
         if found is None and not name:
@@ -294,7 +296,7 @@ class Workspace(Channel):
                 hint = f"valid: {', '.join(chosen.drives)}" if chosen.drives else "no drive has replied there"
                 raise Diagnostic(f"no drive {address} on {chosen.name}", hint=hint)
             self._open[chosen].selected = found
-        self.selected_bus = chosen.name
+        self.selected_bus, self.deselected = chosen.name, False
         self.changed()
 
     def identified(self, bus: Bus) -> None:

@@ -121,7 +121,7 @@ class Assist:
     async def prepare(self) -> None:
         """Import what the first typed letter needs, in a thread; the rest depends on the drive and is less."""
         await asyncio.to_thread(imported, "multidrop.shell.prompt.complete:complete")
-        await asyncio.to_thread(imported("multidrop.shell.operations.table:load"))
+        await asyncio.to_thread(imported, "multidrop.shell.verbs.work:ALL")
         self.hint(ANY_LETTER)
         self.complete(ANY_LETTER)
 

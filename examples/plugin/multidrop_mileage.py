@@ -3,7 +3,7 @@
 import asyncio
 import re
 from collections import Counter, defaultdict, deque
-from typing import Any
+from typing import Annotated, Any
 
 from multidrop.base.errors import Diagnostic
 from multidrop.base.feature import Feature
@@ -11,9 +11,12 @@ from multidrop.drives.events import Restarted, Sample
 from multidrop.shell.batch.runner import run
 from multidrop.shell.events import Entered
 from multidrop.shell.hooks import AtSession
+from multidrop.shell.operations.argument_types import Address, Url
 from multidrop.shell.operations.operation import Operation
+from multidrop.shell.operations.parameter import Argument
 from multidrop.shell.setting_units import distance
 
+Line = Annotated[str, Argument("a line, as for send", metavar="LINE")]
 SETS = re.compile(r"(@\S+\s+)?((P|PX|PY)\s*=|SAP\s+1\s*,)", re.IGNORECASE)  # gives a position and moves nothing
 
 
@@ -53,28 +56,39 @@ class Mileage:
                 name, way = self.session.display_name(drive), distance(self.session, drive, axis, steps).lstrip("-")
                 self.session.output(f"{name}{axis and f'.{axis}'}: {steps} steps{way and f' ({way})'}")
 
-    async def play(self, lines: list[str]) -> None:
+    async def play(self, lines: tuple[str, ...]) -> None:
         for line in lines:
             await self.again()
             await self.session.run(line)
         await self.show()
 
 
-async def mileage(call: Any) -> None:
-    drive = call.drive(call.word()) if call.word() else None
+async def show(call: Any, address: Address = "") -> None:
+    drive = call.drive(address) if address else None
     if drive and drive.address not in call.session.buses[drive.link.name].drives:
-        raise Diagnostic(f"no drive {call.word()}", "/mileage", "/drives lists them")
+        raise Diagnostic(f"no drive {address}", "/mileage", "/drives lists them")
     await call.session.hooks.part(Mileage).show(drive)
 
 
-VERB = Operation(
-    usage="/mileage [ADDR]",
-    help="Show how far each drive moved in this session.\nThere and back counts twice.",
-    work=mileage,
-    command="mileage",
-    meaning="run lines, then show how far each drive moved",
-    run=lambda chosen: run([chosen.url], lambda session: session.hooks.part(Mileage).play(chosen.lines)),
-    arguments={"URL": "a port, a URL or a saved connection", "LINE ...": "a line, as for send"},
-    examples=["mileage 'sim:#press' 'MR 51200' '/wait stopped'"],
+def play(url: Url, lines: tuple[Line, ...]) -> int:
+    return run([url], lambda session: session.hooks.part(Mileage).play(lines))
+
+
+FEATURE = Feature(
+    "mileage",
+    "how far drives moved",
+    adds=(
+        AtSession(lambda session: session.hooks.keep(Mileage(session))),
+        Operation(
+            show,
+            verb="/mileage",
+            help="Show how far each drive moved in this session.\nThere and back counts twice.",
+        ),
+        Operation(
+            play,
+            command="mileage",
+            meaning="run lines, then show how far each drive moved",
+            examples=("mileage 'sim:#press' 'MR 51200' '/wait stopped'",),
+        ),
+    ),
 )
-FEATURE = Feature("mileage", "how far drives moved", adds=(AtSession(lambda s: s.hooks.keep(Mileage(s))), VERB))

@@ -2,17 +2,46 @@
 
 from __future__ import annotations
 
-import argparse
+from typing import Annotated
 
 from multidrop.base.feature import Feature
 from multidrop.shell.operations import arguments
+from multidrop.shell.operations.argument_types import Url
 from multidrop.shell.operations.operation import Operation
+from multidrop.shell.operations.parameter import Argument, Listed, OneOf
+
+REPORT = OneOf("report", required=True)
+Certified = Annotated[
+    str,
+    Argument(
+        "the drive (default: the first); may be repeated",
+        metavar="ADDR",
+        listed=(Listed.DRIVE,),
+        action=arguments.Several,
+    ),
+]
+NewReport = Annotated[
+    str,
+    Argument("the new report; -: standard output", metavar="FILE", listed=(Listed.FILE,), short="-o", one_of=REPORT),
+]
+Compared = Annotated[
+    str,
+    Argument(
+        "print where the answers differ from this report; exit code 0: nowhere, 1: somewhere",
+        metavar="FILE",
+        listed=(Listed.FILE,),
+        one_of=REPORT,
+    ),
+]
+SmallMoves = Annotated[bool, Argument("agree to small moves beforehand; without, a terminal is asked")]
 
 
-def _certify(chosen: argparse.Namespace) -> int:
+def _certify(
+    url: Url, *, drive: Certified = "", output: NewReport = "", compare: Compared = "", yes: SmallMoves = False
+) -> int:
     from multidrop.features.certify.command import run
 
-    return run(chosen)
+    return run(url, drive, output, compare, yes)
 
 
 FEATURE = Feature(
@@ -20,30 +49,16 @@ FEATURE = Feature(
     "a report of what a drive answers, and two drives compared by it",
     adds=(
         Operation(
+            _certify,
             command="certify",
             meaning=(
                 "ask a drive the questions that our rulings leave open, for a report; or compare a drive with a report"
             ),
-            run=_certify,
             examples=(
                 "certify press --drive a -o report.toml",
                 "certify 'sim:#press' --drive a -o report.toml --yes",
                 "certify --compare report.toml 'sim:#press' --drive a",
             ),
-            arguments={
-                "URL": "what to open",
-                "--drive ADDR": {
-                    "help": "the drive (default: the first); may be repeated",
-                    "action": arguments.Several,
-                },
-                "-o | --compare": {
-                    "-o|--output FILE": "the new report; -: standard output",
-                    "--compare FILE": (
-                        "print where the answers differ from this report; exit code 0: nowhere, 1: somewhere"
-                    ),
-                },
-                "--yes": "agree to small moves beforehand; without, a terminal is asked",
-            },
             after="snapshot",
         ),
     ),

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import argparse
-
 from multidrop.base import new_file
 from multidrop.base.errors import Diagnostic
 from multidrop.features.certify import certificate
@@ -15,19 +13,19 @@ DIFFERS = 1
 """The exit code of a comparison where an answer differs."""
 
 
-def run(chosen: argparse.Namespace) -> int:
+def run(url: str, drive: str, output: str, compare: str, agreed: bool) -> int:
     """Write a report, or compare a drive with one; report a wrong file before anything is opened."""
-    if is_several(chosen.drive):
-        raise Diagnostic(f"--drive {chosen.drive}: a report is of one drive", "certify", "name one")
-    theirs = certificate.load(chosen.compare) if chosen.compare else None
+    if is_several(drive):
+        raise Diagnostic(f"--drive {drive}: a report is of one drive", "certify", "name one")
+    theirs = certificate.load(compare) if compare else None
     if theirs is None:
-        new_file.check(chosen.output, printed=True)
+        new_file.check(output, printed=True)
 
     async def work(session: Session) -> int:
-        [drive] = targets(session, chosen.drive)
+        [certified] = targets(session, drive)
         if theirs is not None:
-            return DIFFERS if await certificate.compare(session, drive, chosen.compare, theirs) else 0
-        await certificate.certify(session, drive, chosen.output)
+            return DIFFERS if await certificate.compare(session, certified, compare, theirs) else 0
+        await certificate.certify(session, certified, output)
         return 0
 
-    return runner.run([chosen.url], work, agreed=chosen.yes, unsolicited=False, tried=[chosen.drive])
+    return runner.run([url], work, agreed=agreed, unsolicited=False, tried=[drive])

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import argparse
 import sys
 
 from multidrop.base import new_file
 from multidrop.base.text import counted
-from multidrop.commands.programs import WRONG
 from multidrop.features.convert.conversion import convert
+from multidrop.shell.batch.program_runs import WRONG
 from multidrop.shell.streams.stdout import StatusLine, write
 
 DIFFERS = 1
@@ -17,28 +16,28 @@ SHOWN = 10
 """The largest number of worlds with a difference that are shown."""
 
 
-def run(chosen: argparse.Namespace) -> int:
+def run(file: str, to: str, personality: str | None, output: str, until: float) -> int:
     """Convert a file; 1: something cannot be converted, so nothing is written, or a run beside the original differs."""
-    new_file.check(chosen.output, printed=True)
-    converted = convert(chosen.file, chosen.to, chosen.personality)
+    new_file.check(output, printed=True)
+    converted = convert(file, to, personality)
     found, status = converted.found, StatusLine()
     for each in found.refused:
-        write(sys.stderr, each.line_for(chosen.file))
+        write(sys.stderr, each.line_for(file))
     if found.refused:
-        write(sys.stderr, f"{chosen.file}: nothing is written")
+        write(sys.stderr, f"{file}: nothing is written")
         return WRONG
     runs = []
-    for run_of_both in converted.differences(chosen.until):
+    for run_of_both in converted.differences(until):
         runs.append(run_of_both)
         status.show(f"{counted(len(runs), 'world')} run")
     status.erase()
-    new_file.write(chosen.output, found.text, lambda line: write(sys.stdout, line))
+    new_file.write(output, found.text, lambda line: write(sys.stdout, line))
     differ = [both for both in runs if both[1]]
-    stream = sys.stderr if chosen.output == new_file.STANDARD_OUTPUT else sys.stdout
-    lines = [f"{each.where(chosen.file)}: {each.what}; {each.hint}" for each in found.changes]
+    stream = sys.stderr if output == new_file.STANDARD_OUTPUT else sys.stdout
+    lines = [f"{each.where(file)}: {each.what}; {each.hint}" for each in found.changes]
     lines += [f"differs with {world}: {difference}" for world, difference in differ[:SHOWN]]
     lines += [f"and in {counted(len(differ) - SHOWN, 'more world')}"] if differ[SHOWN:] else []
     count = counted(len(found.changes), "change")
     beside = f"run beside each other in {counted(len(runs), 'world')}, {len(differ)} differ"
-    write(stream, *lines, f"{converted.source} to {converted.target}{new_file.place(chosen.output)}: {count}; {beside}")
+    write(stream, *lines, f"{converted.source} to {converted.target}{new_file.place(output)}: {count}; {beside}")
     return DIFFERS if differ else 0

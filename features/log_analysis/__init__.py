@@ -2,34 +2,62 @@
 
 from __future__ import annotations
 
-import argparse
+from typing import Annotated
 
 from multidrop.base.feature import Feature
+from multidrop.shell.operations.argument_types import Yes
 from multidrop.shell.operations.operation import Operation
+from multidrop.shell.operations.parameter import Argument, Listed, OneOf
+
+AGAINST = OneOf("against", required=True)
+FILE = (Listed.FILE,)
+Moment = Annotated[str, Argument("a time of day (the last one in the log), or a date and a time", metavar="TIME")]
+AnyLog = Annotated[str, Argument("a session log (default: the newest)", metavar="FILE", listed=FILE)]
+MomentAsJson = Annotated[
+    bool, Argument("print one JSON object a line: the moment, then entries as they are in the file")
+]
+Log1 = Annotated[str, Argument("a session log; its last session counts", listed=FILE)]
+Log2 = Annotated[str, Argument("the log of another run", listed=FILE)]
+AsJson = Annotated[bool, Argument("print one JSON object")]
+Judged = Annotated[str, Argument("a session log; its older parts belong to it", metavar="FILE", listed=FILE)]
+BreachesAsJson = Annotated[bool, Argument("print one JSON object a breach")]
+Replayed = Annotated[str, Argument("a session log; its last session is replayed", metavar="FILE", listed=FILE)]
+To = Annotated[str, Argument("what to open", metavar="URL", listed=(Listed.URL,), one_of=AGAINST)]
+Cell = Annotated[str, Argument("a cell file (TOML), in virtual time", metavar="CELL", listed=FILE, one_of=AGAINST)]
+Fast = Annotated[bool, Argument("leave out the pauses between lines")]
+DifferencesAsJson = Annotated[bool, Argument("print one JSON object a difference, and a summary")]
 
 
-def _at(chosen: argparse.Namespace) -> int:
+def _at(time: Moment, file: AnyLog = "", *, json: MomentAsJson = False) -> int:
     from multidrop.features.log_analysis import command
 
-    return command.at(chosen)
+    return command.at(time, file, json)
 
 
-def _bisect(chosen: argparse.Namespace) -> int:
+def _bisect(file1: Log1, file2: Log2, *, json: AsJson = False) -> int:
     from multidrop.features.log_analysis import command
 
-    return command.bisect(chosen)
+    return command.bisect(file1, file2, json)
 
 
-def _judge(chosen: argparse.Namespace) -> int:
+def _judge(file: Judged, *, json: BreachesAsJson = False) -> int:
     from multidrop.features.log_analysis import command
 
-    return command.judge(chosen)
+    return command.judge(file, json)
 
 
-def _replay(chosen: argparse.Namespace) -> int:
+def _replay(
+    file: Replayed,
+    *,
+    to: To = "",
+    against: Cell = "",
+    fast: Fast = False,
+    json: DifferencesAsJson = False,
+    yes: Yes = False,
+) -> int:
     from multidrop.features.log_analysis import command
 
-    return command.replay(chosen)
+    return command.replay(file, to, against, fast, json, yes)
 
 
 FEATURE = Feature(
@@ -37,64 +65,40 @@ FEATURE = Feature(
     "a moment of a log, two runs compared, a log judged or replayed",
     adds=(
         Operation(
+            _at,
             command="log at",
             meaning="print what was known at a moment: states, and the last lines and samples of each drive",
-            run=_at,
             examples=(
                 "log at 11:37:05.2",
                 "log at '2026-11-22 11:37:05' day.jsonl",
             ),
-            arguments={
-                "TIME": "a time of day (the last one in the log), or a date and a time",
-                "[FILE]": "a session log (default: the newest)",
-                "--json": "print one JSON object a line: the moment, then entries as they are in the file",
-            },
             after="log grep",
         ),
         Operation(
+            _bisect,
             command="log bisect",
             meaning="find the first difference between two runs; exit code 0: there is none, 1: there is one",
-            run=_bisect,
             examples=("log bisect monday.jsonl tuesday.jsonl",),
-            arguments={
-                "FILE1": "a session log; its last session counts",
-                "FILE2": "the log of another run",
-                "--json": "print one JSON object",
-            },
             after="log at",
         ),
         Operation(
+            _judge,
             command="log judge",
             meaning="check a session log by the rules of a session; exit code 0: all held, 1: one broke",
-            run=_judge,
             examples=(
                 "log judge day.jsonl",
                 "log judge day.jsonl --json",
             ),
-            arguments={
-                "FILE": "a session log; its older parts belong to it",
-                "--json": "print one JSON object a breach",
-            },
             after="log bisect",
         ),
         Operation(
+            _replay,
             command="log replay",
             meaning="send the lines of a session log to other drives and print where the answers differ; asks first",
-            run=_replay,
             examples=(
                 "log replay day.jsonl --against machine.toml --fast",
                 "log replay day.jsonl --to sim:",
             ),
-            arguments={
-                "FILE": "a session log; its last session is replayed",
-                "--to | --against": {
-                    "--to URL": "what to open",
-                    "--against CELL": "a cell file (TOML), in virtual time",
-                },
-                "--fast": "leave out the pauses between lines",
-                "--json": "print one JSON object a difference, and a summary",
-                "--yes": "answer every question with yes beforehand",
-            },
             after="log judge",
         ),
     ),

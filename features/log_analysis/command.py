@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import argparse
 import json
 import sys
 from collections.abc import Iterator
@@ -34,9 +33,9 @@ MOST_BACKS = 3
 """The times when the clock was set back that are named."""
 
 
-def judge(chosen: argparse.Namespace) -> int:
+def judge(file: str, as_json: bool) -> int:
     """Print each breach of a rule; the exit code says whether there is any. Raises Diagnostic for a wrong file."""
-    path = Path(chosen.file)
+    path = Path(file)
     found = judged(files.whole(path))
     if found.sessions == found.unmarked:
         why = "marks no commands and stops, as older versions did" if found.unmarked else "is not a session log"
@@ -44,7 +43,7 @@ def judge(chosen: argparse.Namespace) -> int:
 
     def work() -> None:
         for rule, line, entry, said in found.breaches:
-            if chosen.json:
+            if as_json:
                 fields = {"rule": rule, "time": entry.time.isoformat(), "where": line.where, "text": said}
                 write(sys.stdout, json.dumps(fields))
             else:
@@ -61,15 +60,15 @@ def judge(chosen: argparse.Namespace) -> int:
     return code or (BROKEN if found.breaches or found.unreadable else 0)
 
 
-def at(chosen: argparse.Namespace) -> int:
+def at(time: str, file: str, as_json: bool) -> int:
     """Print what was known at a time: the last entry of each kind and place, and the last polls."""
-    found = moments.known(log_path(chosen), chosen.time)
+    found = moments.known(log_path(file), time)
 
     def work() -> None:
-        if found.backs and not chosen.json:
+        if found.backs and not as_json:
             write(sys.stdout, _set_back(found))
         for each in found.known:
-            write(sys.stdout, *(_objects(each, found) if chosen.json else _lines(each)))
+            write(sys.stdout, *(_objects(each, found) if as_json else _lines(each)))
 
     return reported(work)
 
@@ -123,17 +122,17 @@ def _time(moment: datetime) -> str:
     return moment.isoformat(" ", "milliseconds")[:STAMP]
 
 
-def bisect(chosen: argparse.Namespace) -> int:
+def bisect(file1: str, file2: str, as_json: bool) -> int:
     """Print the first difference between two runs; the exit code says whether there is any, or may be."""
-    runs = [moments.Run(Path(file)) for file in (chosen.file1, chosen.file2)]
+    runs = [moments.Run(Path(file)) for file in (file1, file2)]
     found = moments.first_difference(*runs)
     lines = [None if index is None else run.line(index) for run, index in zip(runs, found or (None, None), strict=True)]
-    damaged = [place for file in (chosen.file1, chosen.file2) for place in files.damaged(Path(file))]
+    damaged = [place for file in (file1, file2) for place in files.damaged(Path(file))]
     if damaged:
         write(sys.stderr, files.left_out(damaged, "compared"))
 
     def work() -> None:
-        if chosen.json:
+        if as_json:
             both = [None if line is None else {"where": line.where, **json.loads(line.data)} for line in lines]
             fact = {"differ": found is not None, "lines": [len(run.steps) for run in runs], "first": both}
             fact |= {"unreadable": damaged} if damaged else {}
@@ -142,7 +141,7 @@ def bisect(chosen: argparse.Namespace) -> int:
             readable = " that can be read" if damaged else ""
             write(sys.stdout, f"no difference in {counted(len(runs[0].steps), 'line')}{readable}")
         else:
-            for file, run, line in zip((chosen.file1, chosen.file2), runs, lines, strict=True):
+            for file, run, line in zip((file1, file2), runs, lines, strict=True):
                 none = f"{file}: nothing: its run has {counted(len(run.steps), 'line')}"
                 entry = None if line is None else line.entry
                 write(sys.stdout, none if line is None or entry is None else f"{line.where}: {text(entry)}")
@@ -154,17 +153,17 @@ def _stamp(entry: Entry) -> str:
     return text(entry)[:STAMP]
 
 
-def replay(chosen: argparse.Namespace) -> int:
+def replay(file: str, to: str, against: str, fast: bool, as_json: bool, agreed: bool) -> int:
     """Take a log again on other drives; report a wrong file before anything is opened."""
-    found = steps.read(Path(chosen.file))
+    found = steps.read(Path(file))
     if not found.steps:
-        raise Diagnostic("no line of the log was sent to a drive", chosen.file, "/log before the lines keeps them")
+        raise Diagnostic("no line of the log was sent to a drive", file, "/log before the lines keeps them")
     if found.damaged:  # a stop may be missing
         write(sys.stderr, files.left_out(found.damaged, "sent"))
 
     async def body(session: Session) -> None:
-        await run(session, found, fast=chosen.fast, positions=bool(chosen.against), report=ReplayReport(chosen.json))
+        await run(session, found, fast=fast, positions=bool(against), report=ReplayReport(as_json))
 
-    url = chosen.to or f"sim:{chosen.against.removeprefix('sim:')}"
-    loop = VirtualLoop if chosen.against else None
-    return runner.run([url], body, agreed=chosen.yes, unsolicited=False, replies=False, loop=loop)
+    url = to or f"sim:{against.removeprefix('sim:')}"
+    loop = VirtualLoop if against else None
+    return runner.run([url], body, agreed=agreed, unsolicited=False, replies=False, loop=loop)

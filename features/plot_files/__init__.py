@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-import argparse
-from collections.abc import Awaitable, Callable, Mapping, Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Awaitable, Callable
+from typing import TYPE_CHECKING, Annotated
 
 from multidrop.base.feature import Feature
-from multidrop.shell.operations.operation import Forms, Operation
+from multidrop.shell.operations.argument_types import NoReconnect, Url
+from multidrop.shell.operations.operation import Operation, typed
+from multidrop.shell.operations.parameter import Argument, Listed, OneOf
 from multidrop.shell.plot_targets import PlotTargets
 
 if TYPE_CHECKING:
@@ -17,30 +18,60 @@ if TYPE_CHECKING:
     from multidrop.shell.plots.batch import Batch
     from multidrop.shell.verbs.call import Call
 
-TO = "--to FILE.rrd|FILE.csv|FILE.parquet|rerun+http://HOST:PORT/proxy"
-SERVE = "--serve [HOST:]PORT"
-RATE = "--rate N|max"
 VIEWERS = 9876
 """The port at which viewers of rerun connect by default."""
+TARGET, ONE_TARGET = OneOf("target"), OneOf("one target", required=True)
+TO = "FILE.rrd|FILE.csv|FILE.parquet|rerun+http://HOST:PORT/proxy"
+FILE = (Listed.FILE,)
+TypedTo = Annotated[str | None, Argument("into a file, or to a viewer", metavar=TO, listed=FILE, one_of=TARGET)]
+TypedServe = Annotated[str | None, Argument("for viewers that connect", metavar="[HOST:]PORT", one_of=TARGET)]
+TypedRate = Annotated[str, Argument("samples a second of each drive, or max", metavar="N|max")]
+Plotted = Annotated[str, Argument(metavar="ADDR", listed=(Listed.DRIVE, Listed.FILE))]
+To = Annotated[
+    str | None,
+    Argument(
+        "a file for rerun or a table (an existing one is added to), or a viewer elsewhere",
+        metavar=TO,
+        listed=FILE,
+        one_of=ONE_TARGET,
+    ),
+]
+Serve = Annotated[str | None, Argument("serve a viewer's data here", metavar="[HOST:]PORT", one_of=ONE_TARGET)]
+Rate = Annotated[
+    str,
+    Argument("samples a second of each drive, at most (default: 50); max: as fast as the line allows", metavar="N|max"),
+]
+OfUrl = Annotated[
+    str,
+    Argument(
+        "a drive, or ADDR.WORD for a value that it prints (default: all drives)",
+        metavar="ADDR",
+        listed=(Listed.DRIVE,),
+    ),
+]
 
 
-def _plot(chosen: argparse.Namespace) -> int:
+async def _typed(
+    call: Call, *texts: Plotted, to: TypedTo = None, serve: TypedServe = None, rate: TypedRate = ""
+) -> None:
+    from multidrop.features.plot_files.verb import plot
+
+    await plot(call, texts, to, serve, rate)
+
+
+def _plot(
+    url: Url,
+    *,
+    drive: tuple[OfUrl, ...] = (),
+    rate: Rate = "50",
+    to: To = None,
+    serve: Serve = None,
+    no_reconnect: NoReconnect = False,
+) -> int:
     from multidrop.features.plot_files.command import run
 
-    return run(
-        chosen.url,
-        [] if "all" in chosen.drive else chosen.drive,
-        to=chosen.to,
-        serve=chosen.serve,
-        rate=chosen.rate,
-        reconnect=not chosen.no_reconnect,
-    )
-
-
-async def _begin(call: Call, options: Mapping[str, str], texts: Sequence[str]) -> None:
-    from multidrop.features.plot_files.verb import begin_typed
-
-    await begin_typed(call, options, texts)
+    drives = () if "all" in drive else drive
+    return run(url, drives, to=to, serve=serve, rate=rate, reconnect=not no_reconnect)
 
 
 def _save(text: str) -> tuple[str, Callable[[Batch], Awaitable[None]]]:
@@ -60,39 +91,25 @@ FEATURE = Feature(
     "plots in files, as tables, and in rerun",
     adds=(
         Operation(
+            _plot,
             command="plot",
             meaning=(
                 "plot position, velocity and values until interrupted: to a file, or to a viewer served here or "
                 "elsewhere"
             ),
-            run=_plot,
             examples=(
                 "plot 'sim:#press' --to run.rrd",
                 "plot press --drive b --serve 9876",
                 "plot press --to night.csv --rate 1",
                 "plot press --to rerun+http://pc:9876/proxy",
             ),
-            arguments={
-                "URL": "what to open",
-                "--drive ADDR ...": "a drive, or ADDR.WORD for a value that it prints (default: all drives)",
-                RATE: {
-                    "help": "samples a second of each drive, at most (default: 50); max: as fast as the line allows",
-                    "default": "50",
-                },
-                "--to | --serve": {
-                    TO: {
-                        "help": "a file for rerun or a table (an existing one is added to), or a viewer elsewhere",
-                        "default": None,
-                    },
-                    SERVE: {"help": "serve a viewer's data here", "default": None},
-                },
-                "--no-reconnect": "give up a lost connection, and do not try again",
-            },
             after="macro",
         ),
-        Forms(
-            "/plot",
-            usage=f"[ADDR ...] {TO} [{RATE}] | [ADDR ...] {SERVE} [{RATE}]",
+        Operation(
+            _typed,
+            verb="/plot",
+            extends=True,
+            recorded=typed,
             help="""
 Plot drives and values on the screen, to rerun or into a table, with commands and replies, until /plot off.
 
@@ -102,19 +119,11 @@ It reads only while a plot runs or is shown, each drive 50 times a second unless
 max` reads as fast as the line allows. `/plot FILE.rrd` is short for `/plot --to FILE.rrd`; `/plot` alone lists the
 running plots. A table (CSV, Parquet) has a row for each value, state and line.
 """,
-            words={
-                "--to": "into a file, or to a viewer",
-                "--serve": "for viewers that connect",
-                "--rate": "samples a second of each drive, or max",
-            },
         ),
         PlotTargets(
-            options=("--to", "--serve", "--rate"),
-            endings=(".rrd", ".csv", ".parquet"),
             valid="--to FILE.rrd|.csv|.parquet or --serve [HOST:]PORT",
             files="FILE.csv or FILE.rrd",
             stream=f"--serve {VIEWERS}",
-            begin=_begin,
             save=_save,
             read=_read,
         ),

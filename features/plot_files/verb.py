@@ -2,25 +2,38 @@
 
 from __future__ import annotations
 
-from collections.abc import Awaitable, Callable, Mapping, Sequence
+from collections.abc import Awaitable, Callable, Sequence
 from functools import partial
 
 from multidrop.features.plot_files.plot import begin, write
 from multidrop.features.plot_files.request import DEFAULT, parse_rate, parse_target
 from multidrop.shell.plots.batch import Batch
 from multidrop.shell.plots.series import parse_series, read_first
+from multidrop.shell.verbs import plotting
 from multidrop.shell.verbs.call import Call
 
+ENDINGS = (".rrd", ".csv", ".parquet")
 
-async def begin_typed(call: Call, options: Mapping[str, str], texts: Sequence[str]) -> None:
-    """Begin what a line of `/plot` asks for, and say where it goes."""
-    if options.keys() == {"--rate"}:
-        raise call.wrong("no target for the plot")
+
+async def plot(call: Call, texts: Sequence[str], to: str | None, serve: str | None, rate: str) -> None:
+    """Begin what a line of `/plot` asks for: on the screen, or beside it, and say where it goes.
+
+    A word that can only be a target has `--to`.
+    """
+    targets = [text for text in texts if text.endswith(ENDINGS) or "://" in text]
+    if len(targets) + (to is not None) > 1:
+        raise call.wrong("--to is given twice")
+    if targets:
+        texts, to = [text for text in texts if text not in targets], targets[0]
+    if to is None and serve is None:
+        if rate:
+            raise call.wrong("no target for the plot")
+        return await plotting.plot(call, texts)
     workspace = call.session
-    target = parse_target(options.get("--to"), options.get("--serve"))
+    target = parse_target(to, serve)
     if target.file is not None:
         call.output_file(str(target.file))
-    period = parse_rate(options.get("--rate", DEFAULT))
+    period = parse_rate(rate or DEFAULT)
     series = parse_series(workspace, texts)
     await read_first(workspace, series)
     begun, _ = await begin(workspace, target, series, period)

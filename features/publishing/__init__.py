@@ -2,40 +2,62 @@
 
 from __future__ import annotations
 
-import argparse
 import sys
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 from multidrop.base.feature import Feature
 from multidrop.shell.connect.scheme import NoLine
+from multidrop.shell.operations.argument_types import JsonObjects, NoReconnect, Url
 from multidrop.shell.operations.operation import Operation
+from multidrop.shell.operations.parameter import Argument, Listed
 from multidrop.shell.sections import Section
 
 if TYPE_CHECKING:
     from multidrop.features.publishing.login import MqttSettings
 
 
-def _publish(chosen: argparse.Namespace) -> int:
+Target = Annotated[
+    str,
+    Argument(
+        "mqtt://[USER@]BROKER[:PORT]/PREFIX: a broker, and the topic above all others (mqtts:// is encrypted); "
+        "prometheus://[HOST]:PORT or opcua://[HOST]:PORT: serve this machine, or at HOST; may be repeated",
+        metavar="TARGET",
+    ),
+]
+HomeAssistant = Annotated[bool, Argument("describe the values for the discovery of Home Assistant, at the broker")]
+Rate = Annotated[str, Argument("samples a second of each drive, at most (default: 2)", metavar="N")]
+BrokerUrl = Annotated[
+    str,
+    Argument(
+        "mqtt://[USER@]BROKER[:PORT]/PREFIX: a broker, and the topic above all publishers; mqtts:// is encrypted",
+        metavar="BROKER-URL",
+        listed=(Listed.BROKER,),
+    ),
+]
+
+
+def _publish(
+    urls: tuple[Url, ...],
+    *,
+    to: tuple[Target, ...],
+    home_assistant: HomeAssistant = False,
+    rate: Rate = "2",
+    no_reconnect: NoReconnect = False,
+) -> int:
     from multidrop.features.publishing import command
 
-    return command.run(
-        chosen.urls,
-        to=chosen.to,
-        rate=chosen.rate,
-        home_assistant=chosen.home_assistant,
-        reconnect=not chosen.no_reconnect,
-    )
+    return command.run(urls, to=to, rate=rate, home_assistant=home_assistant, reconnect=not no_reconnect)
 
 
-def _plant(chosen: argparse.Namespace) -> int:
+def _plant(url: BrokerUrl, *, json: JsonObjects = False) -> int:
     from multidrop.features.publishing import watch
 
-    if chosen.json or not all(each.isatty() for each in (sys.stdin, sys.stdout, sys.stderr)):
-        return watch.run(chosen.url, as_json=chosen.json)
+    if json or not all(each.isatty() for each in (sys.stdin, sys.stdout, sys.stderr)):
+        return watch.run(url, as_json=json)
     from multidrop.features.publishing.screen import run
 
-    return run(chosen.url)
+    return run(url)
 
 
 def _read_login(table: Mapping[str, Any], where: str) -> MqttSettings:
@@ -55,42 +77,25 @@ FEATURE = Feature(
     "values of all drives for MQTT, Prometheus and OPC UA, and a page of what others publish",
     adds=(
         Operation(
+            _publish,
             command="publish",
             meaning=(
                 "publish samples, states and errors of all drives until interrupted: to an MQTT broker, for "
                 "Prometheus or OPC UA"
             ),
-            run=_publish,
             examples=(
                 "publish press --to mqtt://broker/plant/hall-2",
                 "publish press eth --to mqtts://shop-7@broker/plant/hall-2 --rate 5",
                 "publish press --to mqtt://broker/plant/hall-2 --to prometheus://:9464",
             ),
-            arguments={
-                "URL ...": "what to open",
-                "--to TARGET ...": {
-                    "help": (
-                        "mqtt://[USER@]BROKER[:PORT]/PREFIX: a broker, and the topic above all others (mqtts:// is "
-                        "encrypted); prometheus://[HOST]:PORT or opcua://[HOST]:PORT: serve this machine, or at "
-                        "HOST; may be repeated"
-                    ),
-                    "required": True,
-                },
-                "--home-assistant": "describe the values for the discovery of Home Assistant, at the broker",
-                "--rate N": {
-                    "help": "samples a second of each drive, at most (default: 2)",
-                    "default": "2",
-                },
-                "--no-reconnect": "give up a lost connection, and do not try again",
-            },
             after="poll",
         ),
         Operation(
+            _plant,
             command="plant",
             meaning=(
                 "show every drive that is published under a topic of an MQTT broker, the worst first; commands nothing"
             ),
-            run=_plant,
             examples=(
                 "plant mqtt://broker/plant",
                 "plant mqtt://broker/plant --json",
@@ -100,13 +105,6 @@ FEATURE = Feature(
                 "broker and :PORT after it where they are needed. The password and the certificates are in the "
                 "configuration ([mqtt])."
             ),
-            arguments={
-                "url=BROKER-URL": (
-                    "mqtt://[USER@]BROKER[:PORT]/PREFIX: a broker, and the topic above all publishers; mqtts:// is "
-                    "encrypted"
-                ),
-                "--json": "print one JSON object a line",
-            },
             after="publish",
         ),
         NoLine(

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-import argparse
 import sys
 from contextlib import AbstractContextManager, nullcontext
-from typing import TYPE_CHECKING
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Annotated
 
 from multidrop.base.errors import Diagnostic
 from multidrop.base.feature import Feature
-from multidrop.shell.hooks import Options, asked_for
+from multidrop.shell.hooks import Options
+from multidrop.shell.operations.parameter import Argument
 from multidrop.shell.relaying import Lent
 
 if TYPE_CHECKING:
@@ -17,12 +18,30 @@ if TYPE_CHECKING:
 
 SCREENS = "screens"
 """The folder of the sockets of shared screens, in the state folder."""
-JOIN = "--join WHERE"
 
 
-def _shared(app: MultidropApp, chosen: argparse.Namespace) -> AbstractContextManager[object]:
+@dataclass(frozen=True, kw_only=True)
+class Share:
+    """Whether others watch."""
+
+    share: Annotated[bool, Argument("let others of this account watch, and stop, with --join")] = False
+
+
+@dataclass(frozen=True, kw_only=True)
+class Join:
+    """Which screen is watched; empty: the only one here, None: none."""
+
+    join: Annotated[
+        str | None,
+        Argument(
+            "watch a shared screen: the only one here, its number, or ssh://HOST[/NUMBER]", metavar="WHERE", alone=""
+        ),
+    ] = None
+
+
+def _shared(app: MultidropApp, asked: Share) -> AbstractContextManager[object]:
     """Let others watch while the screen runs."""
-    if not chosen.share:
+    if not asked.share:
         return nullcontext()
     if sys.platform == "win32":
         raise Diagnostic("watching together is not there on Windows", "tui --share", "share on Linux or macOS")
@@ -32,18 +51,18 @@ def _shared(app: MultidropApp, chosen: argparse.Namespace) -> AbstractContextMan
         return sharing(app, app.session.settings.state / SCREENS)
 
 
-def _join(chosen: argparse.Namespace) -> int | None:
+def _join(asked: Join, more: bool) -> int | None:
     """Show the screen of another one, and open nothing."""
-    if chosen.join is None:
+    if asked.join is None:
         return None
-    if chosen.urls or chosen.raw or asked_for(chosen, JOIN):
+    if more:
         raise Diagnostic("a watcher opens nothing itself", "tui --join", "give --join alone, or with ssh://HOST")
     if sys.platform == "win32":
         raise Diagnostic("watching together is not there on Windows", "tui --join", "watch on Linux or macOS")
     else:
         from multidrop.features.shared_screen.command import join
 
-        return join(chosen.join)
+        return join(asked.join)
 
 
 def _lend(number: str) -> None:
@@ -61,21 +80,13 @@ FEATURE = Feature(
     adds=(
         Options(
             "tui",
-            {"--share": "let others of this account watch, and stop, with --join"},
+            Share,
             around=_shared,
             examples=("tui press --share",),
         ),
         Options(
             "tui",
-            {
-                JOIN: {
-                    "help": "watch a shared screen: the only one here, its number, or ssh://HOST[/NUMBER]",
-                    "nargs": "?",
-                    "const": "",
-                    "default": None,
-                    "metavar": "SCREEN",
-                }
-            },
+            Join,
             instead=_join,
             examples=("tui --join", "tui --join ssh://shop-floor"),
         ),

@@ -5,7 +5,6 @@ A signal ends the sweep: what is done is reported, with exit code 130. Cases are
 
 from __future__ import annotations
 
-import argparse
 import json
 import os
 import sys
@@ -20,8 +19,8 @@ from multidrop.base.atomic import write_atomically
 from multidrop.base.errors import Diagnostic, TransportLost
 from multidrop.base.files import why
 from multidrop.base.text import counted
+from multidrop.features.sweeps import Sweep, workers
 from multidrop.features.sweeps import plan as planning
-from multidrop.features.sweeps import workers
 from multidrop.features.sweeps.answers import Answer
 from multidrop.features.sweeps.failures import Group, command, grouped, rows
 from multidrop.features.sweeps.plan import Asked, Plan
@@ -36,36 +35,36 @@ from multidrop.shell.signals import Interruption
 from multidrop.shell.streams.stdout import StatusLine, fail, write
 
 
-def run(chosen: argparse.Namespace) -> int:
+def run(file: str, sweep: Sweep) -> int:
     asked = Asked(
-        chosen.file,
-        chosen.cell,
-        chosen.language or "",
-        chosen.vary,
-        chosen.expect,
-        chosen.run,
-        chosen.until,
-        chosen.random,
-        chosen.seed,
-        chosen.search,
+        file,
+        sweep.cell,
+        sweep.language,
+        sweep.vary,
+        sweep.expect,
+        sweep.run,
+        sweep.until,
+        sweep.random,
+        sweep.seed,
+        sweep.search,
     )
     plan = planning.make(asked)
-    if chosen.svg:
-        if chosen.search or sum(each.count > 1 for each in plan.values) < 2:
-            raise Diagnostic("shows two keys with several values each", f"--svg {chosen.svg}", "vary a second key")
-        check_place(chosen.svg, "--svg", b"<svg", "picture")
-    if chosen.junit:  # before the tables are made
-        check_place(chosen.junit, "--junit", b"<testsuite", "JUnit report")
-    table = Table(plan, chosen.csv, chosen.parquet, chosen.resume)
-    report = Report(plan, table, as_json=chosen.json, junit=chosen.junit, svg=chosen.svg)
+    if sweep.svg:
+        if sweep.search or sum(each.count > 1 for each in plan.values) < 2:
+            raise Diagnostic("shows two keys with several values each", f"--svg {sweep.svg}", "vary a second key")
+        check_place(sweep.svg, "--svg", b"<svg", "picture")
+    if sweep.junit:  # before the tables are made
+        check_place(sweep.junit, "--junit", b"<testsuite", "JUnit report")
+    table = Table(plan, sweep.csv, sweep.parquet, sweep.resume)
+    report = Report(plan, table, as_json=sweep.json, junit=sweep.junit, svg=sweep.svg)
     with Interruption() as interruption:
         try:
-            if chosen.cluster:
-                agree = partial(_agree, chosen.cluster, chosen.yes, workers.TRUST, interruption)
+            if sweep.cluster:
+                agree = partial(_agree, sweep.cluster, sweep.yes, workers.TRUST, interruption)
                 rounds = (map(plan.case, todo) for todo in report.rounds())
-                report.take_all(workers.cluster_results(plan.job, rounds, chosen.cluster, interruption, agree))
+                report.take_all(workers.cluster_results(plan.job, rounds, sweep.cluster, interruption, agree))
             else:
-                jobs = chosen.jobs or workers.cores()
+                jobs = sweep.jobs or workers.cores()
                 for todo in report.rounds():
                     cases = map(plan.case, todo)
                     report.take_all(workers.results(plan.job, cases, len(todo), jobs, interruption, say=report.say))

@@ -2,16 +2,24 @@
 
 from __future__ import annotations
 
-import argparse
+from typing import Annotated
 
 from multidrop.base.feature import Feature
 from multidrop.shell.operations.operation import Operation
+from multidrop.shell.operations.parameter import Argument, Listed
+
+Log = Annotated[str, Argument("a session log; its last session is used", listed=(Listed.FILE,))]
+Cell = Annotated[
+    str,
+    Argument("the cell file (TOML) with the drives and their motors; the values go into it", listed=(Listed.FILE,)),
+]
+ValuesAsJson = Annotated[bool, Argument("print one JSON object a value")]
 
 
-def _fit(chosen: argparse.Namespace) -> int:
+def _fit(log: Log, *, cell: Cell, json: ValuesAsJson = False) -> int:
     from multidrop.features.twin_fit.command import run
 
-    return run(chosen)
+    return run(log, cell, json)
 
 
 FEATURE = Feature(
@@ -19,21 +27,13 @@ FEATURE = Feature(
     "load, friction and current margin of axes from a log",
     adds=(
         Operation(
+            _fit,
             command="twin fit",
             meaning="find load, friction, inertia and current margin of drives in a session log; put them into a cell",
-            run=_fit,
             examples=(
                 "twin fit day.jsonl --cell machine.toml",
                 "twin fit day.jsonl --cell machine.toml --json",
             ),
-            arguments={
-                "LOG": "a session log; its last session is used",
-                "--cell CELL": {
-                    "help": "the cell file (TOML) with the drives and their motors; the values go into it",
-                    "required": True,
-                },
-                "--json": "print one JSON object a value",
-            },
             after="twin",
         ),
         Operation(

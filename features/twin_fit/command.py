@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import argparse
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -18,17 +17,17 @@ if TYPE_CHECKING:
     from multidrop.shell.session import Session
 
 
-def run(chosen: argparse.Namespace) -> int:
+def run(log_file: str, cell_file: str, as_json: bool) -> int:
     """Fit a cell to a log, in virtual time; report a wrong file before anything is opened.
 
     The cell is written once all output is. Raises Diagnostic.
     """
-    log, cell = Path(chosen.log), Path(chosen.cell.removeprefix("sim:"))
+    log, cell = Path(log_file), Path(cell_file.removeprefix("sim:"))
     steps.read(log)
     found: list[Callable[[], None]] = []
 
     async def body(session: Session) -> None:
-        found.append(await fit(session, log, cell, chosen.json))
+        found.append(await fit(session, log, cell, as_json))
 
     code = runner.run([f"sim:{cell}"], body, unsolicited=False, replies=False, loop=VirtualLoop)
     if not code and stdout.dropped:

@@ -2,25 +2,64 @@
 
 from __future__ import annotations
 
-import argparse
-from typing import TYPE_CHECKING
+from argparse import ArgumentTypeError
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Annotated
 
 from multidrop.base.feature import Feature
-from multidrop.shell.hooks import AtSession, Options, Switch
-from multidrop.shell.operations.operation import Operation
+from multidrop.base.text import whole
+from multidrop.shell.hooks import AtSession, Options, Predicting, Switch
+from multidrop.shell.operations.argument_types import RAW, Address
+from multidrop.shell.operations.operation import Operation, typed
+from multidrop.shell.operations.parameter import Argument
 
 if TYPE_CHECKING:
     from multidrop.shell.session import Session
     from multidrop.shell.verbs.call import Call
 
 
-TWIN = {"--twin": "run a simulated twin beside each drive; warn of differences"}
+@dataclass(frozen=True, kw_only=True)
+class Asked:
+    """What a command is asked for."""
+
+    twin: Annotated[bool, Argument("run a simulated twin beside each drive; warn of differences", one_of=RAW)] = False
 
 
-async def _twin(call: Call) -> None:
-    from multidrop.features.twins.verb import twin
+MOST = 1_000_000_000
+"""The largest limit of twins, steps."""
 
-    await twin(call)
+
+def _steps(text: str) -> int:
+    if (steps := whole(text, 1, MOST)) is None:
+        raise ArgumentTypeError(f"no limit {text!r}: steps from 1 to {MOST}")
+    return steps
+
+
+Steps = Annotated[int, Argument(metavar="STEPS", read=_steps)]
+
+
+def _list(call: Call) -> None:
+    from multidrop.features.twins import verb
+
+    verb.list_twins(call)
+
+
+async def _on(call: Call, *targets: Address) -> None:
+    from multidrop.features.twins import verb
+
+    await verb.on(call, targets)
+
+
+def _off(call: Call) -> None:
+    from multidrop.features.twins import verb
+
+    verb.off(call)
+
+
+def _limit(call: Call, steps: Steps) -> None:
+    from multidrop.features.twins import verb
+
+    verb.limit(call, steps)
 
 
 def _begin(session: Session) -> None:
@@ -34,17 +73,17 @@ def _runs(session: Session) -> bool:
     return session.buses.get(session.selected_bus) in session.predicted
 
 
-def _want(session: Session, chosen: argparse.Namespace) -> None:
+def _want(session: Session, asked: Asked) -> None:
     """Let each bus whose drives are found get twins."""
-    if chosen.twin:
+    if asked.twin:
         from multidrop.features.twins.twins import Twins
 
         session.hooks.part(Twins).wanted = True
 
 
-async def _start(session: Session, chosen: argparse.Namespace) -> None:
+async def _start(session: Session, asked: Asked) -> None:
     """Begin twins before the first line of a stream."""
-    if chosen.twin:
+    if asked.twin:
         from multidrop.features.twins.twins import Twins
 
         for bus in list(session.buses.values()):
@@ -56,7 +95,11 @@ FEATURE = Feature(
     "a simulated drive beside each real one",
     adds=(
         Operation(
-            usage="/twin [on [ADDR ...] | off | limit STEPS]",
+            _list,
+            verb="/twin",
+            group="Settings and values",
+            after="/plot",
+            recorded=typed,
             help="""Run a simulated drive beside a real one, and warn where the two differ.
 
 `/twin on` reads each drive of the selected bus once, as a snapshot does, and sets a simulated one like it; ADDR is
@@ -66,17 +109,14 @@ rest; a move adds 30 ms of its velocity. After a homing, a limit switch or a pus
 of the drive, and says so. Only position, velocity and inputs are read, and once the lamps of a drive that stands while
 its twin moves on. `/twin` alone lists the twins.
 """,
-            work=_twin,
-            recorded="typed",
-            words={
-                "on": "run a twin beside each drive; read a drive again that has one",
-                "off": "end all twins",
-                "limit": "the steps by which a drive at rest may differ",
-            },
-            after="/plot",
-            group="Settings and values",
         ),
+        Operation(
+            _on, verb="/twin on", recorded=typed, help="run a twin beside each drive; read a drive again that has one"
+        ),
+        Operation(_off, verb="/twin off", recorded=typed, help="end all twins"),
+        Operation(_limit, verb="/twin limit", recorded=typed, help="the steps by which a drive at rest may differ"),
         AtSession(_begin),
+        Predicting("no twin runs that it could differ from", "/twin on begins one"),
         Switch(
             "twin",
             "/twin",
@@ -84,7 +124,7 @@ its twin moves on. `/twin` alone lists the twins.
             "a twin beside each drive of the line, or none",
             _runs,
         ),
-        Options("tui", TWIN, "--raw", prepare=_want),
-        Options("shell", TWIN, "--raw", prepare=_want, opened=_start),
+        Options("tui", Asked, prepare=_want),
+        Options("shell", Asked, prepare=_want, opened=_start),
     ),
 )

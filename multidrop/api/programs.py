@@ -9,10 +9,10 @@ from multidrop.api.calls import Calls
 from multidrop.api.fixed import Fixed
 from multidrop.base import new_file
 from multidrop.shell import program_listing
+from multidrop.shell.operations.argument_types import Downloading, Restoring
 from multidrop.shell.params import file as files
-from multidrop.shell.params.work import Difference, Options, differences, restore
+from multidrop.shell.params.work import Difference, backup_text, differences, restore
 from multidrop.shell.programs import transfers
-from multidrop.shell.programs.transfers import Wanted
 
 if TYPE_CHECKING:
     from multidrop.dialects.values import Readings
@@ -60,7 +60,8 @@ class AsyncPrograms(Fixed):
         `text`: what a file of that name would hold. `save`: keep it over power-off. `run`: the label to execute then.
         Raises Diagnostic for the file, Refused, NoAnswer, Differs.
         """
-        shell, wanted = self._calls.shell, Wanted(verify, save, only_changed, run)
+        shell = self._calls.shell
+        wanted = Downloading(save=save, run=run, only_changed=only_changed, no_verify=not verify)
         await self._calls.run(lambda: transfers.download(shell, self._drive, file, wanted, text))
 
 
@@ -79,8 +80,7 @@ class AsyncParameters(Fixed):
         """Read every setting, and write them to a new file. Raises Diagnostic for a file that exists."""
         new_file.check(file)
         found = await self.read()
-        identity = files.identity(self._drive.state, self._drive.family.values.parameters.language)
-        new_file.write(file, files.formatted(identity, found))
+        new_file.write(file, backup_text(self._drive, found))
         return found
 
     async def diff(self, file: str = "") -> list[Difference]:
@@ -104,7 +104,13 @@ class AsyncParameters(Fixed):
         `named`: settings that are only written when named, since they can move the motor or lock the drive.
         """
         shell, printed = self._calls.shell, list[str]()
-        options = Options(frozenset(named), communication, save, dry_run, other_product)
+        options = Restoring(
+            dry_run=dry_run,
+            save=save,
+            communication=communication,
+            named=frozenset(named),
+            other_product=other_product,
+        )
         loaded = files.load(file)
         await self._calls.run(lambda: restore(shell, self._drive, loaded, options), printed)
         return printed

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import argparse
 import contextlib
 import sys
+from collections.abc import Sequence
 from functools import partial
 from shlex import quote
 from typing import TYPE_CHECKING
@@ -13,80 +13,82 @@ from multidrop.base.errors import Diagnostic
 from multidrop.base.on_demand import importing
 from multidrop.shell import hooks
 from multidrop.shell.hooks import Around, Prepare
+from multidrop.shell.operations.argument_types import Agreeing, Opening, Reporting
 
 if TYPE_CHECKING:
-    from multidrop.dialects.family import Language
+    from multidrop.dialects.language import Language
+    from multidrop.shell.hooks import Added
     from multidrop.shell.session import Session
 
 
-def shell(chosen: argparse.Namespace) -> int:
+def shell(urls: Sequence[str], raw: bool, reconnect: bool, agreeing: Agreeing, added: Added) -> int:
     if sys.stdin.isatty():
         with importing():
             from multidrop.shell.prompt.prompt import run
         return run(
-            chosen.urls,
-            reconnect=not chosen.no_reconnect,
-            agreed=chosen.yes,
-            beyond=chosen.beyond,
-            raw=chosen.raw,
-            prepare=partial(hooks.prepare, chosen=chosen),
+            urls,
+            reconnect=reconnect,
+            agreed=agreeing.yes,
+            beyond=agreeing.beyond,
+            raw=raw,
+            prepare=added.prepare,
         )
     from multidrop.shell.batch import runner
     from multidrop.shell.prompt.terminal_input import run_stream
 
     async def lines(session: Session) -> None:
-        await hooks.opened(session, chosen)
+        await added.opened(session)
         await run_stream(session, descriptor=sys.stdin.fileno())
 
-    return runner.run(
-        chosen.urls, lines, watch_keys=False, agreed=chosen.yes, beyond=chosen.beyond, asks=False, raw=chosen.raw
-    )
+    return runner.run(urls, lines, watch_keys=False, agreed=agreeing.yes, beyond=agreeing.beyond, asks=False, raw=raw)
 
 
-def send(chosen: argparse.Namespace) -> int:
+def send(url: str, lines: Sequence[str], json: bool, agreeing: Agreeing) -> int:
     with importing():
         from multidrop.shell.batch import runner
         from multidrop.shell.line_syntax import each_names_one_drive, targets
         from multidrop.shell.prompt.terminal_input import run_lines
 
-    lazy, tried = each_names_one_drive(chosen.lines), targets(chosen.lines)
-    if not chosen.json:
-        lines = partial(run_lines, lines=chosen.lines)
-        return runner.run(
-            [chosen.url], lines, lazy=lazy, agreed=chosen.yes, beyond=chosen.beyond, asks=False, tried=tried
-        )
+    opened = partial(
+        runner.run,
+        [url],
+        lazy=each_names_one_drive(lines),
+        agreed=agreeing.yes,
+        beyond=agreeing.beyond,
+        asks=False,
+        tried=targets(lines),
+    )
+    if not json:
+        return opened(partial(run_lines, lines=lines))
     from multidrop.shell.batch.report import Report
     from multidrop.shell.scripts.executor import run_typed
 
     report = Report("send", as_json=True)
 
     async def body(session: Session) -> None:
-        await run_typed(session, chosen.lines, report.executed)
+        await run_typed(session, lines, report.executed)
 
-    code = runner.run(
-        [chosen.url], body, lazy=lazy, agreed=chosen.yes, beyond=chosen.beyond, asks=False, replies=False, tried=tried
-    )
-    return report.finish(code)
+    return report.finish(opened(body, replies=False))
 
 
-def run(chosen: argparse.Namespace) -> int:
+def run(file: str, opening: Opening, reporting: Reporting, agreeing: Agreeing) -> int:
     from multidrop.macros import MacroStore
     from multidrop.shell.batch.report import Report
     from multidrop.shell.configuration import Settings
     from multidrop.shell.scripts.reading import read_script
 
-    if not (chosen.on or chosen.role):
+    if not (opening.on or opening.role):
         raise Diagnostic("nothing to open", "multidrop run", "--on URL, or --role NAME=URL")
-    report = Report(chosen.script, as_json=chosen.json, junit=chosen.junit)
+    report = Report(file, as_json=reporting.json, junit=reporting.junit)
     try:
         report.begin()
-        if chosen.script.endswith(".py"):
+        if file.endswith(".py"):
             from multidrop.commands import python_program
 
-            return python_program.run(chosen, report)
+            return python_program.run(file, opening, reporting.json, agreeing, report)
         settings = Settings()
         macros = MacroStore(settings.macros, settings.project_macros)
-        script = read_script(chosen.script, dict(chosen.set), macros)
+        script = read_script(file, dict(opening.set), macros)
     except Diagnostic as problem:
         return report.refused(problem)
     from multidrop.shell.batch import runner
@@ -95,33 +97,24 @@ def run(chosen: argparse.Namespace) -> int:
     from multidrop.shell.scripts.model import lines_of
 
     async def body(session: Session) -> None:
-        await report.watched(session, chosen.on, chosen.role)
+        await report.watched(session, opening.on, opening.role)
         with report.noting():
             await run_script(session, script, report.executed)
 
     tried = targets(each.text for each in lines_of(script.body))
-    return report.finish(
-        runner.run([], body, agreed=chosen.yes, beyond=chosen.beyond, asks=False, replies=not chosen.json, tried=tried)
-    )
+    agreed, replies = agreeing.yes, not reporting.json
+    code = runner.run([], body, agreed=agreed, beyond=agreeing.beyond, asks=False, replies=replies, tried=tried)
+    return report.finish(code)
 
 
-def start(chosen: argparse.Namespace) -> int:
-    return _screen([])
-
-
-def demo(chosen: argparse.Namespace) -> int:
-    return _screen(["sim:"])
-
-
-def tui(chosen: argparse.Namespace) -> int:
-    if (code := hooks.instead(chosen)) is not None:
+def tui(urls: Sequence[str], raw: bool, reconnect: bool, added: Added) -> int:
+    if (code := added.instead(bool(urls) or raw)) is not None:
         return code
-    prepare, around = partial(hooks.prepare, chosen=chosen), partial(hooks.around, chosen=chosen)
-    return _screen(chosen.urls, not chosen.no_reconnect, chosen.raw, prepare, around)
+    return screen(urls, reconnect, raw, added.prepare, added.around)
 
 
-def _screen(
-    urls: list[str],
+def screen(
+    urls: Sequence[str],
     reconnect: bool = True,
     raw: bool = False,
     prepare: Prepare = hooks.nothing,
@@ -135,17 +128,17 @@ def _screen(
     return run(urls, reconnect, raw, prepare, around)
 
 
-def help_(chosen: argparse.Namespace) -> int:
+def help_(word: str, dialect: str | None) -> int:
     """Explain a word in the language that is named, or in the first that has it; name the others."""
     from multidrop.dialects.families import FAMILIES, languages
     from multidrop.shell.operations.table import load_others
     from multidrop.shell.streams.stdout import write
-    from multidrop.shell.verbs.session import explained, overview
+    from multidrop.shell.verbs.explaining import explained, overview
 
-    word, lines = chosen.word, []
+    lines: list[str] = []
     write(sys.stderr, *(f"warning: {each}" for each in load_others()))
-    if chosen.dialect:
-        language = FAMILIES[chosen.dialect].language
+    if dialect:
+        language = FAMILIES[dialect].language
         lines = language.describe_error(int(word[:9])) if _is_number(word) else language.describe(word)
     elif word:
         having = [each for each in languages() if _has(each, word)]

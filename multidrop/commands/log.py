@@ -6,7 +6,6 @@ r"""`multidrop log show|follow|grep`: session logs as text, and searched.
 
 from __future__ import annotations
 
-import argparse
 import os
 import re
 import sys
@@ -26,7 +25,7 @@ from multidrop.shell.raw import text_of
 from multidrop.shell.streams.stdout import lose, write
 
 if TYPE_CHECKING:
-    pass
+    from multidrop.commands.log_entries import Entries
 
 NOTHING_FOUND = 1
 STAMP = 23
@@ -39,17 +38,17 @@ LAST = 10
 """The entries before the end with which following begins."""
 
 
-def show(chosen: argparse.Namespace) -> int:
-    return reported(lambda: _print(files.whole(log_path(chosen)), chosen, _wanted(chosen)))
+def show(entries: Entries) -> int:
+    return reported(lambda: _print(files.whole(log_path(entries.file)), entries, _wanted(entries)))
 
 
-def grep(chosen: argparse.Namespace) -> int:
+def grep(expression: str, entries: Entries, ignore_case: bool) -> int:
     """Print the entries that match; the exit code says whether any does."""
     try:
-        pattern = re.compile(chosen.pattern, re.IGNORECASE if chosen.ignore_case else 0)
+        pattern = re.compile(expression, re.IGNORECASE if ignore_case else 0)
     except re.error as problem:
-        raise Diagnostic(f"{chosen.pattern!r} is not a regular expression: {problem}", "log grep") from None
-    wanted = _wanted(chosen)
+        raise Diagnostic(f"{expression!r} is not a regular expression: {problem}", "log grep") from None
+    wanted = _wanted(entries)
     found = 0
 
     def matching(entry: Entry) -> bool:
@@ -58,20 +57,20 @@ def grep(chosen: argparse.Namespace) -> int:
         found += matches
         return matches
 
-    code = reported(lambda: _print(files.whole(log_path(chosen)), chosen, matching))
+    code = reported(lambda: _print(files.whole(log_path(entries.file)), entries, matching))
     return code or (0 if found else NOTHING_FOUND)
 
 
-def follow(chosen: argparse.Namespace) -> int:
+def follow(entries: Entries) -> int:
     """Print the last lines of a log, and then what is added, until interrupted."""
-    wanted = _wanted(chosen)
+    wanted = _wanted(entries)
 
     def put(lines: Iterable[Line]) -> None:
-        for line in lines if chosen.json else joined(lines):
-            _put(line, chosen, wanted)
+        for line in lines if entries.json else joined(lines):
+            _put(line, entries, wanted)
 
     def work() -> None:
-        following = Following(log_path(chosen))
+        following = Following(log_path(entries.file))
         put(list(following.look())[-LAST:])
         while True:
             time.sleep(PERIOD)
@@ -92,41 +91,41 @@ def reported(work: Callable[[], None]) -> int:
     return 0
 
 
-def log_path(chosen: argparse.Namespace) -> Path:
+def log_path(file: str) -> Path:
     """The log that is named, or the newest. Raises Diagnostic."""
-    return Path(chosen.file) if chosen.file else files.newest(configuration.load())
+    return Path(file) if file else files.newest(configuration.load())
 
 
-def _wanted(chosen: argparse.Namespace) -> Callable[[Entry], bool]:
+def _wanted(entries: Entries) -> Callable[[Entry], bool]:
     """The filter of entries: by drive, and without polls unless all are asked for."""
-    named = set(filter(None, chosen.drive.split(",")))
+    named = set(filter(None, entries.drive.split(",")))
     every = not named or "all" in named
 
     def wanted(entry: Entry) -> bool:
         own = every or entry.drive in named or f"{entry.bus}:{entry.drive}" in named
-        return (chosen.all or not entry.poll) and own
+        return (entries.all or not entry.poll) and own
 
     return wanted
 
 
-def _print(lines: Iterable[Line], chosen: argparse.Namespace, wanted: Callable[[Entry], bool]) -> None:
+def _print(lines: Iterable[Line], entries: Entries, wanted: Callable[[Entry], bool]) -> None:
     """Print the entries; report the lines that are none. Raises Diagnostic for a file without an entry."""
     known, wrong = 0, ""
-    for line in lines if chosen.json else joined(lines):
+    for line in lines if entries.json else joined(lines):
         known += line.entry is not None
         wrong = wrong or ("" if line.entry else line.where)
         if known:
-            _put(line, chosen, wanted)
+            _put(line, entries, wanted)
     if wrong and not known:
         raise Diagnostic("is not an entry of a session log", wrong, "a log of this version is one JSON object a line")
 
 
-def _put(line: Line, chosen: argparse.Namespace, wanted: Callable[[Entry], bool]) -> None:
+def _put(line: Line, entries: Entries, wanted: Callable[[Entry], bool]) -> None:
     if line.entry is None:
         if line.data.strip():
             write(sys.stderr, f"{line.where}: not a whole entry: {line.data[:80]!r}")
     elif wanted(line.entry):
-        shown = line.data.decode().rstrip("\n") if chosen.json else text(line.entry)
+        shown = line.data.decode().rstrip("\n") if entries.json else text(line.entry)
         sys.stdout.write(shown.encode(encoding := sys.stdout.encoding, "backslashreplace").decode(encoding) + "\n")
         sys.stdout.flush()
 

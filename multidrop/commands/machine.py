@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import argparse
 import os
 import platform
 import shutil
@@ -50,12 +49,12 @@ def not_in_force(found: Settings) -> str:
     return ", ".join(parts)
 
 
-def path(chosen: argparse.Namespace) -> int:
+def path() -> int:
     write(sys.stdout, str(places.config_file()))
     return 0
 
 
-def show(chosen: argparse.Namespace) -> int:
+def show() -> int:
     """Print every setting as TOML; a remark marks those that the file does not set."""
     found = configuration.load()
     for line in shown(found, _keys(found), _text(places.config_file())):
@@ -96,7 +95,7 @@ def shown(found: Settings, keys: dict[str, str], text: str) -> list[str]:
     return lines + rows("guards", {"off": sorted(guards.off), "also": sorted(guards.also)})
 
 
-def check(chosen: argparse.Namespace) -> int:
+def check() -> int:
     """Report what is wrong; exit code 0 if nothing is."""
     found = configuration.load(lenient=True)
     text = _text(places.config_file())
@@ -130,7 +129,7 @@ LONGEST = 200
 """Lines of a file in the report; the rest is counted."""
 
 
-def report(chosen: argparse.Namespace) -> int:
+def report(output: str, agreed: bool) -> int:
     # All sections, without control characters and secrets.
     parts = []
     for title, lines in SECTIONS.items():
@@ -138,13 +137,12 @@ def report(chosen: argparse.Namespace) -> int:
     text = "\n".join(parts).rstrip() + "\n"
     for line in text.splitlines():
         write(sys.stdout, line)
-    if chosen.output == STANDARD_OUTPUT:
+    if output == STANDARD_OUTPUT:
         return 0
     asked = sys.stdin.isatty() and sys.stdout.isatty()
-    if not (chosen.output or asked):
+    if not (output or asked):
         return 0
-    path = Path(chosen.output or f"multidrop-report-{date.today().isoformat()}.txt")
-    agreed = chosen.yes
+    path = Path(output or f"multidrop-report-{date.today().isoformat()}.txt")
     if not agreed and not asked:
         raise Diagnostic("not written: this is not a terminal", str(path), "read the report above, then add --yes")
     if not agreed:
@@ -272,13 +270,13 @@ def _state() -> Iterator[str]:
         yield f"problem: {why(problem)}"
 
 
-def features(chosen: argparse.Namespace) -> int:
+def features(as_json: bool) -> int:
     """List every feature. One that cannot be loaded is listed with its error; the exit code is 0 all the same."""
     import json
 
     load_others()  # their warnings are in the list
     found = list(registry.states(multidrop.__version__))
-    if chosen.json:
+    if as_json:
         for entry, meaning, state in found:
             facts = {"name": entry.name, "source": entry.source, "version": entry.version, "state": state}
             write(sys.stdout, json.dumps(facts | {"meaning": meaning}))

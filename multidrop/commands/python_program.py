@@ -5,7 +5,6 @@ The program runs in the main thread, the session in a thread of its own. A signa
 
 from __future__ import annotations
 
-import argparse
 import contextlib
 import io
 import linecache
@@ -32,6 +31,7 @@ from multidrop.shell.batch.report import Report
 from multidrop.shell.channel import Front
 from multidrop.shell.events import FAILURES, Entered, Output, Printed, SessionEvent
 from multidrop.shell.exit_codes import INTERRUPTED, exit_code
+from multidrop.shell.operations.argument_types import Agreeing, Opening
 from multidrop.shell.prompt.keyboard import on_stop_key, terminal
 from multidrop.shell.scripts.model import Result, ScriptLine
 from multidrop.shell.signals import SIGNALS, early_ends
@@ -154,8 +154,7 @@ def replaced(name: str, stream: object) -> Iterator[None]:
         setattr(sys, name, before)
 
 
-def run(chosen: argparse.Namespace, report: Report) -> int:
-    file = chosen.script
+def run(file: str, opening: Opening, as_json: bool, agreeing: Agreeing, report: Report) -> int:
     try:
         data = bytes_of(file)
         code = compile(data, file, "exec", dont_inherit=True)  # before anything is opened
@@ -168,18 +167,20 @@ def run(chosen: argparse.Namespace, report: Report) -> int:
     else:
         # Reports quote the lines that run, whatever the file holds by then.
         linecache.cache[file] = (len(data), None, decode_source(data).splitlines(True), file)
-        return report.finish(_Execution(chosen, report, code).run())
+        return report.finish(_Execution(file, opening, as_json, agreeing, report, code).run())
     return report.refused(problem)
 
 
 class _Execution:
     """One program: its signals, its session, and how it ended."""
 
-    def __init__(self, chosen: argparse.Namespace, report: Report, code: CodeType) -> None:
-        self._chosen = chosen
+    def __init__(
+        self, file: str, opening: Opening, as_json: bool, agreeing: Agreeing, report: Report, code: CodeType
+    ) -> None:
+        self._opening, self._as_json, self._agreeing = opening, as_json, agreeing
         self._report = report
         self._code = code
-        self._file: str = chosen.script
+        self._file = file
         self._stopped = self._interrupted = self._ending = False
         self._on_continue: list[Callable[[], None]] = []
         self._called: Result | None = None
@@ -238,12 +239,11 @@ class _Execution:
 
     @contextlib.contextmanager
     def _session(self) -> Iterator[Session]:
-        chosen = self._chosen
-        report = self._report if chosen.json else None
-        opened = ReportedSession(self._file, report, yes=chosen.yes, beyond=chosen.beyond, notice=_say)
+        report, agreeing = self._report if self._as_json else None, self._agreeing
+        opened = ReportedSession(self._file, report, yes=agreeing.yes, beyond=agreeing.beyond, notice=_say)
         with opened:
             self._watch_keys(opened)
-            opened.add(*chosen.on, **dict(chosen.role))
+            opened.add(*self._opening.on, **dict(self._opening.role))
             try:
                 yield opened
             except BaseException as end:
@@ -277,9 +277,9 @@ class _Execution:
         module.__file__ = self._file
         with contextlib.ExitStack() as around:
             around.enter_context(_main(module, self._file))
-            if self._chosen.json:
+            if self._as_json:
                 around.enter_context(replaced("stdout", sys.stderr))
-            script.session, script.values = session, dict(self._chosen.set)
+            script.session, script.values = session, dict(self._opening.set)
             around.callback(lambda: [script.__dict__.pop(each) for each in ("session", "values")])
             exec(self._code, module.__dict__)
 

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import argparse
 import json
 import shlex
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 
 from multidrop.base.errors import Diagnostic, TransportLost
@@ -18,19 +17,35 @@ from multidrop.shell.finding.scanning import FoundDrive, Scanning, url_of
 from multidrop.shell.session import Session
 
 
-def run(chosen: argparse.Namespace) -> int:
-    if chosen.save:
-        configuration.check_new(chosen.save)
-    return runner.run([], partial(_scan, chosen), agreed=chosen.yes, unsolicited=False)
+@dataclass(frozen=True)
+class Search:
+    """What is searched for: `url` is a port of which nothing is known."""
+
+    url: str
+    baud: int | None
+    dialect: str | None
+    json: bool
+    all: bool
+
+    @property
+    def bauds(self) -> list[int]:
+        """The only baud rate; empty: any."""
+        return [self.baud] if self.baud else []
 
 
-async def _scan(chosen: argparse.Namespace, session: Session) -> None:
-    urls = parse(chosen.url, session.settings.connections).scheme.searched(chosen.url)
-    searches = [_made(chosen, session, url) for url in urls]
+def run(search: Search, yes: bool, save: str) -> int:
+    if save:
+        configuration.check_new(save)
+    return runner.run([], partial(_scan, search, save), agreed=yes, unsolicited=False)
+
+
+async def _scan(search: Search, save: str, session: Session) -> None:
+    urls = parse(search.url, session.settings.connections).scheme.searched(search.url)
+    searches = [_made(search, session, url) for url in urls]
     failed: TransportLost | None = None
     for scanning in searches:
         try:
-            await scanning.run([chosen.baud] if chosen.baud else [], chosen.all)
+            await scanning.run(search.bauds, search.all)
         except TransportLost as loss:
             failed = loss
             if len(searches) > 1:
@@ -38,17 +53,17 @@ async def _scan(chosen: argparse.Namespace, session: Session) -> None:
     found = [drive for scanning in searches for drive in scanning.found]
     if failed is not None and not found:
         raise failed
-    _conclude(chosen.json, session, found, chosen.save)
+    _conclude(search.json, session, found, save)
 
 
-def _made(chosen: argparse.Namespace, session: Session, url: str) -> Scanning:
+def _made(search: Search, session: Session, url: str) -> Scanning:
     """Make the search that the arguments ask for; it prints each drive that it finds. Raises Diagnostic."""
     connection = parse(url, session.settings.connections)
-    if chosen.dialect:
-        connection = replace(connection, hints=replace(connection.hints, family=chosen.dialect))
+    if search.dialect:
+        connection = replace(connection, hints=replace(connection.hints, family=search.dialect))
 
     def report(drive: FoundDrive) -> None:
-        session.output(json.dumps(drive.facts()) if chosen.json else drive.words())
+        session.output(json.dumps(drive.facts()) if search.json else drive.words())
 
     return Scanning(session, partial(open_buses, state=session.settings.state), connection, report)
 
@@ -65,17 +80,17 @@ def _conclude(as_json: bool, session: Session, found: list[FoundDrive], name: st
         session.notify(f"{others} more replied in another form; --json shows a URL for each", outcome=True)
 
 
-def rescue(chosen: argparse.Namespace) -> int:
-    return runner.run([], partial(_rescue, chosen), agreed=chosen.yes, unsolicited=False)
+def rescue(search: Search, plain: bool, erase: bool, yes: bool) -> int:
+    return runner.run([], partial(_rescue, search, plain, erase), agreed=yes, unsolicited=False)
 
 
-async def _rescue(chosen: argparse.Namespace, session: Session) -> None:
-    scanning = _made(chosen, session, chosen.url)
+async def _rescue(search: Search, plain: bool, erase: bool, session: Session) -> None:
+    scanning = _made(search, session, search.url)
     rescue = Rescue(session, scanning)
-    await rescue.run([chosen.baud] if chosen.baud else [], everything=chosen.all, erase=chosen.erase)
-    if chosen.plain:
+    await rescue.run(search.bauds, everything=search.all, erase=erase)
+    if plain:
         if len(scanning.found) > 1:
             names = ", ".join(each.state.address for each in scanning.found)
-            raise Diagnostic(f"--plain is for a drive that is alone; {names} replied", chosen.url, "nothing was set")
+            raise Diagnostic(f"--plain is for a drive that is alone; {names} replied", search.url, "nothing was set")
         await rescue.make_plain(scanning.found[0])
-    _conclude(chosen.json, session, scanning.found)
+    _conclude(search.json, session, scanning.found)

@@ -1,14 +1,14 @@
 """Commands that serve until interrupted, and small ones: each imports what it needs when it runs.
 
-`multidrop sim`, `relay`, `poll`, `ports`, `completion`.
+`multidrop sim`, `relay`, `ports`, `completion`.
 """
 
 from __future__ import annotations
 
-import argparse
 import re
 import signal
 import sys
+from collections.abc import Sequence
 from types import FrameType
 
 from multidrop.base.errors import Diagnostic
@@ -18,7 +18,7 @@ FILES = {"bash": "multidrop.bash", "zsh": "_multidrop", "fish": "multidrop.fish"
 """The completion of each shell in `multidrop/shipped`, which `make shipped` writes."""
 
 
-def sim(chosen: argparse.Namespace) -> int:
+def sim(cell: str | None, allow: Sequence[str], json: bool, speed: float) -> int:
     """Serve a simulated cell until a signal, or until the reader of its output leaves."""
     import asyncio
     from pathlib import Path
@@ -30,9 +30,8 @@ def sim(chosen: argparse.Namespace) -> int:
     async def body() -> int:
         with nonblocking() as streams:
             try:
-                allow = (*map(Path, chosen.allow), *(configuration.load().allowed if chosen.cell else ()))
-                out = sys.stdout
-                await serve(chosen.cell, json=chosen.json, speed=chosen.speed, stdin=sys.stdin, stdout=out, allow=allow)
+                paths = (*map(Path, allow), *(configuration.load().allowed if cell else ()))
+                await serve(cell, json=json, speed=speed, stdin=sys.stdin, stdout=sys.stdout, allow=paths)
             except Diagnostic as problem:
                 return fail(problem)
             finally:
@@ -42,14 +41,7 @@ def sim(chosen: argparse.Namespace) -> int:
     return asyncio.run(body())
 
 
-def poll(chosen: argparse.Namespace) -> int:
-    from multidrop.shell.plots import poll as command
-
-    asked = command.Polling(chosen.names, chosen.drive or "all", chosen.every, chosen.rows, chosen.json)
-    return command.poll(chosen.url, asked, reconnect=not chosen.no_reconnect)
-
-
-def relay(chosen: argparse.Namespace) -> int:
+def relay(port: str, baud: int) -> int:
     """Lend a port to the multidrop at the other end of standard input and output, until that is gone."""
     if sys.platform == "win32":
         raise Diagnostic(
@@ -60,57 +52,55 @@ def relay(chosen: argparse.Namespace) -> int:
             raise Diagnostic(
                 "another multidrop starts this, through ssh, and speaks frames to it",
                 "multidrop relay",
-                f"open ssh://THIS-HOST{chosen.port} on the other machine",
+                f"open ssh://THIS-HOST{port} on the other machine",
             )
         from multidrop.base import registry
         from multidrop.shell.relaying import lender
 
-        lent = lender(chosen.port)
+        lent = lender(port)
         write(sys.stderr, *(f"warning: {each}" for each in registry.warnings()))
         if lent is not None:
-            lent.lend(chosen.port.partition(":")[2])
+            lent.lend(port.partition(":")[2])
             return 0
-        if "://" in chosen.port:
+        if "://" in port:
             from multidrop.shell.secrets import url_without_secrets
 
-            raise Diagnostic(
-                "is no serial port of this machine", url_without_secrets(chosen.port), "as in /dev/ttyUSB0"
-            )
+            raise Diagnostic("is no serial port of this machine", url_without_secrets(port), "as in /dev/ttyUSB0")
         from multidrop.transports import Unreachable
         from multidrop.transports.relay import serve
         from multidrop.transports.serial_port import SerialEndpoint, opened
 
-        if re.fullmatch("/?COM[0-9]+", chosen.port, re.IGNORECASE):
-            raise Unreachable(f"{chosen.port.strip('/')} is a port of Windows, and this is none; see `multidrop ports`")
+        if re.fullmatch("/?COM[0-9]+", port, re.IGNORECASE):
+            raise Unreachable(f"{port.strip('/')} is a port of Windows, and this is none; see `multidrop ports`")
 
         def ended(number: int, _: FrameType | None) -> None:
             sys.exit(128 + number)  # closes the port
 
         for number in (signal.SIGTERM, signal.SIGHUP):
             signal.signal(number, ended)
-        serve(opened(SerialEndpoint, chosen.port, chosen.baud))
+        serve(opened(SerialEndpoint, port, baud))
         return 0
 
 
-def ports(chosen: argparse.Namespace) -> int:
+def ports(as_json: bool) -> int:
     from multidrop.shell.connect.schemes import local_ports
 
     found = [*local_ports()]
     for port in found:
-        if chosen.json:
+        if as_json:
             import json
 
             fact = {"port": port.device, "stable": port.stable_name, "description": port.description}
             write(sys.stdout, json.dumps(fact))
         else:
             write(sys.stdout, "  ".join(part for part in (port.device, port.stable_name, port.description) if part))
-    if not found and not chosen.json:
+    if not found and not as_json:
         write(sys.stderr, "no serial port was found; multidrop demo needs none")
     return 0
 
 
-def completion(chosen: argparse.Namespace) -> int:
+def completion(shell: str) -> int:
     from importlib.resources import files
 
-    sys.stdout.write((files("multidrop") / "shipped" / FILES[chosen.shell]).read_text(encoding="utf-8"))
+    sys.stdout.write((files("multidrop") / "shipped" / FILES[shell]).read_text(encoding="utf-8"))
     return 0

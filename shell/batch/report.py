@@ -195,7 +195,7 @@ class Report:
             return code or 2
         return code
 
-    async def watched(self, session: Session, urls: list[str], roles: list[tuple[str, str]]) -> None:
+    async def watched(self, session: Session, urls: Sequence[str], roles: Sequence[tuple[str, str]]) -> None:
         """Open URLs, and those of roles under their names; keep the reason of a failure for the report."""
         with self.noting("ended while it was being opened"):
             await session.open_all(urls)

@@ -1,20 +1,23 @@
-"""What the sections of operations name with `@`: the types of values, and arguments that come from other tables.
+"""The texts of arguments: what makes a value of one, and the words and helps that come from other tables.
 
-A type makes a value of a text, or raises argparse's one line of error.
+A `read` makes a value of a text, or raises argparse's one line of error.
 """
 
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterator, Mapping
-from typing import Any
+import re
+from collections.abc import Iterator, Sequence
+from typing import Any, NamedTuple
 
 from multidrop.base.text import real
 
 HOST = "127.0.0.1"
 KEYS = [f"F{number}" for number in range(2, 13)]
-NONE = None
-upper, integer = str.upper, int
+
+
+NOT_GIVEN = object()
+"""The value of an argument that a line does not have: argparse would read a default as if it were typed."""
 
 
 class Several(argparse.Action):
@@ -22,7 +25,7 @@ class Several(argparse.Action):
 
     def __call__(self, parser: object, chosen: argparse.Namespace, values: object, option: object = None) -> None:
         before = getattr(chosen, self.dest)
-        setattr(chosen, self.dest, f"{before},{values}" if before else values)
+        setattr(chosen, self.dest, f"{before},{values}" if isinstance(before, str) and before else values)
 
 
 class Once(argparse.Action):
@@ -35,6 +38,18 @@ class Once(argparse.Action):
         setattr(chosen, self.dest, values)
 
 
+class OnceFlag(Once):
+    """Keeps that an option without a value was given, which a line may do once."""
+
+    def __init__(
+        self, option_strings: Sequence[str], dest: str, help: str | None = None, required: bool = False
+    ) -> None:
+        super().__init__(option_strings, dest, nargs=0, default=False, required=required, help=help)
+
+    def __call__(self, parser: object, chosen: argparse.Namespace, values: object, option: object = None) -> None:
+        super().__call__(parser, chosen, True, option)
+
+
 class Each(argparse.Action):
     """Gathers the values of an option that is repeated; of `NAME=VALUE` each name is given once."""
 
@@ -43,6 +58,25 @@ class Each(argparse.Action):
         if isinstance(values, tuple) and any(values[0] == name for name, *_ in before):
             raise argparse.ArgumentError(self, f"{values[0]} is given twice")
         setattr(chosen, self.dest, [*before, values])
+
+
+class United(argparse.Action):
+    """Keeps the names of all values of an option that is repeated."""
+
+    def __call__(self, parser: object, chosen: argparse.Namespace, values: Any, option: object = None) -> None:
+        before = getattr(chosen, self.dest)
+        setattr(chosen, self.dest, values if before is NOT_GIVEN else before | values)
+
+
+class Named(argparse.Action):
+    """Keeps words `NAME=VALUE`, of which each name is given once."""
+
+    def __call__(self, parser: object, chosen: argparse.Namespace, values: Any, option: object = None) -> None:
+        names = [name for name, _ in values]
+        for name in names:
+            if names.count(name) > 1:
+                raise argparse.ArgumentError(self, f"{name} is given twice")
+        setattr(chosen, self.dest, values)
 
 
 # Values
@@ -88,6 +122,26 @@ def speed(text: str) -> float:
     return found
 
 
+def one_text(text: str) -> str:
+    """A text as it was typed; without its quotation marks where they go around the whole."""
+    from multidrop.shell.line_syntax import split
+
+    words = split(text, "")
+    return words[0] if len(words) == 1 else text
+
+
+def some_text(text: str) -> str:
+    if not text:
+        raise argparse.ArgumentTypeError("")
+    return text
+
+
+def per_turn(text: str) -> str:
+    if "/" not in text:
+        raise argparse.ArgumentTypeError(f"{text} is no unit of a turn or a step, as mm/turn")
+    return text
+
+
 def named_value(text: str) -> tuple[str, str]:
     name, sign, value = text.partition("=")
     if not sign or not name:
@@ -107,6 +161,47 @@ def key_and_values(text: str) -> tuple[str, str]:
     if not (sign and key.strip()):
         raise argparse.ArgumentTypeError(f"{text} is not KEY=VALUES")
     return key.strip(), values
+
+
+def setting_names(text: str) -> frozenset[str]:
+    """Read names of settings, with commas between several."""
+    return frozenset(name.strip().upper() for name in text.split(",") if name.strip())
+
+
+class Accessed(NamedTuple):
+    """Registers that a person reads or writes."""
+
+    address: int
+    length: int | None
+    """Of those to read; None: the value that begins there."""
+    values: Sequence[int] | None
+    """What is written; None: nothing."""
+
+
+def _number_of_register(text: str) -> int:
+    if not re.fullmatch(r"[+-]?(0[xX][0-9A-Fa-f]{1,16}|\d{1,20})", text, re.ASCII):
+        raise argparse.ArgumentTypeError(f"no number {text}; valid: as 87 or 0x57")
+    return int(text, 16 if "x" in text.lower() else 10)
+
+
+def register_access(text: str) -> Accessed:
+    """Read `ADDRESS`, `ADDRESS COUNT` or `ADDRESS =VALUE,VALUE`."""
+    found = re.fullmatch(r"(\S+?)(?:\s*=\s*(.+)|\s+(\S+))?", text.strip())
+    if found is None:
+        raise argparse.ArgumentTypeError("")
+    address = _number_of_register(found[1])
+    if not 0 <= address <= 0xFFFF:
+        raise argparse.ArgumentTypeError(f"no register {found[1]}; valid: 0 to 0xFFFF")
+    if found[2] is None:
+        return Accessed(address, _number_of_register(found[3]) if found[3] else None, None)
+    return Accessed(address, None, [_number_of_register(each.strip()) for each in found[2].split(",")])
+
+
+def output_number(text: str) -> int:
+    number = _number_of_register(text)
+    if not 1 <= number <= 0x10000:
+        raise argparse.ArgumentTypeError(f"no output {text}; valid: from 1")
+    return number
 
 
 def allowed(text: str) -> str:
@@ -136,13 +231,18 @@ def address(text: str) -> tuple[str, int]:
 # Arguments
 
 
-def language() -> Mapping[str, Any]:
+def program_language_names() -> Sequence[str]:
+    from multidrop.dialects.families import program_languages
+
+    return list(program_languages())
+
+
+def language_help() -> str:
     from multidrop.dialects.families import DEFAULT, program_languages
 
     known = program_languages()
     named = (f"{name} for {', '.join(each.endings)}" for name, each in known.items() if name != DEFAULT)
-    endings = f"default: {'; '.join(named)}; else {DEFAULT}"
-    return {"help": endings, "choices": list(known)}
+    return f"default: {'; '.join(named)}; else {DEFAULT}"
 
 
 def titles() -> str:
@@ -151,11 +251,14 @@ def titles() -> str:
     return " or ".join(f"{each.title} ({', '.join(each.endings)})" for each in program_languages().values())
 
 
-class _Checked:
+class CheckedPersonalities:
     """The personalities on which a check of a program depends; a family is imported only to look for one of them."""
 
     def __contains__(self, personality: object) -> bool:
         return any(personality == each for each in self)
+
+    def __len__(self) -> int:
+        return sum(1 for _ in self)
 
     def __iter__(self) -> Iterator[str]:
         from multidrop.simulator.declared import simulated
@@ -169,49 +272,41 @@ class _Checked:
         )
 
 
-def personality(about: str) -> Mapping[str, Any]:
-    """Declare the drive that programs are checked for."""
+def usual_personality() -> str:
     from multidrop.simulator.cell.spec import DriveSpec
 
-    default = DriveSpec().personality
-    about = f"{about} (default: {default})"
-    return {"help": about, "type": str.upper, "choices": _Checked(), "default": default}
+    return DriveSpec().personality
 
 
-def checked_personality() -> Mapping[str, Any]:
-    return personality("the drive that the program is for")
+def checked_personality() -> str:
+    return f"the drive that the program is for (default: {usual_personality()})"
 
 
-def converted() -> Mapping[str, Any]:
+def converter_names() -> Sequence[str]:
     from multidrop.dialects.families import program_languages
 
-    names = [name for files in program_languages().values() for name in files.converters]
-    return {"help": "what the new file is for: %(choices)s", "choices": names, "required": True}
+    return [name for files in program_languages().values() for name in files.converters]
 
 
-def edited_personality() -> Mapping[str, Any]:
-    return personality("the drive that programs are for, unless the editor names one")
+def edited_personality() -> str:
+    return f"the drive that programs are for, unless the editor names one (default: {usual_personality()})"
 
 
-def tested_personality() -> Mapping[str, Any]:
-    """Declare the simulated drive of a program test."""
-    from multidrop.simulator.cell.spec import DriveSpec
+def tested_personality() -> str:
+    return f"%(choices)s (default: the cell's, or {usual_personality()})"
+
+
+def tested_personalities() -> Sequence[str]:
     from multidrop.simulator.declared import simulated
     from multidrop.simulator.families import PROGRAMS
 
-    tested = tuple(personality for name in PROGRAMS for personality in simulated()[name].personalities)
-    about = f"%(choices)s (default: the cell's, or {DriveSpec().personality})"
-    return {"help": about, "type": str.upper, "choices": tested}
+    return tuple(personality for name in PROGRAMS for personality in simulated()[name].personalities)
 
 
-def spoken() -> Mapping[str, Any]:
+def languages() -> list[str]:
     from multidrop.dialects.families import FAMILIES
 
-    return {
-        "help": "in this language (default: the first that has the word)",
-        "choices": list(FAMILIES),
-        "default": None,
-    }
+    return list(FAMILIES)
 
 
 def relayed() -> str:
@@ -220,17 +315,15 @@ def relayed() -> str:
     return ports()
 
 
-def dialect() -> Mapping[str, Any]:
+def scanned_languages() -> list[str]:
     from multidrop.dialects.families import FAMILIES
 
-    languages = [name for name, family in FAMILIES.items() if family.scan is not None]
-    return {"help": "this language only", "choices": languages}
+    return [name for name, family in FAMILIES.items() if family.scan is not None]
 
 
-def freed_dialect() -> Mapping[str, Any]:
-    """Declare the language of a drive that `rescue` can free."""
+def freed_languages() -> list[str]:
+    """The languages of drives that `rescue` can free."""
     from multidrop.dialects.families import FAMILIES
 
     scans = {name: family.scan() for name, family in FAMILIES.items()}
-    languages = [name for name, scan in scans.items() if scan is not None and scan.clears]
-    return {"help": "this language only", "choices": languages}
+    return [name for name, scan in scans.items() if scan is not None and scan.clears]

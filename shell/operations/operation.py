@@ -1,36 +1,63 @@
-"""The declaration of an operation: one record gives its verb with help and completion, and its command with `--help`.
+"""The declaration of an operation: a function, and what a person reads of it.
 
-This module and the declarations are imported for every `--help`, so they import nothing that costs time.
+The function is the declaration of its arguments: `async def rename(call: Call, macro: MacroName, new: NewName)` is
+`/macro rename MACRO NEW`. From it come the verb at the prompt and in scripts, the command with `--help`, completion and
+the man page. The declarations are imported for every `--help`, so they import nothing that costs time; the bodies of
+the functions do.
 """
 
 from __future__ import annotations
 
 import argparse
-import re
-from collections.abc import Callable, Coroutine, Mapping, Sequence
-from types import MappingProxyType
+from collections.abc import Callable, Mapping, Sequence
+from enum import Enum, auto
+from functools import cache
+from inspect import isawaitable, iscoroutine
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from multidrop.base.feature import Kinds
-from multidrop.base.on_demand import imported
+from multidrop.shell.operations.parameter import Listed, Parameter, gathered, parameters
+from multidrop.shell.operations.parsing import LineParser, add_parameters, values
 
 if TYPE_CHECKING:
-    from multidrop.base.errors import Diagnostic
     from multidrop.shell.workspace import Workspace
 
-ACTIONS = "multidrop.shell.operations.arguments"
-NOTHING: Mapping[str, Any] = MappingProxyType({})
-TYPE_RAISES: Kinds = (ValueError, TypeError, argparse.ArgumentTypeError)
-"""What argparse expects of the `type` of an argument."""
-Arguments = Mapping[str, Any]
-"""The arguments of a command by their notation; each has its help, a mapping with `help` and what else
-argparse takes for it, or a function that returns either.
 
-`FILE` is one word, `[FILE]` may be left out, `FILE ...` is one or more, `[FILE ...]` any number; `--json` is a flag,
-`--to URL` an option with a value, `--vary KEY=VALUES ...` one that may be repeated. A word is kept under its metavar in
-small letters, several with an s, or under the NAME of `NAME=FILE`. `--a | --b` has a mapping of the arguments of which
-a line has one; in brackets none is needed. Functions read the tables of families, whose import takes time.
-"""
+class Kind(Enum):
+    """What a verb of scripts is to the lines around it."""
+
+    STEP = auto()
+    IF = auto()
+    """Whether it returns true decides over the lines up to `/else` or `/end`."""
+    COUNT = auto()
+    """The lines up to `/end` are executed as often as it returns."""
+    WHILE = auto()
+    """They are executed as long as it returns true, before each round."""
+    BETWEEN = auto()
+    """It divides or ends a block."""
+    CALL = auto()
+    """It stands for the lines of a file or a macro."""
+
+
+class Scripted(NamedTuple):
+    """What makes a verb one of scripts, which get to it line by line. `do` is given a `shell.scripts.use.Use`."""
+
+    kind: Kind = Kind.STEP
+    check: Callable[..., None] | None = None
+    """Raises Diagnostic for arguments that are wrong before anything is sent. It is given a `Checking` of
+    `shell.scripts.use`, and the arguments."""
+    bare: bool = False
+    """Its names have no braces: it has an expression."""
+    steers: bool = False
+    """It has a result only where it fails."""
+    verdict: bool = False
+    """It is a check, which reports count."""
+    goes_on: bool = False
+    """A check that fails is noted, and the script goes on."""
+
+
+ADDED = "added"
+"""The parameter with the options of features."""
 
 
 class Examples(NamedTuple):
@@ -40,164 +67,176 @@ class Examples(NamedTuple):
     lines: tuple[str, ...]
 
 
-class Operation(NamedTuple):
-    """A task of the product: a verb in a session, a command, or both."""
+Call = Any
+"""`shell.verbs.call.Call`, which knows the session and so all verbs; a function names it, and mypy checks its body."""
 
-    usage: str = ""
-    """Name and arguments of the verb, in the notation of `multidrop.shell.operations.usage`; empty: no verb."""
+
+def typed(call: Call) -> str:
+    """Record a line as it was typed."""
+    return f"{call.verb.name} {call.rest}".strip()
+
+
+class Operation(NamedTuple):
+    """A task of the product: a verb in a session, a command, or both.
+
+    As a verb, the function is given the `Call`, or what `at` makes of it; as a command, what `through` gives it. Both
+    add arguments of their own: `[ADDR]` behind those of a verb, and `URL` and `--drive` before those of a command.
+    """
+
+    do: Callable[..., Any] | None = None
+    """What it does; a coroutine is awaited. A command returns its exit code, or None for 0. None: a group."""
+    verb: str = ""
+    """Its name, and the fixed words behind it: `/play`, `/macro rename`. Several with one name are its forms."""
+    command: str = ""
+    """The words of the command: `program check`."""
     help: str = ""
-    """The help on the verb; its first line is the meaning."""
-    work: str | Callable[[Any], Coroutine[Any, Any, None]] = ""
-    """What the verb does, from a `shell.verbs.call.Call`: a function, or `FILE:FUNCTION` in `multidrop.shell.verbs`."""
-    words: Mapping[str, str] = NOTHING
-    """The meanings of the literal words of the usage."""
-    recorded: str | Callable[..., Any] = ""
-    """`FILE:FUNCTION` of the line that a macro records; `typed`: the line as typed; empty: none."""
-    checked: str | Callable[..., Any] = ""
-    """`FILE:FUNCTION`, which raises Diagnostic for arguments that are wrong whatever is open: scripts are checked."""
-    rows: str | Callable[[], Sequence[str]] = ""
-    """`MODULE:FUNCTION` for more lines of its help, from the table that the verb uses."""
+    """The help on the verb; its first line is the meaning. Of a form it is the meaning of its fixed word."""
+    meaning: str = ""
+    """The meaning of the command."""
+    examples: Sequence[str] = ()
+    """Of the command, without `multidrop` in front."""
+    at: Callable[..., Any] | None = None
+    through: Callable[..., Any] | None = None
+    """Calls a function with what `do` is given first, and returns the exit code; a coroutine is awaited."""
+    group: str = ""
+    """The title of `/help` under which the verb is listed."""
+    after: str = ""
+    """The verb or command that a feature's is listed after, in `/help` and `--help`; empty: it comes last."""
+    recorded: Callable[[Call], str] | None = None
+    """The line that a macro records; None: none."""
+    rows: Callable[[], Sequence[str]] | None = None
+    """More lines of the help on the verb, from the table that it uses."""
     fits: Callable[[Workspace], bool] | None = None
     """The condition under which the verb is offered."""
-    changes: Sequence[str] | None = None
-    """The first words with which the verb changes a drive, or lets it run; none: with any. None: it never does."""
+    changes: bool = False
+    """It changes a drive, or lets it run."""
+    checked: bool = False
+    """A script is refused as a whole for arguments that are wrong; of other verbs a value may be unknown by then."""
+    script: Scripted | None = None
+    """It is a verb of scripts alone."""
     immediate: bool = False
     """The verb is done at once, so a stop has nothing to end."""
     concurrent: bool = False
     """The verb runs beside the lines typed at a prompt."""
-    command: str = ""
-    """The words of the command: `program check`; empty: no command."""
-    meaning: str = ""
-    """The meaning of the command."""
-    run: str | Callable[[argparse.Namespace], int] = ""
-    """From the parsed arguments to the exit code: a function, or its `FILE.FUNCTION` in `multidrop.commands`; empty:
-    a group."""
-    examples: Sequence[str] = ()
-    arguments: Arguments = NOTHING
     urls: bool = False
     """The help on a group explains URLs, as that on a command with a URL does."""
     own_urls: str = ""
     """The explanation of its own URLs, where it takes other ones."""
+    extends: bool = False
+    """Of a feature: a form of a verb that is there already. It comes before the verb's own, and takes the place of
+    those with the same `verb`."""
+    open: bool = False
+    """Features may add options to the command: `do` is given them as `added`, a `shell.hooks.Added`."""
     connection: bool = False
     """The standard output of the command is a connection, whose end it notices itself."""
-    group: str = ""
-    """The title of `/help` under which a feature's verb is listed."""
-    after: str = ""
-    """The verb or command that a feature's is listed after, in `/help` and `--help`; empty: it comes last."""
 
     def passes(self) -> Mapping[str, Kinds]:
         """What its callers expect to be raised, besides what a person reads; see `base.foreign`."""
-        return {"run": (SystemExit,), "type": TYPE_RAISES}
+        return {"do": (SystemExit,)} if self.command and not self.verb else {}
 
     def claims(self) -> tuple[str, ...]:
         """What only one feature can add."""
-        return tuple(filter(None, (self.name, self.command)))
-
-    def offered(self, workspace: Workspace) -> bool:
-        """Whether the verb is offered; one whose condition fails is not."""
-        from multidrop.base.errors import Diagnostic
-
-        try:
-            return self.fits is None or self.fits(workspace)
-        except Diagnostic:  # by others
-            return False
+        if self.extends:
+            named = self.fixed[:1] or tuple(name for each in self.options for name in each.names)
+            return tuple(f"{self.name} {word}" for word in named)
+        return tuple(filter(None, (self.verb, self.command)))
 
     @property
     def name(self) -> str:
-        return self.usage.partition(" ")[0]
+        """The name of the verb; empty: none."""
+        return self.verb.partition(" ")[0]
+
+    # As a verb
 
     @property
-    def lines(self) -> list[str]:
-        """The help on the verb; the first line is its meaning."""
-        return [line.strip() for line in self.help.strip().splitlines()]
-
-    def meaning_of(self, typed: Sequence[str]) -> str:
-        """The meaning of the first word if that is a literal; else the meaning of the verb."""
-        return self.words.get(typed[0], self.lines[0]) if typed else self.lines[0]
-
-    def described(self) -> list[str]:
-        """The usage, the help, and the rows of its table."""
-        rows = imported(self.rows) if isinstance(self.rows, str) and self.rows else self.rows
-        return [self.usage, *self.lines, *(rows() if rows else ())]
-
-    def check(self, rest: str) -> None:
-        """Raise Diagnostic for arguments that are wrong whatever is open."""
-        if self.checked:
-            self.imported(self.checked)(self, rest)
-
-    def with_forms(self, added: Forms) -> Operation:
-        """The verb, whose forms are a group in brackets, with the forms of a feature before them."""
-        usage = self.usage.replace("[", f"[{added.usage} | ", 1)
-        return self._replace(usage=usage, help=added.help, words={**added.words, **self.words})
-
-    def imported(self, place: str | Callable[..., Any]) -> Any:
-        return imported(f"multidrop.shell.verbs.{place}") if isinstance(place, str) else place
+    def fixed(self) -> tuple[str, ...]:
+        """The fixed words behind the name of the verb."""
+        return tuple(self.verb.split()[1:])
 
     @property
-    def command_work(self) -> Callable[[argparse.Namespace], int]:
-        """What the command does."""
-        if not isinstance(self.run, str):
-            return self.run
-        file, _, function = self.run.partition(".")
-        work: Callable[[argparse.Namespace], int] = imported(f"multidrop.commands.{file}:{function}")
-        return work
+    def arguments(self) -> tuple[Parameter, ...]:
+        """The arguments of the verb."""
+        return _own(self.do, 1) + _own(self.at, 1) if self.verb else ()
 
-    def wrong(self, message: str = "") -> Diagnostic:
-        """A Diagnostic with the usage, and with the error if it is known."""
-        from multidrop.base.errors import Diagnostic
+    @property
+    def places(self) -> tuple[Parameter, ...]:
+        return tuple(each for each in self.arguments if not each.option)
 
-        usage = f"usage: {self.usage}"
-        return Diagnostic(message, self.name, usage) if message else Diagnostic(usage, self.name)
+    @property
+    def options(self) -> tuple[Parameter, ...]:
+        return tuple(each for each in self.arguments if each.option)
 
+    @property
+    def usage(self) -> str:
+        """The fixed words and the arguments of the verb."""
+        return " ".join((*self.fixed, *(each.usage for each in (*self.places, *self.options))))
 
-class Forms(NamedTuple):
-    """Forms of a verb that is there already, whose work takes them to the feature."""
+    def parsed(self, text: str) -> dict[str, Any]:
+        """The values of the text behind the fixed words. Raises WrongWords."""
+        return _line_parser(self.do, self.at).line(text, self.name)
 
-    verb: str
-    usage: str
-    """The forms, as in the usage of an Operation: `[ADDR ...] --to FILE | [ADDR ...] --serve PORT`."""
-    help: str
-    """The help on the verb with them, whole."""
-    words: Mapping[str, str] = NOTHING
-    """The meanings of their literal words; these are unlike those of the verb."""
+    async def work(self, call: Call, found: Mapping[str, Any]) -> None:
+        """Do it for a verb's line."""
+        first: Any = call
+        if self.at is not None:
+            places, named = gathered(_own(self.at, 1), found)
+            first = self.at(call, *places, **named)
+        await self.done(first, found)
 
-    def claims(self) -> tuple[str, ...]:
-        """What only one feature can add."""
-        return tuple(f"{self.verb} {word}" for word in self.words)
+    async def done(self, first: Any, found: Mapping[str, Any]) -> Any:
+        """Call the function with what it is given first; return what it returns."""
+        assert self.do is not None
+        places, named = gathered(_own(self.do, 1), found)
+        result = self.do(first, *places, **named)
+        return await result if isawaitable(result) else result
 
+    # As a command
 
-def add_arguments(parser: argparse._ActionsContainer, arguments: Arguments) -> None:
-    for notation, about in arguments.items():
-        if " | " in notation:
-            group = parser.add_mutually_exclusive_group(required=not notation.startswith("["))
-            add_arguments(group, about)
-            continue
-        about = about() if callable(about) else about
-        options: dict[str, Any] = dict(about) if isinstance(about, Mapping) else {"help": about or None}
-        name, _, metavar = notation.partition(" ")
-        if notation.startswith("-"):
-            if metavar.endswith(" ..."):
-                options = {"action": imported(f"{ACTIONS}:Each"), "default": []} | options
-            elif not metavar and "choices" not in options:
-                options["action"] = "store_true"
-            elif not {"type", "choices", "required"} & options.keys():
-                options.setdefault("default", "")
-            if metavar and "action" not in options:
-                options["action"] = imported(f"{ACTIONS}:Once")
-            names = name.split("|")
+    @property
+    def command_arguments(self) -> tuple[Parameter, ...]:
+        """The arguments of the command."""
+        own = _own(self.do, int(self.through is not None)) if self.command else ()
+        return _own(self.through, 1) + own
+
+    @property
+    def run(self) -> bool:
+        """Whether the command does anything: it is no mere group."""
+        return self.do is not None
+
+    @property
+    def takes_urls(self) -> bool:
+        """Whether the help on the command explains URLs."""
+        return self.urls or any(Listed.URL in each.argument.listed for each in self.command_arguments)
+
+    def add_to(self, parser: argparse.ArgumentParser, added: Sequence[Parameter] = ()) -> None:
+        """Add the arguments of the command to its parser, with those that features add."""
+        add_parameters(parser, (*self.command_arguments, *added))
+
+    def command_work(self, chosen: argparse.Namespace, **more: object) -> int:
+        """Run the command; return the exit code. `more`: what `do` is given besides its arguments."""
+        assert self.do is not None
+        do, found = self.do, values(self.command_arguments, chosen)
+        places, named = gathered(_own(do, int(self.through is not None)), found)
+        named |= more
+        if self.through is None:
+            result = do(*places, **named)
         else:
-            given, _, metavar = notation.rpartition("=")
-            optional, several = metavar.startswith("["), "..." in metavar
-            metavar = metavar.strip("[]").removesuffix(" ...")
-            if optional or several:
-                options["nargs"] = ("*" if several else "?") if optional else "+"
-            if optional and not several:
-                options.setdefault("default", "")
-            word = re.match(r"\w+", metavar)
-            names = [given or (word[0].lower() if word else "") + "s" * several]
-            if "choices" in options:
-                metavar = ""
-        metavar = metavar.removesuffix(" ...")
-        if metavar:
-            options["metavar"] = metavar
-        parser.add_argument(*names, **options)
+            own, names = gathered(_own(self.through, 1), found)
+            result = self.through(lambda first: do(first, *places, **named), *own, **names)
+        if iscoroutine(result):
+            import asyncio
+
+            result = asyncio.run(result)
+        return result or 0
+
+
+def _own(function: Callable[..., Any] | None, given: int) -> tuple[Parameter, ...]:
+    return () if function is None else _parameters(function, given, (ADDED,))
+
+
+_parameters = cache(parameters)
+
+
+@cache
+def _line_parser(do: Callable[..., Any] | None, at: Callable[..., Any] | None) -> LineParser:
+    return LineParser(_own(do, 1) + _own(at, 1))

@@ -1,28 +1,25 @@
 """All operations: `VERBS["/open"]`, `COMMANDS["program check"]`, and `find` for a typed name.
 
-The `.toml` files of this folder declare them. A section is an operation: its head is the command, or the verb where it
-has no command; its keys are the fields of `Operation`. A value `@NAME` is NAME of `arguments`, and `@MODULE:NAME` is in
-another module. A new operation is one section, and its work. The two orders below are those of the overviews; an
-operation that they do not name comes last.
+The modules in `base.registry.OPERATIONS` declare those of multidrop itself, and features theirs. The two orders below
+are those of the overviews; an operation that they do not name comes last.
 """
 
 from __future__ import annotations
 
-import os
 import re
 from argparse import ArgumentParser
-from ast import literal_eval
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from functools import cache, reduce
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from functools import cache, cached_property
 from itertools import chain
-from typing import Any
+from typing import TypeVar
 
 from multidrop.base import registry
 from multidrop.base.errors import Diagnostic
 from multidrop.base.feature import Feature
 from multidrop.base.on_demand import imported
-from multidrop.shell.operations import arguments, conditions
-from multidrop.shell.operations.operation import Forms, Operation, add_arguments
+from multidrop.shell.operations.operation import Operation
+from multidrop.shell.operations.parsing import LineParser
+from multidrop.shell.operations.verb import Verb
 
 VERB_GROUPS = {
     "Stop and end": "/stop /resume /quit /exit",
@@ -38,73 +35,62 @@ VERB_GROUPS = {
 """The verbs in the order and the groups of `/help`."""
 COMMAND_ORDER = """demo tui shell send run sim program params macro poll snapshot ports relay scan rescue
     log config features help report completion"""
-SCRIPT_VERBS: Mapping[str, tuple[str, str]] = {
-    "/set": ("/set NAME EXPR", "gives a name a value, which is worked out once: a number, a text, a drive's word"),
-    "/if": ("/if EXPR", "executes the lines up to /else or /end if the expression holds"),
-    "/else": ("/else", "begins the lines that are executed if the expression of /if does not hold"),
-    "/end": ("/end", "ends a block of /if, /repeat, /while or /until"),
-    "/repeat": ("/repeat N", "executes the lines up to /end N times"),
-    "/while": (
-        "/while EXPR",
-        "executes the lines up to /end while the expression holds; it is asked before each round",
-    ),
-    "/until": (
-        "/until EXPR",
-        "executes the lines up to /end until the expression holds; it is asked before each round",
-    ),
-    "/expect": (
-        '/expect "TEXT" [SECONDS]',
-        "looks for a text in what the last command printed, and in what comes until then (1 s); fails without it",
-    ),
-    "/assert": (
-        "/assert [@ADDR] EXPR OP EXPR [+- N]",
-        "compares two values now, and ends the script where that does not hold; OP is ==, !=, <, <=, > or >=",
-    ),
-    "/verify": (
-        "/verify [@ADDR] EXPR OP EXPR [+- N]",
-        "compares as /assert does, but goes on where that does not hold; the end of the script is then exit code 1",
-    ),
-    "/print": ("/print TEXT", "prints a text to standard output; {NAME} is replaced by its value"),
-    "/call": ("/call FILE|MACRO [NAME=VALUE ...]", "executes another script, or plays a macro, with these values"),
-}
-"""The verbs that only scripts have, each with its usage and its meaning."""
-SCRIPT_WORDS: Mapping[str, str] = {name: usage for name, (usage, _) in SCRIPT_VERBS.items()}
-"""Their usage."""
-_FILES = ("buses", "programs", "drives", "macros", "session")
-_HEAD = re.compile(r"""^\["?([^".\]]+)"?\]\n(?:usage = ["'](/\w+))?""", re.M)
-_ENTRY = re.compile(
-    r"""^\[\S[^\n]*?(?:\.(\w+))?\]$|^((?:"[^"\n]*"|[\w.-]+)+)\ =\ (?:\"{3}\n(.*?)\"{3}|(\[\n.*?^\]|[^\n]+))$""",
-    re.M | re.S,
-)
-"""A head, with the name of its table; or a key and its text of several lines, or another value."""
 _VERB = re.compile(r"/[a-z][a-z0-9-]*")
 _COMMAND = re.compile(r"[a-z][a-z0-9-]*( [a-z][a-z0-9-]*)?")
 BY_OTHERS = "Added by others"
 """The title of `/help` for verbs that name no other one."""
-_KEY = re.compile(r'"([^"]*)"|([\w-]+)')
-_ELSEWHERE = re.compile(r"@([\w.]+:\w+)")
 
 
-class Declared(Mapping[str, Operation]):
-    """Operations by name: those of the sections, then those of features, each after the one that it names.
+D = TypeVar("D", bound=Verb | Operation)
 
-    A section is parsed, and a feature imported, when its operation is asked for: a start needs one or two of them.
+
+@cache
+def core() -> tuple[Operation, ...]:
+    """The operations of multidrop itself, in the order of their modules."""
+    return tuple(each for module in registry.OPERATIONS for each in imported(f"{module}:OPERATIONS"))
+
+
+def _verbs(those: Iterable[Operation]) -> dict[str, Verb]:
+    """Verbs by name, each with its forms."""
+    found: dict[str, list[Operation]] = {}
+    for each in those:
+        if each.verb and each.script is None and not each.extends:
+            found.setdefault(each.name, []).append(each)
+    return {name: Verb(tuple(forms)) for name, forms in found.items()}
+
+
+def _commands(those: Iterable[Operation]) -> dict[str, Operation]:
+    return {each.command: each for each in those if each.command}
+
+
+class Declared(Mapping[str, D]):
+    """Operations by name: the core's, then those of features, each after the one that it names.
+
+    A feature is imported when its operation is asked for: a start needs one or two of them.
     """
 
     def __init__(
         self,
-        sections: Mapping[str, str],
         order: Sequence[str],
-        name_of: Callable[[Operation], str],
+        by_name: Callable[[Iterable[Operation]], Mapping[str, D]],
+        extended: Callable[[D], D],
         named: re.Pattern[str],
     ) -> None:
-        """`named`: matches the names; the table of features has other words, too."""
-        self._sections = {name: sections[name] for name in (*order, *(each for each in sections if each not in order))}
-        self._name_of, self._named = name_of, named
+        """`extended`: adds to an operation what features add. `named`: matches the names; features have other words."""
+        self._order, self._by_name, self._extended, self._named = order, by_name, extended, named
 
-    def __getitem__(self, name: str) -> Operation:
-        if name in self._sections:
-            return reduce(Operation.with_forms, _forms(name), _operation(self._sections[name]))
+    @cached_property
+    def _core(self) -> Mapping[str, D]:
+        return self._by_name(core())
+
+    @cached_property
+    def core_names(self) -> Sequence[str]:
+        """The names of the core's operations."""
+        return list(dict.fromkeys((*(each for each in self._order if each in self._core), *self._core)))
+
+    def __getitem__(self, name: str) -> D:
+        if name in self._core:
+            return self._extended(self._core[name])
         feature = registry.with_word(name)
         for each in (feature,) if feature is not None else registry.by_others():
             if (found := self._added(each).get(name)) is not None:
@@ -112,7 +98,7 @@ class Declared(Mapping[str, Operation]):
         raise KeyError(name)
 
     def __iter__(self) -> Iterator[str]:
-        names = [*self._sections]
+        names = [*self.core_names]
         registry.place(
             {name: each.after for feature in registry.features() for name, each in self._added(feature).items()}, names
         )
@@ -123,25 +109,25 @@ class Declared(Mapping[str, Operation]):
 
     def __contains__(self, name: object) -> bool:
         """Whether there is such an operation; a feature of the wheel is not imported for that."""
-        if name in self._sections or any(name in self._added(each) for each in registry.by_others()):
+        if name in self.core_names or any(name in self._added(each) for each in registry.by_others()):
             return True
         return name in registry.words() and self._named.fullmatch(str(name)) is not None
 
-    def _added(self, feature: Feature) -> dict[str, Operation]:
-        return {name: each for each in registry.records((feature,), Operation) if (name := self._name_of(each))}
+    def _added(self, feature: Feature) -> Mapping[str, D]:
+        return self._by_name(registry.records((feature,), Operation))
 
-    def parts(self, group: str) -> Parts:
+    def parts(self, group: str) -> Parts[D]:
         """The commands of a group by their last word; of "" all first words."""
         return Parts(self, group)
 
 
-class Parts(Mapping[str, Operation]):
+class Parts(Mapping[str, D]):
     """The commands of a group, by their last words."""
 
-    def __init__(self, every: Declared, group: str) -> None:
+    def __init__(self, every: Declared[D], group: str) -> None:
         self._every, self._group = every, group
 
-    def __getitem__(self, word: str) -> Operation:
+    def __getitem__(self, word: str) -> D:
         return self._every[f"{self._group} {word}".strip()]
 
     def __iter__(self) -> Iterator[str]:
@@ -155,80 +141,29 @@ class Parts(Mapping[str, Operation]):
         return isinstance(word, str) and word.split() == [word] and f"{self._group} {word}".strip() in self._every
 
 
-def _forms(verb: str) -> Iterator[Forms]:
-    """The forms that features add to a verb; none of them is imported for another name."""
-    if verb.startswith("/"):
-        those = (*registry.with_words(f"{verb} "), *registry.by_others())
-        yield from (each for each in registry.records(those, Forms) if each.verb == verb)
+def _with_forms(verb: Verb) -> Verb:
+    """A verb with the forms that features add; none of them is imported for another name."""
+    those = (*registry.with_words(f"{verb.name} "), *registry.by_others())
+    added = [each for each in registry.records(those, Operation) if each.extends and each.name == verb.name]
+    return verb.extended(added) if added else verb
+
+
+VERBS: Declared[Verb] = Declared(" ".join(VERB_GROUPS.values()).split(), _verbs, _with_forms, _VERB)
+"""By name, in the order of `/help`."""
+COMMANDS: Declared[Operation] = Declared(COMMAND_ORDER.split(), _commands, lambda each: each, _COMMAND)
+"""By their words, in the order of `--help`; the parts of a group after it."""
 
 
 @cache
-def _operation(section: str) -> Operation:
-    head, fields = section[1:].partition("]")[0].strip('"'), fields_of(section)
-    if "usage" in fields:
-        fields["usage"] = _ELSEWHERE.sub(lambda found: imported(found[1]), fields["usage"])
-    if "fits" in fields:
-        fields["fits"] = getattr(conditions, fields["fits"])
-    for name in fields.keys() & {"words", "arguments", "changes", "examples"}:
-        fields[name] = _meant(fields[name])
-    return Operation(**fields) if head.startswith("/") else Operation(command=head, **fields)
+def script_verbs() -> Mapping[str, Verb]:
+    """The verbs that only scripts have, by name, in the order of `/help`."""
+    return {each.name: Verb((each,)) for each in core() if each.script is not None}
 
 
-def fields_of(section: str) -> dict[str, Any]:
-    """The values of a section. It is TOML of one sort; tomllib would cost every start 8 ms."""
-    fields: dict[str, Any] = {}
-    table = fields
-    for head, key, text, value in _ENTRY.findall(section):
-        if head:
-            table = fields[head] = {}
-        elif key:
-            *path, last = (quoted or bare for quoted, bare in _KEY.findall(key))
-            place = table
-            for each in path:
-                place = place.setdefault(each, {})
-            place[last] = text or value == "true" or literal_eval(value)
-    return fields
-
-
-def _meant(value: Any) -> Any:
-    """A value with what its names stand for."""
-    if isinstance(value, dict):
-        return {name: _meant(each) for name, each in value.items()}
-    if isinstance(value, list):
-        return tuple(value)
-    if not isinstance(value, str) or not value.startswith("@"):
-        return value
-    return imported(value[1:]) if ":" in value else getattr(arguments, value[1:])
-
-
-def sections(text: str) -> Iterator[tuple[str, str, str]]:
-    """(verb, command, text) of each section of a file; an empty name is none."""
-    heads = [*_HEAD.finditer(text)]
-    for found, end in zip(heads, [*(each.start() for each in heads[1:]), len(text)], strict=True):
-        yield found[2] or "", "" if found[1].startswith("/") else found[1], text[found.start() : end]
-
-
-def _declared() -> Iterator[tuple[str, str, str]]:
-    for name in _FILES:
-        with open(os.path.join(os.path.dirname(__file__), f"{name}.toml"), encoding="utf-8") as file:
-            yield from sections(file.read())
-
-
-_FOUND = [*_declared()]
-VERBS = Declared(
-    {verb: text for verb, _, text in _FOUND if verb},
-    " ".join(VERB_GROUPS.values()).split(),
-    lambda each: each.name,
-    _VERB,
-)
-"""By name, in the order of `/help`."""
-COMMANDS = Declared(
-    {command: text for _, command, text in _FOUND if command},
-    COMMAND_ORDER.split(),
-    lambda each: each.command,
-    _COMMAND,
-)
-"""By their words, in the order of `--help`; the parts of a group after it."""
+def script_verb(name: str) -> Operation | None:
+    """A verb of scripts; None for any other word."""
+    found = script_verbs().get(name)
+    return found.main if found is not None else None
 
 
 def groups() -> dict[str, list[str]]:
@@ -243,22 +178,36 @@ def groups() -> dict[str, list[str]]:
     return found
 
 
-def _wrong(added: Operation) -> str:
-    """What an operation by others lacks, in words; empty: nothing. Raises TypeError or ValueError for a wrong kind."""
-    dict(added.words), " ".join(added.examples)
-    if not added.name and not added.command:
-        return "an Operation has neither the usage of a verb nor a command"
-    for name, named in (added.name, _VERB), (added.command, _COMMAND):
-        if name and not named.fullmatch(name):
-            return f"{name} is no name of a verb or a command"
-    if added.name and not added.help.strip():
-        return f"{added.name} has no help"
-    if added.command and not added.meaning.strip():
-        return f"{added.command} has no meaning"
-    if added.name and not callable(added.work):
-        return f"{added.name} has no function"
-    if added.command and not callable(added.run) and not COMMANDS.parts(added.command):
-        return f"{added.command} has no function"
+def _wrong(added: Sequence[Operation]) -> str:
+    """What operations by others lack, in words; empty: nothing. Raises Diagnostic, TypeError or ValueError for a wrong
+    kind.
+    """
+    for each in added:
+        " ".join(each.examples)
+        if not each.name and not each.command:
+            return "an Operation has neither a verb nor a command"
+        if each.script is not None:
+            return f"{each.name}: features add no verbs of scripts"
+        for name, named in (each.name, _VERB), (each.command, _COMMAND):
+            if name and not named.fullmatch(name):
+                return f"{name} is no name of a verb or a command"
+        if each.name and not each.extends and (each.name in VERBS.core_names or each.name in script_verbs()):
+            return f"{each.name} is taken"
+        if each.extends and each.name not in VERBS.core_names:
+            return f"multidrop has no verb {each.name} to extend"
+        if each.command and not each.meaning.strip():
+            return f"{each.command} has no meaning"
+        if each.do is not None and not callable(each.do):
+            return f"{each.verb or each.command} has no function"
+        if each.command and each.do is None and not COMMANDS.parts(each.command):
+            return f"{each.command} has no function"
+        LineParser(each.arguments)
+        each.add_to(ArgumentParser())
+    for verb in _verbs(added).values():
+        if not verb.help.strip():
+            return f"{verb.name} has no help"
+        if not verb.working:
+            return f"{verb.name} has no function"
     return ""
 
 
@@ -292,38 +241,32 @@ def _check(feature: Feature) -> None:
     from multidrop.shell.connect.schemes import CORE
     from multidrop.shell.sections import CORE as TABLES
 
-    core = {*VERBS._sections, *COMMANDS._sections, *(f"{each}:" for each in CORE), *(f"[{each}]" for each in TABLES)}
+    core = {*VERBS.core_names, *COMMANDS.core_names, *(f"{each}:" for each in CORE), *(f"[{each}]" for each in TABLES)}
     if taken := next((each for each in registry.claims(feature) if each in core), ""):
         raise Diagnostic(f"{taken} is taken")
-    for each in registry.records((feature,), Operation):
-        if wrong := _wrong(each):
-            raise Diagnostic(wrong)
+    if wrong := _wrong([*registry.records((feature,), Operation)]):
+        raise Diagnostic(wrong)
     for record in feature.adds:
-        if (added := getattr(record, "arguments", None)) is not None:  # of a command, or more of one that is there
-            command = str(getattr(record, "command", ""))
-            parser = ArgumentParser()
-            add_arguments(parser, COMMANDS[command].arguments if command in COMMANDS._sections else {})
-            add_arguments(parser, added)
+        if (added := getattr(record, "parameters", None)) is not None:  # more options of a command
+            command = COMMANDS[record.command]  # type: ignore[attr-defined]
+            command.add_to(ArgumentParser(), added)
+            names = {each.name for each in command.command_arguments}
+            if taken := next((each.name for each in added if each.name in names), ""):
+                raise Diagnostic(f"{command.command}: the name {taken} is taken")
 
 
-def find(name: str) -> Operation:
+def find(name: str) -> Verb:
     """Find a verb by name; one that is unknown may be of others, as a script is checked before a session opens.
 
     Raises Diagnostic with similar names.
     """
-    if name not in VERBS and name not in SCRIPT_WORDS:
+    if name not in VERBS and name not in script_verbs():
         join_others()
     if name in VERBS:
         return VERBS[name]
     import difflib
 
-    if name in SCRIPT_WORDS:
+    if name in script_verbs():
         raise Diagnostic(f"{name} is a verb of scripts", hint="multidrop run SCRIPT, or run - for standard input")
-    near = difflib.get_close_matches(name, [*VERBS, *SCRIPT_WORDS], 2) or ["/help"]
+    near = difflib.get_close_matches(name, [*VERBS, *script_verbs()], 2) or ["/help"]
     raise Diagnostic(f"no verb {name}", hint=f"try {' or '.join(near)}")
-
-
-def load() -> None:
-    """Import the work of all verbs; a screen does this in a thread before the first verb is typed."""
-    for verb in VERBS.values():
-        verb.imported(verb.work)

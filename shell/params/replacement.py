@@ -18,8 +18,9 @@ from multidrop.dialects.program_files import LOCKED
 from multidrop.dialects.values import Change, Parameters, Permission, Plan, Readings, differing
 from multidrop.shell import snapshots
 from multidrop.shell.channel import transferring
+from multidrop.shell.operations.argument_types import Downloading, Restoring
 from multidrop.shell.params.file import read, shown
-from multidrop.shell.params.work import Options, check_ready, send
+from multidrop.shell.params.work import check_ready, send
 from multidrop.shell.programs import transfers
 from multidrop.simulator import cells
 from multidrop.simulator.cell.writer import BusText, write
@@ -55,7 +56,7 @@ def chosen(cell: Cell, file: str, drive: Drive, name: str, several: bool = False
     raise Diagnostic(what, file, hint)
 
 
-async def apply(session: Session, drive: Drive, file: str, spec: DriveSpec, wanted: Options) -> None:
+async def apply(session: Session, drive: Drive, file: str, spec: DriveSpec, wanted: Restoring) -> None:
     """Put the state of a drive in a file onto a drive. Raises Diagnostic, DriveError or TransportLost."""
     await _Replacement(session, drive, file, spec, wanted).run()
 
@@ -63,7 +64,7 @@ async def apply(session: Session, drive: Drive, file: str, spec: DriveSpec, want
 class _Replacement:
     """One apply: the drive, and what it is to become."""
 
-    def __init__(self, session: Session, drive: Drive, file: str, spec: DriveSpec, wanted: Options) -> None:
+    def __init__(self, session: Session, drive: Drive, file: str, spec: DriveSpec, wanted: Restoring) -> None:
         self._session, self._drive, self._file = session, drive, file
         self._spec, self._wanted = spec, wanted
         self._settings = _tables(spec).wanted(spec)
@@ -210,7 +211,7 @@ class _Replacement:
         if self._differs(here):  # the user's variables too; what was in the drive goes to a backup first
             clear = self._clearing and _tables(here).program(here).lines  # else an old program stays beside the new one
             lines = (*((self._clearing,) if clear else ()), *self._program.file)
-            text, saved = "".join(f"{line}\n" for line in lines), transfers.Wanted(save=True)
+            text, saved = "".join(f"{line}\n" for line in lines), Downloading(save=True)
             await transfers.download(self._session, self._drive, f"{self._file}#{self._spec.name}", saved, text)
             self._done.append("program")
         await self._change(communication=False)

@@ -35,6 +35,7 @@ from multidrop.dialects.values import (
 from multidrop.drives.drive import Drive
 from multidrop.shell.channel import running, transferring
 from multidrop.shell.line_syntax import split_target
+from multidrop.shell.operations.argument_types import Restoring
 from multidrop.shell.params import file as files
 from multidrop.shell.session import Session
 from multidrop.shell.workspace import Workspace
@@ -126,6 +127,11 @@ async def each(workspace: Workspace, drives: Sequence[Drive], work: Work) -> Non
         raise Diagnostic(text)
 
 
+def backup_text(drive: Drive, found: Readings) -> str:
+    """The file of settings that were read of a drive."""
+    return files.formatted(files.identity(drive.state, drive.family.values.parameters.language), found)
+
+
 async def backup(workspace: Workspace, name: str, target: str) -> None:
     """Write the settings of drives to new files, or to standard output."""
 
@@ -134,8 +140,7 @@ async def backup(workspace: Workspace, name: str, target: str) -> None:
         make_place(own, target)
         new_file.check(own, printed=True)
         found, who = await files.read(workspace, drive, "backup"), workspace.display_name(drive)
-        text = files.formatted(files.identity(drive.state, drive.family.values.parameters.language), found)
-        new_file.write(own, text, workspace.output)
+        new_file.write(own, backup_text(drive, found), workspace.output)
         workspace.notify(f"{who}: {counted(len(found.readings), 'setting')}{new_file.place(own)}")
         if found.unread:
             names = files.listed([name for name, _ in found.unread])
@@ -242,18 +247,6 @@ CLOSE = 0.5
 """The likeness from which a name is suggested: names have two letters."""
 
 
-@dataclass(frozen=True)
-class Options:
-    """The permissions and options of a restore, and of an apply."""
-
-    named: frozenset[str] = frozenset()
-    """Settings that are only written when they are named."""
-    communication: bool = False
-    save: bool = False
-    dry_run: bool = False
-    other_product: bool = False
-
-
 class Unlike(DriveError):
     """The drive has other values than were sent."""
 
@@ -268,7 +261,7 @@ class Wanted:
     """Those of `withheld` that the drive should have, and that could not be read."""
 
 
-async def restore(session: Session, drive: Drive, file: files.SettingsFile, options: Options) -> None:
+async def restore(session: Session, drive: Drive, file: files.SettingsFile, options: Restoring) -> None:
     """Send what differs from a file. Raises Diagnostic or DriveError."""
     who, family = session.display_name(drive), drive.family.values.parameters
     if file.language and file.language != family.language:
@@ -306,7 +299,9 @@ async def restore(session: Session, drive: Drive, file: files.SettingsFile, opti
     _check_complete(wanted, who)
 
 
-async def send(session: Session, drive: Drive, plan: Plan, options: Options, what: str, written: list[Change]) -> None:
+async def send(
+    session: Session, drive: Drive, plan: Plan, options: Restoring, what: str, written: list[Change]
+) -> None:
     """Send the steps, and note each that is done.
 
     Only a step that a person has named can start motion: an early end then stops the drive, and with it its line.
@@ -328,7 +323,7 @@ def _check_complete(wanted: Wanted, who: str) -> None:
         raise NoAnswer(f"{who}: {names} could not be read and is left alone; restore the file again")
 
 
-def _values(present: Readings, file: files.SettingsFile, options: Options, who: str) -> Wanted:
+def _values(present: Readings, file: files.SettingsFile, options: Restoring, who: str) -> Wanted:
     """The values to restore. Raises Diagnostic for a name that the drive lacks."""
     wanted, unread = Wanted({}), dict(present.unread)
     if unknown := sorted(options.named - {*file.named}):
@@ -404,7 +399,9 @@ def _accounted(workspace: Workspace, who: str, plan: Plan) -> Iterator[list[Chan
         raise
 
 
-async def _finish(workspace: Workspace, drive: Drive, plan: Plan, goal: Mapping[str, Value], options: Options) -> None:
+async def _finish(
+    workspace: Workspace, drive: Drive, plan: Plan, goal: Mapping[str, Value], options: Restoring
+) -> None:
     """Read back all settings of the file, and save them. Raises DriveError where the drive has others."""
     who = workspace.display_name(drive)
     after = (await files.read(workspace, drive, "verifying")).values
@@ -425,7 +422,7 @@ async def _finish(workspace: Workspace, drive: Drive, plan: Plan, goal: Mapping[
 
 
 async def restore_each(
-    session: Session, name: str, target: str, options: Options, ready: files.SettingsFile | None = None
+    session: Session, name: str, target: str, options: Restoring, ready: files.SettingsFile | None = None
 ) -> None:
     """Restore drives from their files; every file is read before the first step.
 

@@ -105,6 +105,14 @@ def _other_language(text: str, language: str, verb: str = "check it with") -> Pr
     return Problem(1, 1, f"this is {known[name].title}, not {known[language].title}", hint)
 
 
+def correct_text_of(file: str) -> str:
+    """Read a program file. Raises Diagnostic for one that is correct in no language, in the language of its name."""
+    language, text = program_language_of(file), program_text_of(file)
+    if not correct_in(text, language):
+        program_languages()[language].language.read(text, file)
+    return text
+
+
 def to_run(file: str, language: str = "") -> tuple[str, str]:
     """Return the text of a program file that is to be run, and its language: as given, else by its name.
 

@@ -10,7 +10,6 @@ from __future__ import annotations
 import asyncio
 import contextlib
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from weakref import WeakSet
 
@@ -24,12 +23,14 @@ from multidrop.drives.drive import Drive, still
 from multidrop.shell import motions
 from multidrop.shell.channel import running, transferring
 from multidrop.shell.events import By, Printed
+from multidrop.shell.operations.argument_types import Downloading
 from multidrop.shell.program_listing import Sight, check_one, read
 from multidrop.shell.session import Session
 from multidrop.shell.state.backups import Copy, Sources, write_backup
 from multidrop.shell.state.crash_marks import marked
 from multidrop.shell.workspace import Workspace
 
+PLAIN = Downloading()
 LIMIT = 10.0
 """The longest wait for a running program and its motion to end, s."""
 APART = 0.05
@@ -38,19 +39,6 @@ _under_way: WeakSet[Drive] = WeakSet()
 """The drives to which a file is being downloaded."""
 MOST = 20
 """The largest number of differing lines that are shown."""
-
-
-@dataclass(frozen=True)
-class Wanted:
-    """The options of a download."""
-
-    verify: bool = True
-    save: bool = False
-    only_changed: bool = False
-    run: str = ""
-    """The label of the program to execute at the end; empty: none."""
-    later: bool = False
-    """It is executed by `start`, once all drives of the line have their programs: what one prints meets no download."""
 
 
 # Checking
@@ -103,9 +91,19 @@ def in_words(file: str, found: Difference, drive: str) -> str:
 
 
 async def download(
-    session: Session, drive: Drive, file: str, wanted: Wanted = Wanted(), text: str | None = None, by: By = By.OPERATOR
+    session: Session,
+    drive: Drive,
+    file: str,
+    wanted: Downloading = PLAIN,
+    text: str | None = None,
+    by: By = By.OPERATOR,
+    *,
+    later: bool = False,
 ) -> None:
     """Send a program file to a drive. `text`: what a file of that name would hold.
+
+    `later`: the program is executed by `start`, once all drives of the line have theirs: what one prints meets no
+    download.
 
     Raises Diagnostic for the file, the backup and lines that were not agreed to, and the drive's failures.
     """
@@ -115,7 +113,7 @@ async def download(
         raise Refused(f"{session.display_name(drive)}: a download to it is under way (nothing was sent)")
     _under_way.add(drive)
     try:
-        made = _Download(session, drive, file, wanted)
+        made = _Download(session, drive, file, wanted, later)
         await made.agree(lines, by)
         async with session.automations.run(f"the download of {file}"):
             await made.run(text, lines)
@@ -123,7 +121,7 @@ async def download(
         _under_way.discard(drive)
 
 
-async def start(session: Session, drive: Drive, file: str, wanted: Wanted, text: str) -> None:
+async def start(session: Session, drive: Drive, file: str, wanted: Downloading, text: str | None) -> None:
     """Execute the program of a download whose start was left for `later`. `text`: what was downloaded.
 
     Raises the drive's failures.
@@ -136,9 +134,9 @@ async def start(session: Session, drive: Drive, file: str, wanted: Wanted, text:
 class _Download:
     """One download: a drive, a file, and what is wanted of it."""
 
-    def __init__(self, session: Session, drive: Drive, file: str, wanted: Wanted) -> None:
+    def __init__(self, session: Session, drive: Drive, file: str, wanted: Downloading, later: bool = False) -> None:
         self._session, self._drive = session, drive
-        self._file, self._wanted = file, wanted
+        self._file, self._wanted, self._later = file, wanted, later
         self._name = session.display_name(drive)
 
     @property
@@ -153,7 +151,7 @@ class _Download:
                 start = programs.start(lines, wanted.run)
             except Diagnostic as problem:
                 raise Diagnostic(f"{problem.message} (nothing was sent)", self._file, problem.hint) from None
-        start = "" if wanted.later else start
+        start = "" if self._later else start
         ends_program = programs.size(lines) > 0
         if ends_program and not wanted.only_changed:  # one that prints without a pause lets nothing be listed
             await self._end_program()
@@ -179,7 +177,7 @@ class _Download:
                     await self._end_program()
                 sent = await self._send(lines, held)
                 await self._save(lines)
-                if programs.size(lines) and wanted.verify:
+                if programs.size(lines) and not wanted.no_verify:
                     await self._verify(text, lines, sent, held)
         except BaseException:
             self._say(f"what was in it before is in {backup}", warning=True)

@@ -1,6 +1,6 @@
 """Completion and hints for the line being typed, at the prompt and in the TUI.
 
-A placeholder of a usage has values: open buses and drives, files, words of the drives' languages.
+The values of an argument are open buses and drives, files, words of the drives' languages.
 """
 
 from __future__ import annotations
@@ -19,14 +19,14 @@ from multidrop.macros import KEYS
 from multidrop.shell.connect.schemes import schemes
 from multidrop.shell.line_syntax import EVERYONE, DriveLine, VerbLine, join_target, parse
 from multidrop.shell.operations.conditions import simulated_cell
+from multidrop.shell.operations.parameter import Listed, Parameter
 from multidrop.shell.operations.table import VERBS
-from multidrop.shell.operations.usage import following, narrowed
 from multidrop.shell.workspace import Workspace
 from multidrop.simulator.declared import simulated
 from multidrop.simulator.families import PROGRAMS
 
 if TYPE_CHECKING:
-    from multidrop.dialects.family import Language
+    from multidrop.dialects.language import Language
 
 MOST = 200
 """The largest number of completions."""
@@ -88,7 +88,7 @@ def hint(workspace: Workspace, text: str) -> str:
     if isinstance(parsed, VerbLine):
         verb = VERBS.get(parsed.name)
         typed = parsed.rest.split()
-        return f"{narrowed(verb.usage, typed)}   {verb.meaning_of(typed)}" if verb else ""
+        return f"{verb.narrowed(typed)}   {verb.meaning_of(typed)}" if verb else ""
     if parsed is None:
         return ""
     language, product = spoken(workspace, parsed)
@@ -107,11 +107,12 @@ def names_of(workspace: Workspace, text: str) -> Drive | None:
 def _arguments(workspace: Workspace, typed: list[str], word: str) -> Found:
     """The completions that a verb's usage allows here."""
     verb = VERBS.get(typed[0])
-    for each in following(verb.usage, typed[1:]) if verb else ():
-        if (kind := kind_of(each)) in PLACEHOLDERS:
-            yield from offered(workspace, kind, word)
-        elif each == each.lower():
-            yield each, verb.words.get(each, "") if verb else ""
+    for each in verb.following(typed[1:]) if verb is not None else ():
+        if isinstance(each, Parameter):
+            for listed in each.argument.listed:
+                yield from offered(workspace, listed, word)
+        else:
+            yield each
 
 
 def spoken(workspace: Workspace, line: DriveLine) -> tuple[Language, str]:
@@ -146,53 +147,42 @@ def verbs(workspace: Workspace) -> Found:
     return ((verb.name, verb.lines[0]) for verb in VERBS.values() if verb.offered(workspace))
 
 
-PLACEHOLDERS = (
-    *("ADDR", "@ADDR", "BUS", "BUS[:ADDR]", "DRIVE", "F2..F12", "FILE", "MACRO", "PAGE"),
-    *("PERSONALITY", "URL", "WORD"),
-)
-"""The words of a usage for which values are known; only a person knows the value of any other placeholder."""
-
-
-def kind_of(placeholder: str) -> str:
-    """The placeholder without the ending of a file: that of `FILE.csv` is `FILE`."""
-    return "FILE" if placeholder.startswith("FILE.") else placeholder
-
-
-def offered(workspace: Workspace, placeholder: str, word: str) -> Found:
-    """The values of a placeholder; `word`: what is typed of it."""
+def offered(workspace: Workspace, listed: Listed, word: str) -> Found:
+    """The values of an argument; `word`: what is typed of it."""
     drives = [pair for pair in targets(workspace) if not pair[0].endswith("*")]
-    match placeholder:
-        case "ADDR" | "BUS[:ADDR]":
+    match listed:
+        case Listed.DRIVE:
             yield from drives
-        case "@ADDR":
+        case Listed.AT_DRIVE:
             yield from ((f"@{name}", meaning) for name, meaning in drives)
-        case "DRIVE":
+        case Listed.BUS:
+            yield from ((bus.name, ", ".join(bus.drives)) for bus in workspace.buses.values())
+        case Listed.SIMULATED_DRIVE:
             cell = simulated_cell(workspace)
             for each in cell.floor.drives if cell else ():
                 name = each.spec.name if each.bus == workspace.selected_bus else f"{each.bus}:{each.spec.name}"
                 yield name, each.spec.personality
-        case "F2..F12":
+        case Listed.KEY:
             yield from ((key, "") for key in KEYS)
-        case "MACRO" | "PAGE" as what:
+        case Listed.MACRO | Listed.PAGE:
             with contextlib.suppress(Diagnostic):
-                found = workspace.macros.names() if what == "MACRO" else workspace.macros.pages()
-                yield from [(name, "macro" if what == "MACRO" else "page of keys") for name in found]
-        case "PERSONALITY":
+                found = workspace.macros.names() if listed is Listed.MACRO else workspace.macros.pages()
+                yield from [(name, "macro" if listed is Listed.MACRO else "page of keys") for name in found]
+        case Listed.PERSONALITY:
             yield from ((name, family) for family in PROGRAMS for name in simulated()[family].personalities)
-        case "URL":
+        case Listed.URL:
             yield from ((name, each.url) for name, each in workspace.settings.connections.items())
             yield from ((form.prefix, form.meaning) for form in schemes().values())
             if word.startswith("sim:"):
                 cells = (f"sim:{name}" for name, _ in _files(word[4:]))
                 yield from ((name, "a cell") for name in cells if name.endswith((".toml", "/")))
-        case "WORD":
+            yield from _files(word)
+        case Listed.WORD:
             yield from ((verb.name, verb.lines[0]) for verb in VERBS.values())
             language, product = spoken(workspace, DriveLine(""))
             yield from language.complete("", product)
-    if placeholder in ("BUS", "BUS[:ADDR]"):
-        yield from ((bus.name, ", ".join(bus.drives)) for bus in workspace.buses.values())
-    if placeholder in ("FILE", "URL"):
-        yield from _files(word)
+        case Listed.FILE:
+            yield from _files(word)
 
 
 def _files(word: str) -> Found:

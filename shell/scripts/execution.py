@@ -10,30 +10,19 @@ import contextlib
 from collections import deque
 from collections.abc import Awaitable, Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
-from typing import TypeVar
+from typing import Any, TypeVar
 
-from multidrop.base.errors import Diagnostic, DriveError, Stopped
+from multidrop.base.errors import Diagnostic, Stopped
 from multidrop.base.text import counted
 from multidrop.macros import checked_values, fill
 from multidrop.shell import waits
 from multidrop.shell.events import FAILURES, By, Failed
 from multidrop.shell.motions import OUTCOME, check_own
+from multidrop.shell.operations.operation import Kind, Scripted
+from multidrop.shell.operations.table import script_verb
 from multidrop.shell.playing import Playing, StepProgress, cast
 from multidrop.shell.scripts import words
 from multidrop.shell.scripts.captured_prints import Hearing
-from multidrop.shell.scripts.expression import (
-    Comparison,
-    Expression,
-    Name,
-    Value,
-    Word,
-    evaluate,
-    number,
-    quoted,
-    unknowns,
-    written,
-)
 from multidrop.shell.scripts.model import (
     CallFile,
     CallMacro,
@@ -46,7 +35,8 @@ from multidrop.shell.scripts.model import (
     ScriptLine,
 )
 from multidrop.shell.scripts.planning import bind
-from multidrop.shell.scripts.questions import Checks, Place, converted, drive_of, known
+from multidrop.shell.scripts.questions import Place
+from multidrop.shell.scripts.use import CheckFailed, Use, chosen
 from multidrop.shell.session import Session
 from multidrop.shell.workspace import LATCHED
 
@@ -79,10 +69,6 @@ RECENT = 5
 Values = dict[str, str]
 """The values of the names in one file."""
 T = TypeVar("T")
-
-
-class CheckFailed(DriveError):
-    """An `/assert` or `/expect` did not find what it wants."""
 
 
 @dataclass(frozen=True)
@@ -214,7 +200,7 @@ class Execution:
             if frame.playing is not None and frame.playing.progress is not None and node.line.step:
                 frame.playing.progress.begins(node.line.step, _shown(node.line.text, frame))
             if isinstance(node, If):
-                holds = await self._own(node.line, frame, self._condition)
+                holds = await self._own(node.line, frame, self._done)
                 await self.block(node.body if holds else node.otherwise, frame)
             elif isinstance(node, Repeat):
                 await self._repeat(node, frame)
@@ -230,8 +216,8 @@ class Execution:
 
     async def _repeat(self, node: Repeat, frame: Frame) -> None:
         """Execute a block a number of times, or as its condition says before each round."""
-        counted = node.line.word == "/repeat"
-        left = await self._own(node.line, frame, self._count) if counted else 0
+        counted = _scripted(node.line).kind is Kind.COUNT
+        left = await self._own(node.line, frame, self._done) if counted else 0
         while not self._quits and (left > 0 if counted else await self._goes_on(node.line, frame)):
             left -= 1
             await asyncio.sleep(0)  # a body that sends nothing must not delay a stop
@@ -239,7 +225,7 @@ class Execution:
 
     async def _goes_on(self, line: ScriptLine, frame: Frame) -> bool:
         """Whether a loop has another round; one that waits for a motion which has failed ends with that failure."""
-        goes_on = await self._own(line, frame, self._condition) == (line.word == "/while")
+        goes_on: bool = await self._own(line, frame, self._done)
         if goes_on and not self.is_over:
             await self._own(line, frame, lambda text, frame: check_own(self.session))
         return goes_on
@@ -256,18 +242,16 @@ class Execution:
             await self.play(node.played, given, node.times, fast, roles, frame.place)
 
     async def _step(self, line: ScriptLine, frame: Frame) -> None:
-        if line.word == "/set":
-            await self._own(line, frame, self._set)
-        elif line.word == "/verify" and not self.is_over:
-            try:
-                await self._own(line, frame, self._assert, counts=True)
-            except CheckFailed as failure:
-                self.failed.append(line.where)
-                self.session.notify(f"{line.where}: {failure}", warning=True)
-        elif line.word in self._checks:
-            await self._own(line, frame, self._checks[line.word], counts=True)
-        else:
-            await self.line(line, frame)
+        if script_verb(line.word) is None:
+            return await self.line(line, frame)
+        scripted = _scripted(line)
+        try:
+            await self._own(line, frame, self._done, counts=not scripted.steers)
+        except CheckFailed as failure:
+            if self.is_over or not scripted.goes_on:
+                raise
+            self.failed.append(line.where)
+            self.session.notify(f"{line.where}: {failure}", warning=True)
 
     async def line(self, line: ScriptLine, frame: Frame) -> None:
         """Execute an ordinary line, with values filled in if there are any."""
@@ -332,56 +316,21 @@ class Execution:
                 self.recent.append(result)
                 self._executed(result)
 
-    # The verbs of scripts
-
-    @property
-    def _checks(self) -> Mapping[str, Work[None]]:
-        return {"/print": self._print, "/assert": self._assert, "/verify": self._assert, "/expect": self._expect}
-
-    async def _set(self, text: str, frame: Frame) -> None:
-        name, tree = words.setting(text, frame.names)
-        frame.names[name] = written(await self._value(tree, frame))
-
-    async def _condition(self, text: str, frame: Frame) -> bool:
-        return bool(number(await self._value(words.expression(text, frame.names), frame)))
-
-    async def _count(self, text: str, frame: Frame) -> int:
-        return words.repetitions(await self._value(words.expression(text, frame.names), frame))
+    async def _done(self, text: str, frame: Frame) -> Any:
+        """Do what a verb of scripts does; return what that returns."""
+        found = chosen(text)
+        return await found.form.done(
+            Use(self.session, self._heard, frame.names, frame.place, frame.by, found.form.name, text), found.values
+        )
 
     async def _given(self, text: str, frame: Frame) -> Values:
         return words.call(text)[1]
 
-    async def _print(self, text: str, frame: Frame) -> None:
-        self.session.output(words.rest_of(text))
 
-    async def _assert(self, text: str, frame: Frame) -> None:
-        tree = words.check(text, frame.names)
-        for word in (each for each in unknowns(tree) if isinstance(each, Word)):
-            drive = drive_of(self.session, word, frame.place)
-            self._heard.target = self._heard.target or (drive.link.name, drive.address)
-        measured, checks = await converted(self.session, tree, frame.place)
-        assert isinstance(measured, Comparison)
-        tree, found = measured, await self._known(measured, frame, checks)
-        if evaluate(tree, found):
-            return
-        within = evaluate(tree.within, found)
-        wanted = f"{tree.sign} {quoted(evaluate(tree.right, found))}" + (f" +- {written(within)}" if within else "")
-        seen = quoted(evaluate(tree.left, found))
-        units = (f" ({each.shown(number(found[word]))})" for word, each in checks.items())
-        raise CheckFailed(f"{text}: wanted {wanted}, seen {seen}{''.join(units)}")
-
-    async def _expect(self, text: str, frame: Frame) -> None:
-        wanted, seconds = words.expectation(text)
-        if not await waits.listened(self.session, partial(self._heard.finds, wanted), seconds):
-            seen = ", ".join(map(quoted, self._heard.last(SHOWN))) or "nothing"
-            raise CheckFailed(f'{text}: wanted "{wanted}" within {seconds:g} s, seen {seen}')
-
-    async def _value(self, tree: Expression, frame: Frame) -> Value:
-        tree, checks = await converted(self.session, tree, frame.place)
-        return evaluate(tree, await self._known(tree, frame, checks))
-
-    async def _known(self, tree: Expression, frame: Frame, checks: Checks) -> Mapping[Name | Word, Value]:
-        return await known(self.session, tree, frame.names, frame.by, frame.place, checks)
+def _scripted(line: ScriptLine) -> Scripted:
+    verb = script_verb(line.word)
+    assert verb is not None and verb.script is not None  # the line was checked
+    return verb.script
 
 
 @contextlib.contextmanager

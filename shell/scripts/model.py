@@ -8,6 +8,7 @@ from datetime import datetime
 from typing import Any
 
 from multidrop.macros import Macro
+from multidrop.shell.operations.table import script_verb
 from multidrop.shell.secrets import without_secrets
 from multidrop.shell.waits import Standing
 
@@ -155,7 +156,8 @@ class Result:
 
     @property
     def check(self) -> bool:
-        return bool(self.line.where) and self.line.word in ("/assert", "/expect", "/verify")
+        verb = script_verb(self.line.word)
+        return bool(self.line.where) and verb is not None and verb.script is not None and verb.script.verdict
 
     def fact(self) -> dict[str, Any]:
         """The result as an object for programs; what is empty is left out."""

@@ -20,15 +20,15 @@ from multidrop.macros import Macro, MacroStore, check_name, checked_values, fill
 from multidrop.macros.model import Parameter, plain, written
 from multidrop.macros.toml_format import in_text
 from multidrop.shell.line_syntax import ENDS, VerbLine, parse
-from multidrop.shell.operations.table import find
+from multidrop.shell.operations.operation import Kind
+from multidrop.shell.operations.table import find, script_verb
 from multidrop.shell.scripts import words
-from multidrop.shell.scripts.expression import evaluate, unknowns
 from multidrop.shell.scripts.model import CallFile, CallMacro, If, MacroScript, Node, Repeat, Script, ScriptLine, Step
+from multidrop.shell.scripts.use import Checking, chosen
 from multidrop.shell.session import BARE_WORDS, bare
 
-LOOPS = ("/repeat", "/while", "/until")
-EXPRESSIONS = ("/if", *LOOPS, "/set", "/assert", "/verify")
-"""The verbs with an expression, in which a name has no braces."""
+BLOCKS = (Kind.IF, Kind.COUNT, Kind.WHILE)
+"""What begins a block."""
 UNKNOWN = "0"
 """Stands for a value that is only known when the line is executed."""
 
@@ -233,33 +233,28 @@ class _Checker:
         """The steps up to an `/else` or `/end`, and that line; None at the end of the file."""
         body: list[Node] = []
         for line in self._lines:
-            if line.word in ("/else", "/end"):
-                self._try(line, words.alone)
+            if _kind(line) is Kind.BETWEEN:
+                self._try(line, chosen)
                 return body, line
             body.append(self._node(line))
         return body, None
 
     def _node(self, line: ScriptLine) -> Node:
-        if line.word in ("/if", *LOOPS):
-            self._try(line, partial(self._steering, line))
+        kind = _kind(line)
+        if kind in BLOCKS:
+            self._try(line, partial(self._check, line))
             self._depth += 1
             if self._depth > DEEPEST:
                 raise WrongScript([*self.problems, Diagnostic(f"blocks are nested deeper than {DEEPEST}", line.where)])
-            node = self._if(line) if line.word == "/if" else self._repeat(line)
+            node = self._if(line) if kind is Kind.IF else self._repeat(line)
             self._depth -= 1
             return node
-        if line.word == "/call":
+        if kind is Kind.CALL:
             return self._try(line, lambda text: self._call(line, text)) or Step(line)
         if line.word == "/play":
             return self._try(line, lambda text: self._play(line, text)) or Step(line)
         self._try(line, partial(self._check, line))
         return Step(line)
-
-    def _steering(self, line: ScriptLine, text: str) -> None:
-        """Check the expression of a block; also the number of an `/repeat`, where that is known beforehand."""
-        tree = words.expression(text, self._names)
-        if line.word == "/repeat" and not self._unknown(line.text) and not list(unknowns(tree)):
-            words.repetitions(evaluate(tree, {}))
 
     def _if(self, line: ScriptLine) -> If:
         before = dict(self._names)
@@ -277,7 +272,7 @@ class _Checker:
         body, end = self._block()
         self._close(line, end)
         text = words.rest_of(line.text)
-        if not (line.word == "/repeat" and text.isdecimal() and int(text) > 0):
+        if not (_kind(line) is Kind.COUNT and text.isdecimal() and int(text) > 0):
             self._names = before
         return Repeat(line, body)
 
@@ -291,17 +286,15 @@ class _Checker:
     def _check(self, line: ScriptLine, text: str) -> None:
         """Check a filled line as far as that is possible without a drive."""
         word = line.word
-        if word == "/set":
-            name, _ = words.setting(text, self._names)
-            self._names[name] = None
+        if script_verb(word) is not None:
+            found = chosen(text)
+            if (scripted := found.form.script) is not None and scripted.check is not None:
+                checking = Checking(word, self._names, not self._unknown(line.text))
+                scripted.check(checking, **found.values)
         elif words.sets_outcome(text):
             find(word).check(words.rest_of(text))
             self._names[words.OUTCOME] = None
-        elif word in ("/assert", "/verify"):
-            words.check(text, self._names)
-        elif word == "/expect":
-            words.expectation(text)
-        elif word != "/print":
+        else:
             parsed = parse(text)
             if isinstance(parsed, VerbLine):
                 verb = find(parsed.name)
@@ -370,9 +363,17 @@ class _Checker:
         self.problems.append(Diagnostic(message, line.where))
 
 
+def _kind(line: ScriptLine) -> Kind | None:
+    """What a verb of scripts is to the lines around it; None for any other line."""
+    verb = script_verb(line.word)
+    return verb.script.kind if verb is not None and verb.script is not None else None
+
+
 def _used(line: ScriptLine, given: Collection[str]) -> set[str]:
     """The names that a line uses: with braces, and those of `given` in an expression."""
-    bare = {*words.NAME.findall(words.rest_of(line.text))} if line.word in EXPRESSIONS else set()
+    verb = script_verb(line.word)
+    own = verb is not None and verb.script is not None and verb.script.bare
+    bare = {*words.NAME.findall(words.rest_of(line.text))} if own else set()
     return value_names(line.text) | (bare & {*given})
 
 

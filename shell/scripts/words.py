@@ -3,20 +3,17 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 from functools import cache
 from typing import TypeVar
 
 from multidrop.base.errors import Diagnostic
-from multidrop.base.text import whole
 from multidrop.dialects.families import FAMILIES
 from multidrop.macros import Macro
-from multidrop.shell import waits
 from multidrop.shell.line_syntax import ENDS, divided
-from multidrop.shell.operations.table import SCRIPT_WORDS, VERBS
-from multidrop.shell.operations.usage import split
-from multidrop.shell.playing import FOREVER
+from multidrop.shell.operations.table import VERBS, script_verbs
+from multidrop.shell.operations.verb import Verb
 from multidrop.shell.scripts.expression import Comparison, Expression, Name, Value, parse, parse_check, quoted, unknowns
 
 T = TypeVar("T", bound=Expression)
@@ -25,16 +22,6 @@ OUTCOME = "outcome"
 """The name that a `/wait ended` sets."""
 MOST = 10**9
 """The largest number of repetitions."""
-SECONDS = 1.0
-"""The default time in which `/expect` looks for its text, s."""
-MOST_ROUNDS = 10**9
-"""The largest number of rounds."""
-
-
-def wrong(word: str, message: str = "") -> Diagnostic:
-    """A Diagnostic with the usage of a verb."""
-    usage = f"usage: {SCRIPT_WORDS[word]}"
-    return Diagnostic(message, word, usage) if message else Diagnostic(usage, word)
 
 
 def rest_of(text: str) -> str:
@@ -42,61 +29,43 @@ def rest_of(text: str) -> str:
     return divided(text.strip(ENDS))[1]
 
 
-def expression(text: str, names: Collection[str]) -> Expression:
-    """Parse the expression of `/if`, `/repeat`, `/while` and `/until`."""
-    return _parsed(text, rest_of(text), names, parse)
+def expression(word: str, text: str, names: Collection[str]) -> Expression:
+    """Parse an expression of a verb. Raises Diagnostic."""
+    return _parsed(word, text, names, parse)
 
 
-def check(text: str, names: Collection[str]) -> Comparison:
-    """Parse `/assert` and `/verify`."""
-    return _parsed(text, rest_of(text), names, parse_check)
+def comparison(word: str, text: str, names: Collection[str]) -> Comparison:
+    """Parse a comparison of a verb. Raises Diagnostic."""
+    return _parsed(word, text, names, parse_check)
 
 
-def setting(text: str, names: Collection[str]) -> tuple[str, Expression]:
-    """Parse `/set`: the name, and its expression."""
-    name, rest = divided(rest_of(text))
+def check_name(name: str) -> None:
+    """Raise Diagnostic for a name that `/set` cannot give a value."""
+    verb = script_verbs()["/set"]
     if not NAME.fullmatch(name):
-        raise wrong("/set", f"invalid name {name}" if name else "")
+        raise verb.wrong(f"invalid name {name}" if name else "")
     if _is_word(name):
-        raise wrong("/set", f"{name} is a word of drives; use another name, or small letters")
-    return name, _parsed(text, rest.strip(), names, parse)
-
-
-def expectation(text: str) -> tuple[str, float]:
-    """Parse `/expect`: the text, and the seconds in which it is expected."""
-    words = split(rest_of(text), "/expect")
-    if not (1 <= len(words) <= 2 and words[0]):
-        raise wrong("/expect")
-    return words[0], waits.seconds(words[1], lambda why: wrong("/expect", why)) if len(words) == 2 else SECONDS
+        raise verb.wrong(f"{name} is a word of drives; use another name, or small letters")
 
 
 def call(text: str) -> tuple[str, dict[str, str]]:
     """Parse `/call`: the file or macro, and the values that are given to it."""
-    target, *pairs = split(rest_of(text), "/call") or [""]
-    if not target:
-        raise wrong("/call")
-    values = {}
-    for pair in pairs:
-        name, sign, value = pair.partition("=")
-        if not (name and sign):
-            raise wrong("/call", f"no value {pair}; valid: NAME=VALUE")
-        if name in values:
-            raise wrong("/call", f"{name} is given twice")
-        values[name] = value
-    return target, values
+    found = script_verbs()["/call"].parsed(rest_of(text)).values
+    return found["target"], dict(found["values"])
 
 
 def macro_call(text: str) -> PlayCall:
     """Parse `/play MACRO`, or `/call MACRO`, which has values only."""
     word = text.split(maxsplit=1)[0]
-    usage = f"usage: {SCRIPT_WORDS.get(word) or VERBS['/play'].usage}"
     if word == "/call":
-        target, given = call(text)
-        return PlayCall(target, given)
-    found = split(rest_of(text), word)
-    if not found or found[0] == "stop":
-        raise Diagnostic(usage, word)
-    return play_call(found, lambda why: Diagnostic(why, word, usage))
+        return PlayCall(*call(text))
+    verb = VERBS["/play"]
+    assert isinstance(verb, Verb)
+    chosen = verb.parsed(rest_of(text))
+    if chosen.form.fixed:  # it ends macros
+        raise verb.wrong()
+    found = chosen.values
+    return PlayCall(found["macro"], dict(found["values"]), found["times"], found["fast"])
 
 
 @dataclass(frozen=True)
@@ -116,59 +85,16 @@ class PlayCall:
         return {name: value for name, value in self.given.items() if name not in roles}, roles
 
 
-def play_call(words: Sequence[str], wrong: Callable[[str], Diagnostic]) -> PlayCall:
-    """Read the words after `/play`. Raises Diagnostic."""
-    name, *rest = words
-    given: dict[str, str] = {}
-    times: int | None = 1
-    fast = False
-    for option in ("--times", "--fast"):
-        if rest.count(option) > 1:
-            raise wrong(f"{option} is given twice")
-    while rest:
-        word = rest.pop(0)
-        if word == "--fast":
-            fast = True
-        elif word == "--times":
-            times = rounds(rest.pop(0) if rest else "", wrong)
-        else:
-            name_of, sign, value = word.partition("=")
-            if not (name_of and sign):
-                raise wrong(f"no value {word}; valid: NAME=VALUE")
-            if name_of in given:
-                raise wrong(f"{name_of} is given twice")
-            given[name_of] = value
-    return PlayCall(name, given, times, fast)
-
-
-def rounds(text: str, wrong: Callable[[str], Diagnostic]) -> int | None:
-    """Read a number of rounds; None: without an end. Raises the Diagnostic that `wrong` returns."""
-    if text == FOREVER:
-        return None
-    number = whole(text, 1, MOST_ROUNDS)
-    if number is None:
-        raise wrong(f"no number of rounds {text}".rstrip() + f"; valid: 1 to {MOST_ROUNDS}, or {FOREVER}")
-    return number
-
-
 def repetitions(value: Value) -> int:
     if isinstance(value, str) or value != int(value) or not 0 <= value <= MOST:
-        raise wrong("/repeat", f"no number of repetitions {quoted(value)}; valid: 0 to {MOST}")
+        verb = script_verbs()["/repeat"]
+        raise verb.wrong(f"no number of repetitions {quoted(value)}; valid: 0 to {MOST}")
     return int(value)
 
 
-def alone(text: str) -> None:
-    """Check that `/else` or `/end` is alone on its line."""
-    if rest_of(text):
-        raise wrong(text.split(maxsplit=1)[0])
-
-
-def _parsed(text: str, rest: str, names: Collection[str], parsing: Callable[[str, Collection[str]], T]) -> T:
-    word = text.split(maxsplit=1)[0]
-    if not rest:
-        raise wrong(word)
+def _parsed(word: str, text: str, names: Collection[str], parsing: Callable[[str, Collection[str]], T]) -> T:
     try:
-        found = parsing(rest, names)
+        found = parsing(text, names)
     except Diagnostic as problem:
         raise Diagnostic(problem.message, word, problem.hint) from None
     for each in unknowns(found):

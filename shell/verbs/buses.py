@@ -1,48 +1,47 @@
-"""The work of the verbs on ports and buses: open, close, select, list, name, raw bytes."""
+"""Operations on ports and buses: open, close, select, list, name, search."""
 
 from __future__ import annotations
 
-import asyncio
-from collections.abc import Callable
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Annotated
 
 from multidrop.base.errors import Diagnostic, Inexpressible, NoAnswer
-from multidrop.base.text import whole
-from multidrop.dialects.units import Takes
-from multidrop.shell import configuration
-from multidrop.shell.events import By
-from multidrop.shell.finding import scanning
 from multidrop.shell.line_syntax import split_target
-from multidrop.shell.openings import model
-from multidrop.shell.raw import TERMINATORS, Form, RawLine, Watched, parse_bytes
-from multidrop.shell.verbs.call import Call
+from multidrop.shell.operations import conditions
+from multidrop.shell.operations.argument_types import Address, BusName, UrlForm
+from multidrop.shell.operations.operation import Operation
+from multidrop.shell.operations.parameter import Argument, Listed
 
 if TYPE_CHECKING:
-    pass
+    from multidrop.drives.drive import Drive
+    from multidrop.shell.verbs.call import Call
 
-BREAK = 250
-"""The length of a break, ms."""
-LONGEST_BREAK = 2000
-"""The same, at most: a break holds back a stop, which is then repeated."""
-HIGHEST_BAUD = 10_000_000
-SWITCH = {"on": True, "off": False}
-FORMS = {form.value[0]: form for form in Form}
+GROUP = "Lines and drives"
+NewBusName = Annotated[str, Argument(metavar="NAME")]
+Selected = Annotated[str, Argument(metavar="ADDR|BUS[:ADDR]", listed=(Listed.DRIVE, Listed.BUS))]
+Side = Annotated[str, Argument(words={"left": "before its neighbour", "right": "after its neighbour"})]
 
 
-async def open_(call: Call) -> None:
-    url, *name = call.words()
-    for bus in await call.session.open(url, name[0] if name else None):
+async def open_(call: Call, url: UrlForm, name: NewBusName = "") -> None:
+    from multidrop.shell.events import By
+
+    for bus in await call.session.open(url, name or None):
         if bus.silent and call.by is not By.OPERATOR:
             await call.session.forget(bus)
             raise NoAnswer(bus.silent)
 
 
-async def close(call: Call) -> None:
-    (name,) = call.words()
+def urls() -> Sequence[str]:
+    from multidrop.shell.connect.schemes import table
+
+    return table()
+
+
+async def close(call: Call, name: BusName) -> None:
     bus, session = call.session.bus(name), call.session
     selected = session.selected_bus == bus.name
     if selected:  # what follows was written for this bus, and never goes to another one
-        session.selected_bus = ""
+        session.selected_bus, session.deselected = "", True
     try:
         await session.forget(bus)
     finally:
@@ -52,9 +51,8 @@ async def close(call: Call) -> None:
     session.notify(f"{name} is closed")
 
 
-async def use(call: Call) -> None:
+def use(call: Call, target: Selected) -> None:
     workspace = call.session
-    (target,) = call.words()
     bus, address = split_target(target)
     if not bus and target in workspace.buses:
         selected = workspace.buses.get(workspace.selected_bus)
@@ -66,9 +64,10 @@ async def use(call: Call) -> None:
     workspace.notify(f"lines go to {workspace.display_name(drive) if drive else empty}")
 
 
-async def drives(call: Call) -> None:
+def drives(call: Call) -> None:
+    from multidrop.shell.openings import model
+
     workspace = call.session
-    call.words()
     if not workspace.buses:
         raise Diagnostic("nothing is open", "/drives", "/open URL opens a line of drives")
     for bus in workspace.buses.values():
@@ -83,9 +82,13 @@ async def drives(call: Call) -> None:
             workspace.output(" ".join(word for word in words if word) + mode)
 
 
-async def scan(call: Call) -> None:
+async def scan(call: Call, bus_name: BusName = "") -> None:
+    from multidrop.shell.events import By
+    from multidrop.shell.finding import scanning
+    from multidrop.shell.openings import model
+
     workspace = call.session
-    bus = workspace.bus(call.word())
+    bus = workspace.bus(bus_name)
     if call.by is By.OPERATOR and workspace.openings.searches(bus):
         return await workspace.openings.search(bus)
     found = await scanning.extend(workspace, bus)
@@ -97,8 +100,8 @@ async def scan(call: Call) -> None:
         workspace.notify(f"{bus.name}: no other drive replies", outcome=True)
 
 
-async def referenced(call: Call) -> None:
-    drive = call.drive(call.word())
+def referenced(call: Call, address: Address = "") -> None:
+    drive = call.drive(address)
     name = call.session.display_name(drive) or drive.shown
     if drive not in call.session.bus(drive.link.name).drives.values():
         raise Diagnostic(f"no drive {name}", hint="/drives lists them")
@@ -108,12 +111,18 @@ async def referenced(call: Call) -> None:
     call.session.changed()
 
 
-async def status(call: Call) -> None:
-    drive = call.drive(call.word())
+async def status(call: Call, address: Address = "") -> None:
+    drive = call.drive(address)
     if not drive.family.offers("status"):
         raise Inexpressible(f"{call.session.display_name(drive)}: drives of this family do not report their state")
     for line in await drive.run(drive.family.status()):
         call.session.output(line)
+    await _show_in_units(call, drive)
+
+
+async def _show_in_units(call: Call, drive: Drive) -> None:
+    from multidrop.dialects.units import Takes
+
     units = call.session.units if call.session.scaled else None
     if units is None or not units.shown or not units.axes(drive) or drive.programming:
         return
@@ -127,128 +136,108 @@ async def status(call: Call) -> None:
             call.session.output(f"{each.axis} in units: {shown}{lost}".lstrip())
 
 
-async def rename(call: Call) -> None:
-    name, *bus = call.words()
-    call.session.rename_bus(call.session.bus("".join(bus)), name)
+def rename(call: Call, name: NewBusName, bus: BusName = "") -> None:
+    call.session.rename_bus(call.session.bus(bus), name)
 
 
-async def tab(call: Call) -> None:
-    where, *bus = call.words()
-    if where not in ("left", "right"):
-        raise call.wrong()
-    call.session.move_bus(call.session.bus("".join(bus)), 1 if where == "right" else -1)
+def tab(call: Call, where: Side, bus: BusName = "") -> None:
+    call.session.move_bus(call.session.bus(bus), 1 if where == "right" else -1)
 
 
-async def keep(call: Call) -> None:
-    name, *bus = call.words()
-    url = call.session.openings.url_of(call.session.bus("".join(bus)))
+def keep(call: Call, name: NewBusName, bus: BusName = "") -> None:
+    from multidrop.shell import configuration
+
+    url = call.session.openings.url_of(call.session.bus(bus))
     path = configuration.save(name, url)
     call.session.notify(f"{path}: connection {name} is saved: {url}", outcome=True)
 
 
-def _raw(call: Call) -> RawLine:
-    """The selected bus in raw mode. Raises Diagnostic for any other."""
-    bus = call.session.bus()
-    found = call.session.raw.get(bus.name)
-    if found is None:
-        raise Diagnostic(f"{bus.name} is not in raw mode", call.verb.name, "/raw on begins it")
-    return found
+OPERATIONS = (
+    Operation(
+        open_,
+        verb="/open",
+        group=GROUP,
+        rows=urls,
+        help="""
+Open a line of drives; moves nothing.
 
+NAME becomes the name of the bus. URL is a port, the name of a saved connection, or one of these:
+""",
+    ),
+    Operation(close, verb="/close", group=GROUP, help="Close a bus; moves nothing and stops nothing."),
+    Operation(
+        use,
+        verb="/use",
+        group=GROUP,
+        immediate=True,
+        help="""
+Select the drive or the bus for lines without an address.
 
-async def raw(call: Call) -> None:
-    match call.words() or ["on"]:
-        case [("on" | "off") as word]:
-            bus = call.session.bus()
-            if (word == "on") == (bus.name in call.session.raw):
-                state = "already" if word == "on" else "not"
-                raise Diagnostic(f"{bus.name} is {state} in raw mode", call.verb.name)
-            openings = call.session.openings
-            await (openings.raw_on(bus) if word == "on" else openings.raw_off(bus))
-        case ["open", url]:
-            before = {*call.session.buses}
-            await call.session.open(url, raw=True)
-            call.session.select("", next(name for name in call.session.buses if name not in before))
-        case ["baud", number]:
-            line, baud = _raw(call), whole(number, 1, HIGHEST_BAUD)
-            if baud is None:
-                raise call.wrong(f"no baud rate {number}")
-            await _set(line, f"the baud rate {baud}", lambda: line.control().set_baud(baud))
-            line.bus.set_baud(baud)
-            call.session.notify(f"{line.bus.name}: {baud} baud")
-        case [("dtr" | "rts") as pin, word]:
-            line = _raw(call)
-            if word not in SWITCH:
-                raise call.wrong()
-            control = line.control()
-            await _set(line, pin.upper(), lambda: (control.set_dtr if pin == "dtr" else control.set_rts)(SWITCH[word]))
-            call.session.notify(f"{line.bus.name}: {pin.upper()} {word}")
-        case ["break", *length]:
-            await _send_break(call, length[0] if length else str(BREAK))
-        case ["end", word]:
-            line = _raw(call)
-            if word not in TERMINATORS:
-                raise call.wrong()
-            line.end = TERMINATORS[word]
-            call.session.notify(f"{line.bus.name}: {word} follows a typed text")
-        case ["show", word]:
-            line = _raw(call)
-            if word not in FORMS:
-                raise call.wrong()
-            line.form = FORMS[word]
-            call.session.notify(f"{line.bus.name}: bytes are shown as {word}")
-        case _:
-            raise call.wrong()
+A drive of the selected bus takes precedence over a bus of the same name.
+""",
+    ),
+    Operation(
+        drives,
+        verb="/drives",
+        group=GROUP,
+        immediate=True,
+        help="List the drives of every open bus; * marks the selected drive.",
+    ),
+    Operation(
+        scan,
+        verb="/scan",
+        group=GROUP,
+        help="""
+Search an open line for drives that are not listed: every name or number, at its baud rate; moves nothing.
 
+`multidrop scan PORT` searches other baud rates and languages.
+""",
+    ),
+    Operation(
+        status,
+        verb="/status",
+        group=GROUP,
+        fits=conditions.reports_status,
+        help="Show the state of a drive in words: motion, program, errors, inputs, outputs.",
+    ),
+    Operation(
+        referenced,
+        verb="/referenced",
+        group=GROUP,
+        immediate=True,
+        help="""
+Take the position of a drive for right again after a restart; nothing is sent.
 
-async def _send_break(call: Call, text: str) -> None:
-    line = _raw(call)
-    length = whole(text, 1, LONGEST_BREAK)
-    if length is None:
-        raise call.wrong(f"a break takes 1 to {LONGEST_BREAK} ms")
-    control = line.control()
-    try:
-        await _set(line, "break", lambda: control.set_break(True))
-        await asyncio.sleep(length / 1000)
-    finally:  # also when a stop ends the wait: a break holds back what is written
-        await _set(line, "break", lambda: control.set_break(False))
-    call.session.notify(f"{line.bus.name}: a break of {length} ms was sent")
+A homing that ends well, or a position that is set, does the same. Until then `~` is before the position.
+""",
+    ),
+    Operation(
+        rename,
+        verb="/rename",
+        group=GROUP,
+        immediate=True,
+        help="""
+Give an open bus (by default the selected one) another name; moves nothing.
 
+/keep saves it under that name. A macro that names the bus keeps the name before.
+""",
+    ),
+    Operation(
+        tab,
+        verb="/tab",
+        group=GROUP,
+        immediate=True,
+        help="Move the tab of a bus, by default of the selected one; no drive moves.",
+    ),
+    Operation(
+        keep,
+        verb="/keep",
+        group=GROUP,
+        immediate=True,
+        help="""
+Save an open bus (by default the selected one) as a connection: /open NAME opens it again.
 
-async def _set(line: RawLine, what: str, change: Callable[[], None]) -> None:
-    """Change a setting of the port, in a thread: a server may have to confirm it. Raises Diagnostic."""
-    try:
-        await asyncio.to_thread(change)
-    except OSError as error:
-        why = error.strerror or str(error)
-        raise Diagnostic(f"the port does not take {what} ({why})", line.bus.name, "nothing was changed") from None
-
-
-async def hex_(call: Call) -> None:
-    words, workspace = call.words(), call.session
-    bus = workspace.bus()
-    if bus.name in workspace.raw:
-        raise Diagnostic(f"{bus.name} is raw: its bytes are shown", call.verb.name, "/raw show text|hex|both")
-    record = workspace.of(bus)
-    shown = record.bytes_shown
-    word = words[0] if words else "off" if shown else "on"
-    form = FORMS.get("both" if word == "on" else word)
-    if form is None and word != "off":
-        raise call.wrong()
-    if form is None:
-        if shown is not None:
-            shown.close()
-            record.bytes_shown = None
-        workspace.notify(f"{bus.name}: bytes are not shown")
-        return
-    if shown is None:
-        shown = record.bytes_shown = Watched(bus, workspace.publish, workspace.wall)
-        shown.open()
-    shown.form = form
-    workspace.notify(f"{bus.name}: bytes are shown as {form.value[0]}, without polls; /hex off ends it")
-
-
-async def bytes_(call: Call) -> None:
-    line, data = _raw(call), parse_bytes(call.rest)
-    if not data:
-        raise call.wrong()
-    await call.session.path.send_bytes(line.bus, data, call.by)
+The configuration file keeps its remarks. A serial port is saved by its stable name.
+""",
+    ),
+)

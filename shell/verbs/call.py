@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Coroutine, Mapping, Sequence
+from collections.abc import Coroutine
 from dataclasses import dataclass
-from inspect import iscoroutine
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,21 +12,11 @@ from multidrop.base.errors import Diagnostic
 from multidrop.drives.drive import Drive
 from multidrop.shell.events import By
 from multidrop.shell.line_syntax import split_target
-from multidrop.shell.operations.operation import Operation
-from multidrop.shell.operations.usage import limits, split
+from multidrop.shell.operations.verb import Chosen, Verb
 from multidrop.shell.session import Session
 
 if TYPE_CHECKING:
     from multidrop.macros import Macro
-
-
-def words(verb: Operation, rest: str) -> list[str]:
-    """The words after the name, without quotes. Raises Diagnostic for a number that no form of the usage has."""
-    found = split(rest, verb.name)
-    low, high = limits(verb.usage)
-    if not low <= len(found) <= high:
-        raise verb.wrong()
-    return found
 
 
 @dataclass(frozen=True)
@@ -34,62 +24,35 @@ class Call:
     """One use of a verb: where it works, the text after its name, and its origin."""
 
     session: Session
-    verb: Operation
+    verb: Verb
     rest: str
     by: By = By.OPERATOR
     shown: str | Macro | None = None
     """What a person was shown of the file that the line names; see `line_syntax.VerbLine`."""
 
+    @cached_property
+    def chosen(self) -> Chosen:
+        """The form of the line, and its values. Raises Diagnostic for words that are no arguments of the verb."""
+        return self.verb.parsed(self.rest)
+
+    @property
+    def changes(self) -> bool:
+        """Whether the line changes a drive, or lets it run. Raises Diagnostic as `chosen` does."""
+        return self.chosen.form.changes
+
+    @property
+    def immediate(self) -> bool:
+        """Whether it is done at once."""
+        return self.chosen.form.immediate
+
     def work(self) -> Coroutine[Any, Any, None]:
-        work: Coroutine[Any, Any, None] = self.verb.imported(self.verb.work)(self)
-        if not iscoroutine(work):  # by others
-            raise Diagnostic(f"{self.verb.name} has no async function")
-        return work
+        """What the line does."""
+        return self.chosen.form.work(self, self.chosen.values)
 
-    def recorded(self) -> str:
-        """The line that a macro records; empty: none."""
-        if self.verb.recorded == "typed":
-            return f"{self.verb.name} {self.rest}".strip()
-        return str(self.verb.imported(self.verb.recorded)(self)) if self.verb.recorded else ""
-
-    def words(self) -> list[str]:
-        """The words after the name, without quotes. Raises Diagnostic for a number that no form of the usage has."""
-        return words(self.verb, self.rest)
-
-    def word(self) -> str:
-        """The only word; empty where there is none."""
-        return "".join(self.words()[:1])
-
-    def split(self) -> list[str]:
-        """The words after the name, without quotes, however many there are."""
-        return split(self.rest, self.verb.name)
-
-    def sort(
-        self, flags: Sequence[str], values: Mapping[str, str], *, listed: bool = False
-    ) -> tuple[list[str], list[tuple[str, str]]]:
-        """Sort the words into places and options, which are in any order. Raises Diagnostic.
-
-        `values` names the value that an option needs. `listed`: an error names the valid ones.
-        """
-        places: list[str] = []
-        options: list[tuple[str, str]] = []
-        left = iter(self.split())
-        for word in left:
-            if any(word == name for name, _ in options):
-                raise self.wrong(f"{word} is given twice")
-            value = next(left, "") if word in values else ""
-            if word in values and not value:
-                raise self.wrong(f"{word} needs {values[word]}")
-            if word in flags or word in values:
-                options.append((word, value))
-            elif not word.startswith("--"):
-                places.append(word)
-            elif listed:
-                valid = f"valid: {', '.join((*flags, *values))}"
-                raise Diagnostic(f"no option {word}", self.verb.name, valid)
-            else:
-                raise self.wrong(f"no option {word}")
-        return places, options
+    def recorded(self) -> str | None:
+        """The line that a macro records; None: none."""
+        recorded = self.chosen.form.recorded
+        return recorded(self) if recorded is not None else None
 
     def output_file(self, name: str) -> str:
         """Return the path of a file to write. Raises Diagnostic for a macro's that leaves the current folder.

@@ -1,191 +1,413 @@
-"""The work of the verbs on macros: play, list, change, record."""
+"""Operations on macros: record, play, list and change them."""
 
 from __future__ import annotations
 
-import shlex
-from dataclasses import replace
+import sys
+from typing import TYPE_CHECKING, Annotated
 
 from multidrop.base.errors import Diagnostic, Stopped
-from multidrop.base.text import counted
-from multidrop.macros import FIRST_PAGE, KEYS, Macro, check_name, parse_macro
-from multidrop.macros.recorder import Offer, with_waits
-from multidrop.macros.store import listed
-from multidrop.shell import macro_changes
-from multidrop.shell.events import By
-from multidrop.shell.line_syntax import divided
-from multidrop.shell.macro_arguments import roles_in, settled
-from multidrop.shell.scripts import executor
-from multidrop.shell.scripts.words import play_call
-from multidrop.shell.verbs.call import Call
-from multidrop.shell.workspace import LATCHED, Workspace
+from multidrop.shell.operations import arguments
+from multidrop.shell.operations.argument_types import (
+    Agreeing,
+    MacroName,
+    NamedValue,
+    Opening,
+    Reporting,
+    Yes,
+)
+from multidrop.shell.operations.operation import Operation, typed
+from multidrop.shell.operations.parameter import Argument, Listed
+from multidrop.shell.verbs.macro_places import AtTerminal, Macros, at_terminal, changing
+
+if TYPE_CHECKING:
+    from multidrop.shell.verbs.call import Call
+
+GROUP = "Macros"
+NewName = Annotated[str, Argument("the other name", metavar="NAME")]
+Note = Annotated[str, Argument("the note", metavar="TEXT ...", rest=True, read=arguments.one_text)]
+Key = Annotated[str, Argument(metavar="F2..F12", read=arguments.function_key, listed=(Listed.KEY,))]
+OnKey = Annotated[
+    str,
+    Argument("off: free the key", metavar="MACRO|off", words={"off": "free the key"}, read=str, listed=(Listed.MACRO,)),
+]
+Page = Annotated[str, Argument("a number or a word (default: 1)", metavar="PAGE", listed=(Listed.PAGE,))]
+InProject = Annotated[bool, Argument("into the folder macros of the current folder")]
+InPlace = Annotated[bool, Argument("replace the macros of these names")]
+Rounds = Annotated[
+    "int | None",
+    Argument(
+        "play N rounds, or until it is interrupted",
+        metavar="N|forever",
+        read=arguments.rounds,
+        words={"forever": "play until it is interrupted"},
+    ),
+]
+Fast = Annotated[bool, Argument("leave out the recorded pauses")]
+Replace = Annotated[bool, Argument("in place of the macro of that name")]
+Waits = Annotated[bool, Argument("put waits in place of long pauses")]
+Exported = Annotated[str, Argument("the new file (-: standard output)", metavar="FILE", listed=(Listed.FILE,))]
+Imported = Annotated[
+    str,
+    Argument(
+        "function-key strings, one a line: F2 STRING ; comment (-: standard input)",
+        metavar="FILE",
+        listed=(Listed.FILE,),
+    ),
+]
+ExportedMacro = Annotated[str, Argument("a macro (default: those on keys)", metavar="MACRO", listed=(Listed.MACRO,))]
 
 
-async def play(call: Call) -> None:
-    words, workspace = call.words(), call.session
-    if words[0] == "stop":
-        if len(words) > 2:
-            raise call.wrong()
-        found = [each for each in workspace.playing if each.name in words[1:] or not words[1:]]
-        if not found:
-            raise Diagnostic(f"macro {words[1]} does not play" if words[1:] else "no macro plays", "/play stop")
-        for each in found:
-            each.end()
-        return
-    chosen = play_call(words, call.wrong)
-    if workspace.latched:
-        raise Stopped(LATCHED)
-    if call.by is By.OPERATOR and any(each.name == chosen.macro for each in workspace.playing):
-        raise Diagnostic(f"macro {chosen.macro} is playing", "/play", f"/play stop {chosen.macro} ends it")
-    macro = workspace.macros.load(chosen.macro)
-    if workspace.front.unsaved is not None:
-        call.warn_of_editor(workspace.macros.path(macro.name))
-    if isinstance(call.shown, Macro) and macro != call.shown:
-        what = f"macro {macro.name} has changed on the disk since it was shown here; nothing was sent"
-        raise Diagnostic(
-            what, str(workspace.macros.path(macro.name)), "look at it; play it again to play it as it is now"
-        )
-    values, roles = await settled(workspace, macro, chosen.given)
-    await executor.play(call.session, macro, values, times=chosen.times, fast=chosen.fast, roles=roles)
+# List and change
 
 
-async def macros(call: Call) -> None:
-    call.words()
-    found = listed(call.session.macros)
+def list_(macros: Macros) -> None:
+    """Print a line for each macro; one that cannot be read is reported and does not hide the others."""
+    from multidrop.macros.store import listed
+
+    found = listed(macros.store)
     for line in found.lines:
-        call.session.output(line, columns=True)
+        macros.row(line)
     for line in (*found.warnings, *map(str, found.broken[:-1])):
-        call.session.notify(line, warning=True)
+        macros.warn(line)
     if found.broken:
         raise found.broken[-1]
 
 
-async def macro(call: Call) -> None:
-    words, workspace = call.words(), call.session
-    if call.by is By.MACRO:
-        raise Diagnostic("a macro does not change macros", "/macro", "type the line")
-    store, plain = workspace.macros, not any(word.startswith("--") for word in words[:-1])
-    done: list[str] = []
-    match words:
-        case ["show", name]:
-            for line in macro_changes.text_of_macro(store, name):
-                workspace.output(line)
-        case ["edit", name]:
-            await _edit(workspace, name)
-        case ["describe", name, *text]:
-            typed = divided(divided(call.rest)[1])[1]
-            done = macro_changes.describe(store, name, text[0] if len(text) == 1 else typed)
-        case ["copy", name, new, "--project"] if plain:
-            done = macro_changes.copy(store, name, new, True)
-        case ["import", file, "--force"] if plain:
-            done = macro_changes.import_(store, file, True)
-        case [("rename" | "copy") as what, name, new] if plain and not new.startswith("--"):
-            done = (macro_changes.rename if what == "rename" else macro_changes.copy)(store, name, new)
-        case ["import", file] if not file.startswith("--"):
-            done = macro_changes.import_(store, file)
-        case ["delete", name]:
-            doomed = macro_changes.deletion(store, name)
-            await workspace.questions.confirm(doomed.what, so_far="nothing was deleted")
-            done = macro_changes.delete(store, doomed)
-        case ["export", file, *names]:
-            done = macro_changes.export(store, call.output_file(file), names, workspace.output)
-        case _:
-            raise call.wrong()
-    for line in done:
-        workspace.notify(line)
+def show(macros: Macros, macro: MacroName) -> None:
+    from multidrop.shell import macro_changes
+
+    for line in macro_changes.text_of_macro(macros.store, macro):
+        macros.output(line)
+
+
+def describe(macros: Macros, macro: MacroName, text: Note) -> None:
+    from multidrop.shell import macro_changes
+
+    macros.say(*macro_changes.describe(macros.store, macro, text))
+
+
+def rename(macros: Macros, macro: MacroName, new: NewName) -> None:
+    from multidrop.shell import macro_changes
+
+    macros.say(*macro_changes.rename(macros.store, macro, new))
+
+
+def copy(macros: Macros, macro: MacroName, new: NewName, *, project: InProject = False) -> None:
+    from multidrop.shell import macro_changes
+
+    macros.say(*macro_changes.copy(macros.store, macro, new, project))
+
+
+def set_key(macros: Macros, key: Key, macro: OnKey, *, page: Page = "1") -> None:
+    from multidrop.shell import macro_changes
+
+    done, doubtful = macro_changes.set_key(macros.store, key, macro, page)
+    macros.say(done)
+    for each in doubtful:
+        macros.warn(each)
+
+
+def import_(macros: Macros, file: Imported, *, force: InPlace = False) -> None:
+    from multidrop.shell import macro_changes
+
+    macros.say(*macro_changes.import_text(macros.store, *macros.text(file), force))
+
+
+def export(macros: Macros, file: Exported, *names: ExportedMacro) -> None:
+    from multidrop.shell import macro_changes
+
+    macros.say(*macro_changes.export(macros.store, macros.written(file), names, macros.output))
+
+
+async def edit(macros: Macros, macro: MacroName) -> None:
+    """Open the screen's editor. Elsewhere name the command: an editor on this terminal would take the stop key."""
+    import shlex
+
+    from multidrop.shell import macro_changes
+
+    macro_changes.check(macros.store, macro)
+    if (editor := macros.call.session.front.edit) is not None:
+        return await editor(str(macros.store.path(macro)))
+    hint = f"in another terminal: multidrop macro edit {shlex.quote(macro)}"
+    raise Diagnostic("an editor would take Ctrl+X, which must stop the drives", f"/macro edit {macro}", hint)
+
+
+def edit_at_terminal(macros: AtTerminal, macro: MacroName) -> None:
+    from multidrop.shell import macro_editing
+
+    macros.say(macro_editing.edited(macros.store, macros.settings.macro_drafts, macro, macros.warn))
+
+
+async def delete(macros: Macros, macro: MacroName) -> None:
+    from multidrop.shell import macro_changes
+
+    doomed = macro_changes.deletion(macros.store, macro)
+    await macros.call.session.questions.confirm(doomed.what, so_far="nothing was deleted")
+    macros.say(*macro_changes.delete(macros.store, doomed))
+
+
+def delete_at_terminal(macros: AtTerminal, macro: MacroName, *, yes: Yes = False) -> None:
+    from multidrop.shell import macro_changes
+
+    doomed = macro_changes.deletion(macros.store, macro)
+    if not yes and sys.stdin.isatty() and sys.stderr.isatty():
+        sys.stderr.write(f"macro delete {doomed.what}. Go on? [y/N] ")
+        sys.stderr.flush()
+        yes = sys.stdin.readline().strip() in ("y", "Y")
+    if not yes:
+        raise Diagnostic(f"{doomed.what}; nothing was deleted", "macro delete", "--yes agrees to it")
+    macros.say(*macro_changes.delete(macros.store, doomed))
+
+
+# Play
+
+
+async def play(call: Call, macro: MacroName, *values: NamedValue, times: Rounds = 1, fast: Fast = False) -> None:
+    from multidrop.macros import Macro
+    from multidrop.shell.events import By
+    from multidrop.shell.macro_arguments import settled
+    from multidrop.shell.scripts import executor
+    from multidrop.shell.workspace import LATCHED
+
+    workspace = call.session
+    if workspace.latched:
+        raise Stopped(LATCHED)
+    if call.by is By.OPERATOR and any(each.name == macro for each in workspace.playing):
+        raise Diagnostic(f"macro {macro} is playing", "/play", f"/play stop {macro} ends it")
+    loaded = workspace.macros.load(macro)
+    if workspace.front.unsaved is not None:
+        call.warn_of_editor(workspace.macros.path(macro))
+    if isinstance(call.shown, Macro) and loaded != call.shown:
+        what = f"macro {macro} has changed on the disk since it was shown here; nothing was sent"
+        raise Diagnostic(what, str(workspace.macros.path(macro)), "look at it; play it again to play it as it is now")
+    given, roles = await settled(workspace, loaded, dict(values))
+    await executor.play(workspace, loaded, given, times=times, fast=fast, roles=roles)
+
+
+def stop_playing(call: Call, macro: MacroName = "") -> None:
+    found = [each for each in call.session.playing if macro in ("", each.name)]
+    if not found:
+        raise Diagnostic(f"macro {macro} does not play" if macro else "no macro plays", "/play stop")
+    for each in found:
+        each.end()
+
+
+def play_opened(
+    macro: MacroName,
+    *,
+    opening: Opening,
+    times: Rounds = 1,
+    fast: Fast = False,
+    reporting: Reporting,
+    agreeing: Agreeing,
+) -> int:
+    """Play a macro on what is opened for it."""
+    from multidrop.shell.batch import macro_run
+
+    return macro_run.play(macro, opening, times, fast, reporting, agreeing)
+
+
+# Record
+
+
+def recording(call: Call) -> None:
+    call.session.output(f"recording: {call.session.recording or 'nothing'}")
+
+
+def record(call: Call, macro: MacroName, *, replace: Replace = False) -> None:
+    from multidrop.macros import check_name
+
+    workspace = call.session
+    check_name(macro, "/record")
+    before = workspace.macros.contents(macro)
+    if before is not None and not replace:
+        hint = f"use another name; /record {macro} --replace replaces it"
+        raise Diagnostic(f"macro {macro} exists already", "/record", hint)
+    if before is not None:
+        workspace.macros.load(macro)  # what cannot be read is never replaced
+    time = workspace.wall(workspace.now()).isoformat(" ", "seconds")
+    workspace.recorder.start(macro, workspace.now(), before, time)
+    workspace.notify(f"recording {macro}; /record stop ends it")
     workspace.changed()
 
 
-async def _edit(workspace: Workspace, name: str) -> None:
-    """Open the screen's editor. Elsewhere name the command: an editor on this terminal would take the stop key."""
-    macro_changes.check(workspace.macros, name)
-    if workspace.front.edit is not None:
-        return await workspace.front.edit(str(workspace.macros.path(name)))
-    hint = f"in another terminal: multidrop macro edit {shlex.quote(name)}"
-    raise Diagnostic("an editor would take Ctrl+X, which must stop the drives", f"/macro edit {name}", hint)
+async def keep_recording(call: Call, *, waits: Waits = False) -> None:
+    from multidrop.shell import macro_recording
 
-
-async def key(call: Call) -> None:
-    words, store = call.words(), call.session.macros
-    if len(words) == 3 or (len(words) == 4 and words[2] != "--page"):
-        raise call.wrong()
-    if words[0].upper() not in KEYS:
-        raise call.wrong(f"no key {words[0]}; valid: F2 to F12")
-    page = words[3] if len(words) == 4 else FIRST_PAGE
-    done, doubtful = macro_changes.set_key(store, words[0], words[1], page)
-    call.session.notify(done)
-    for each in doubtful:
-        call.session.notify(each, warning=True)
+    await macro_recording.keep(call.session, waits)
     call.session.changed()
 
 
-async def record(call: Call) -> None:
-    words, workspace = call.words(), call.session
-    if len(words) == 2 and words[1] != ("--waits" if words[0] == "stop" else "--replace"):
-        raise call.wrong()
-    if not words:
-        workspace.output(f"recording: {workspace.recording or 'nothing'}")
-    elif words[0] == "stop":
-        await _keep(call, waits=len(words) == 2)
-    else:
-        name = words[0]
-        check_name(name, "/record")
-        before = workspace.macros.contents(name)
-        if before is not None and len(words) == 1:
-            hint = f"use another name; /record {name} --replace replaces it"
-            raise Diagnostic(f"macro {name} exists already", "/record", hint)
-        if before is not None:
-            workspace.macros.load(name)  # what cannot be read is never replaced
-        time = workspace.wall(workspace.now()).isoformat(" ", "seconds")
-        workspace.recorder.start(name, workspace.now(), before, time)
-        workspace.notify(f"recording {name}; /record stop ends it")
-    workspace.changed()
+OPERATIONS = (
+    Operation(
+        list_,
+        verb="/macros",
+        at=Macros,
+        command="macro list",
+        through=at_terminal,
+        group=GROUP,
+        immediate=True,
+        help="""
+List the macros: name, key and page, number of lines, values, note.
 
+Macros beside a project, in the folder `macros` of the current folder, come before the user's own.
+""",
+        meaning="list the macros: name, key, number of lines, values, note",
+        examples=("macro list",),
+    ),
+    Operation(
+        verb="/macro",
+        command="macro",
+        group=GROUP,
+        help="""
+Show, describe, rename, copy or delete a macro; import or export function-key strings.
 
-async def _keep(call: Call, waits: bool) -> None:
-    """Save the recording, in another file if its own was changed meanwhile; then offer waits."""
-    workspace, store = call.session, call.session.macros
-    macro, before = workspace.recorder.macro(), workspace.recorder.before
-    wanted, found = macro.name, workspace.recorder.offers
-    if waits:
-        macro = with_waits(macro, found)
-    macro = replace(macro, roles=roles_in(macro, list(workspace.buses)))
-    try:
-        if store.contents(wanted) != before:
-            macro, before = replace(macro, name=store.free_name(wanted)), None
-        if before is not None:
-            macro = _in_place_of(before, macro)
-        path = store.save(macro, before)
-    except Diagnostic as problem:
-        hint = "nothing is lost, the recording goes on; correct this and type /record stop again"
-        raise Diagnostic(problem.message, problem.where, hint) from None
-    workspace.recorder.discard()
-    if macro.name != wanted:
-        workspace.notify(f"{wanted} was changed meanwhile and stays unchanged", warning=True)
-    workspace.notify(f"macro {macro.name}: {macro.length} in {path}")
-    if waits:
-        for offer in found:
-            workspace.notify(f"macro {macro.name}: {offer.text}")
-    elif found:
-        await _offer(workspace, macro, found)
+Remarks in a file stay, whatever else of it changes. Without a screen `multidrop macro edit` in another
+terminal opens an editor.
+""",
+        meaning="list, show, play, change, import and export macros",
+        urls=True,
+    ),
+    Operation(
+        show,
+        verb="/macro show",
+        at=changing,
+        command="macro show",
+        through=at_terminal,
+        immediate=True,
+        help="print its file",
+        meaning="print a macro's file",
+        examples=("macro show shuttle",),
+    ),
+    Operation(
+        play,
+        verb="/play",
+        group=GROUP,
+        recorded=typed,
+        concurrent=True,
+        help="""
+Play a macro; {NAME} in its lines takes the given value. The first failure ends it.
 
+A role of the macro takes the name of an open bus. What is missing is asked for. `/play stop` ends what plays and
+stops the drives that it set in motion; its on_early_end lines follow. After Ctrl+X they do not.
+""",
+    ),
+    Operation(stop_playing, verb="/play stop", recorded=typed, help="end what plays, and stop what it set in motion"),
+    Operation(
+        play_opened,
+        command="macro play",
+        meaning="play a macro: once, several rounds, or until it is interrupted",
+        examples=(
+            "macro play shuttle --on press --set STEPS=51200",
+            "macro play shuttle --role gantry=/dev/ttyUSB0 --times 10 --junit report.xml",
+            "macro play shuttle --on sim:cell.toml --fast --times forever",
+        ),
+    ),
+    Operation(
+        edit,
+        verb="/macro edit",
+        at=changing,
+        immediate=True,
+        help="open its file in the editor of the screen",
+    ),
+    Operation(
+        edit_at_terminal,
+        command="macro edit",
+        through=at_terminal,
+        meaning="open a macro's file in the editor of VISUAL or EDITOR; it changes only once the whole text is right",
+        examples=("macro edit shuttle",),
+    ),
+    Operation(
+        describe,
+        verb="/macro describe",
+        at=changing,
+        command="macro describe",
+        through=at_terminal,
+        immediate=True,
+        help="change its note",
+        meaning="change a macro's note",
+        examples=('macro describe shuttle "ten turns and back"',),
+    ),
+    Operation(
+        rename,
+        verb="/macro rename",
+        at=changing,
+        command="macro rename",
+        through=at_terminal,
+        immediate=True,
+        help="give it another name",
+        meaning="give a macro another name",
+        examples=("macro rename shuttle ten-turns",),
+    ),
+    Operation(
+        copy,
+        verb="/macro copy",
+        at=changing,
+        command="macro copy",
+        through=at_terminal,
+        immediate=True,
+        help="copy it under another name",
+        meaning="copy a macro; --project: into the folder macros of the current folder",
+        examples=("macro copy shuttle shuttle --project",),
+    ),
+    Operation(delete, verb="/macro delete", at=changing, immediate=True, help="delete its file"),
+    Operation(
+        delete_at_terminal,
+        command="macro delete",
+        through=at_terminal,
+        meaning="delete a macro; asks first",
+        examples=("macro delete shuttle",),
+    ),
+    Operation(
+        set_key,
+        verb="/key",
+        at=Macros,
+        command="macro key",
+        through=at_terminal,
+        group=GROUP,
+        immediate=True,
+        help="""
+Assign a macro to a function key, or free the key.
 
-async def _offer(workspace: Workspace, macro: Macro, found: list[Offer]) -> None:
-    """Ask whether waits go in place of the pauses; say how where no person can be asked, and after a no."""
-    store, saved = workspace.macros, workspace.macros.contents(macro.name)
-    changes = "; ".join(offer.text for offer in found)
-    if await workspace.questions.agrees(f"macro {macro.name}: put waits in place of pauses: {changes}"):
-        store.save(with_waits(macro, found), saved)
-        workspace.notify(f"macro {macro.name}: {counted(len(found), 'pause')} replaced")
-        return
-    for offer in found:
-        workspace.notify(f"macro {macro.name}: {offer.text} would fit; /macro edit {macro.name} changes it")
+Keys are in pages, each a number or a word; the default is 1. Only key and page in the macro's file change.
+""",
+        meaning="put a macro on a function key, or free the key",
+        examples=("macro key F3 shuttle", "macro key F3 shuttle --page 2", "macro key F3 off"),
+    ),
+    Operation(
+        import_,
+        verb="/macro import",
+        at=changing,
+        command="macro import",
+        through=at_terminal,
+        immediate=True,
+        help="make macros of function-key strings, one a line: F2 STRING ; comment",
+        meaning="make macros of a vendor's function-key strings, one a line: F2 STRING ; comment",
+        examples=("macro import keys.txt",),
+    ),
+    Operation(
+        export,
+        verb="/macro export",
+        at=changing,
+        command="macro export",
+        through=at_terminal,
+        immediate=True,
+        help="write macros as function-key strings",
+        meaning="write macros to a new file of a vendor's function-key strings",
+        examples=("macro export keys.txt", "macro export keys.txt f2 shuttle"),
+    ),
+    Operation(
+        recording,
+        verb="/record",
+        group=GROUP,
+        immediate=True,
+        help="""
+Record the typed lines as a macro, until `/record stop`.
 
-
-def _in_place_of(before: bytes, macro: Macro) -> Macro:
-    """The macro with the key, the note and the on_early_end lines of the one before it, if that one can be read."""
-    try:
-        old = parse_macro(before.decode("utf-8-sig", "replace"))
-    except Diagnostic:
-        return macro
-    kept = replace(macro, key=old.key, page=old.page, note=old.note)
-    return replace(kept, on_early_end=old.on_early_end, on_early_end_moves=old.on_early_end_moves)
+Without a word it shows the recording. With `--replace` it replaces the macro of that name and keeps its key. At the
+end, waits are offered in place of long pauses: for the end of a motion, an input, or a text that was printed.
+""",
+    ),
+    Operation(record, verb="/record", immediate=True),
+    Operation(keep_recording, verb="/record stop", immediate=True, help="end, and save it"),
+)

@@ -1,171 +1,321 @@
-"""The work of the verbs on programs: check, list, transfer, trace and step."""
+"""Operations on programs: check, test, list, transfer, trace and step them."""
 
 from __future__ import annotations
 
-import asyncio
-import shlex
-from math import inf
+from typing import TYPE_CHECKING, Annotated
 
-from multidrop.base import new_file
-from multidrop.base.errors import Diagnostic, Inexpressible
-from multidrop.base.text import counted
-from multidrop.dialects.families import program_language_of
-from multidrop.dialects.program_files import errors
-from multidrop.drives.drive import Drive
-from multidrop.shell import program_listing
-from multidrop.shell.line_syntax import split_target
-from multidrop.shell.programs import debugging, transfers
-from multidrop.shell.programs.checking import examine
-from multidrop.shell.programs.debugging import LEFT, Debugger
-from multidrop.shell.verbs.call import Call
-from multidrop.simulator.declared import simulated
-from multidrop.simulator.families import PROGRAMS
+from multidrop.shell.operations.argument_types import (
+    Address,
+    Checking,
+    Downloading,
+    Drives,
+    FileName,
+    MaybeAddress,
+    ProgramFile,
+    Testing,
+    Url,
+)
+from multidrop.shell.operations.operation import Operation, typed
+from multidrop.shell.operations.parameter import Argument, Listed
+from multidrop.shell.verbs.on_drives import (
+    OfUrl,
+    OnDrives,
+    R_co,
+    agreed_of_url,
+    given_options,
+    of_url,
+    of_url_to_files,
+    one_of_call,
+)
 
-FLAGS = ("--save", "--only-changed", "--no-verify")
+if TYPE_CHECKING:
+    from multidrop.shell.verbs.call import Call
+
+GROUP = "Programs of drives"
+Personality = Annotated[str, Argument(metavar="PERSONALITY", listed=(Listed.PERSONALITY,))]
+NewFile = Annotated[
+    str, Argument("the new file; it can be downloaded again; -: standard output", metavar="FILE", listed=(Listed.FILE,))
+]
+AsStored = Annotated[bool, Argument("save the lines as they are stored, without remarks")]
+Label = Annotated[str, Argument(metavar="LABEL")]
+OFF, NOW = "remove the break point", "break the running program where it is"
+BreakPoint = Annotated[str, Argument(metavar="LABEL|off|now", read=str, words={"off": OFF, "now": NOW})]
+Passes = Annotated[str, Argument(metavar="PASSES")]
+Watched = Annotated[str, Argument(metavar="NAME|off", read=str, words={"off": "watch nothing"})]
+AsDifferences = Annotated[bool, Argument("print one JSON object a difference: drive, line, here, at, there")]
+AsLines = Annotated[bool, Argument("print one JSON object a line of the drive: drive, at, text")]
+
+# Files
 
 
-def _listed(call: Call) -> tuple[Drive, str]:
-    """The drive, and the file: the word with a dot or a slash."""
-    words = call.words()
-    files = [word for word in words if "." in word or "/" in word]
-    targets = [word for word in words if word not in files]
-    if len(files) > 1 or len(targets) > 1:
-        raise call.wrong()
-    return call.drive("".join(targets)), "".join(files)
+async def check(call: Call, file: FileName, personality: Personality = "") -> None:
+    from multidrop.shell.verbs import program_lines
+
+    await program_lines.check(call, file, personality)
+
+
+def check_files(files: tuple[ProgramFile, ...], *, how: Checking) -> int:
+    from multidrop.shell.batch import program_runs
+
+    return program_runs.check(files, how)
+
+
+def test_files(files: tuple[ProgramFile, ...], *, how: Testing) -> int:
+    from multidrop.shell.batch import program_runs
+
+    return program_runs.test(files, how)
+
+
+# Drives
+
+
+def words_of(call: Call) -> list[str]:
+    """The words of a line whose first one is a drive, or not, by what is open."""
+    return [word for value in call.chosen.values.values() for word in ([value] if isinstance(value, str) else value)]
 
 
 def list_recorded(call: Call) -> str:
-    drive, file = _listed(call)
-    words = ("/list", call.session.qualified_address(drive), shlex.quote(file) if file else "")
-    return " ".join(word for word in words if word)
+    from multidrop.shell.verbs import program_lines
+
+    return program_lines.listed_line(call, words_of(call))
 
 
-async def list_(call: Call) -> None:
-    drive, file = _listed(call)
-    if file:
-        new_file.check(call.output_file(file), printed=True)
-    lines = await program_listing.readable(call.session, drive)
-    if not lines:
-        program_listing.say_none(call.session, drive)
-    if file and lines:
-        return program_listing.save_new(call.session, drive, file, lines)
-    for line in lines:
-        call.session.output(line)
+async def list_(call: Call, addr: Address = "", file: FileName = "") -> None:
+    from multidrop.shell.verbs import program_lines
+
+    await program_lines.list_program(call, [addr, file])
+
+
+def list_of_url(drives: OfUrl, *, json: AsLines = False) -> int:
+    from multidrop.shell.verbs import programs_in_drives
+
+    return programs_in_drives.list_programs(drives, json)
+
+
+def diff(file: ProgramFile, url: Url, *, drive: Drives = "", json: AsDifferences = False) -> int:
+    from multidrop.shell.verbs import programs_in_drives
+
+    return programs_in_drives.diff(file, OfUrl(url, drive), json)
 
 
 def upload_recorded(call: Call) -> str:
-    file, *target = call.words()
-    return f"/upload {shlex.quote(file)} {call.session.qualified_address(call.drive(''.join(target)))}".rstrip()
+    import shlex
+
+    values = call.chosen.values
+    words = ("/upload", shlex.quote(values["file"]), _qualified(call, values["addr"]), *given_options(call))
+    return " ".join(filter(None, words))
 
 
-async def upload(call: Call) -> None:
-    name, *target = call.words()
-    file, drive = call.output_file(name), call.drive("".join(target))
-    new_file.check(file, printed=True)
-    program_listing.save_new(call.session, drive, file, await program_listing.upload(call.session, drive))
+def upload(drives: OnDrives[R_co], file: NewFile, *, raw: AsStored = False) -> R_co:
+    from multidrop.shell.verbs import programs_in_drives
 
-
-def _downloaded(call: Call) -> tuple[str, str, dict[str, str]]:
-    """The file, the address, and the options."""
-    places, options = call.sort(FLAGS, {"--run": "a label"})
-    if not 1 <= len(places) <= 2:
-        raise call.wrong()
-    return places[0], "".join(places[1:]), dict(options)
+    return programs_in_drives.upload(drives, file, raw)
 
 
 def download_recorded(call: Call) -> str:
-    file, target, options = _downloaded(call)
-    given = [f"{name} {options[name]}".rstrip() for name in (*FLAGS, "--run") if name in options]
-    words = ("/download", shlex.quote(file), call.session.qualified_address(call.drive(target)), *given)
-    return " ".join(word for word in words if word)
+    import shlex
+
+    values = call.chosen.values
+    words = ("/download", shlex.quote(values["file"]), _qualified(call, values["addr"]), *given_options(call))
+    return " ".join(filter(None, words))
 
 
-async def download(call: Call) -> None:
-    file, target, options = _downloaded(call)
-    wanted = transfers.Wanted(
-        verify="--no-verify" not in options,
-        save="--save" in options,
-        only_changed="--only-changed" in options,
-        run=options.get("--run", ""),
-    )
-    call.warn_of_editor(file)
-    shown = call.shown if isinstance(call.shown, str) else None
-    await transfers.download(call.session, call.drive(target), file, wanted, shown, by=call.by)
+def _qualified(call: Call, target: str) -> str:
+    """The address of the drive that is meant now; several as they were typed."""
+    from multidrop.shell.params.work import is_several
+
+    return target if is_several(target) else call.session.qualified_address(call.drive(target))
 
 
-async def check(call: Call) -> None:
-    file, *personality = call.words()
-    wanted, language = "".join(personality).upper(), program_language_of(file)
-    valid = simulated()[language].personalities
-    if wanted and wanted not in valid:
-        raise Diagnostic(f"no personality {wanted}", call.verb.name, f"valid for {file}: {', '.join(valid)}")
-    selected = call.session.selected
-    own = selected.product if selected else ""
-    product = wanted or (own if own in valid else PROGRAMS[language].drive.personality)
-    call.warn_of_editor(file)
-    reported = {own: (selected.version, selected.state.part)} if selected else {}
-    checked = await asyncio.to_thread(examine, file, product, reported=reported)
-    for each in checked.problems:
-        call.session.notify(each.line_for(file), warning=True)
-    if not checked.right:
-        count = len(errors(checked.problems))
-        raise Inexpressible(f"{file}: {counted(count, 'error')} for {product}")
-    call.session.output(f"{file}: {checked.facts}")
+def download(drives: OnDrives[R_co], file: ProgramFile, *, how: Downloading) -> R_co:
+    from multidrop.shell.verbs import programs_in_drives
+
+    return programs_in_drives.download(drives, file, how)
 
 
-def _at_drive(call: Call) -> tuple[str, list[str]]:
-    """The target, and the other words. A drive's name goes before a label's."""
-    words = call.split()
-    bus, address = split_target(words[0] if words else "")
-    known = call.session.bus(bus).drives if words and ":" not in words[0] else {}
-    if words and (":" in words[0] or address in known or any(drive.label == address for drive in known.values())):
-        return words[0], words[1:]
-    return "", words
+# The debugger
 
 
 def debugger_recorded(call: Call) -> str:
-    target, words = _at_drive(call)
-    return " ".join(filter(None, (call.verb.name, call.session.qualified_address(call.drive(target)), *words)))
+    from multidrop.shell.verbs import program_lines
+
+    return program_lines.debugger_line(call, words_of(call))
 
 
-def _parts(call: Call, low: int, high: float) -> tuple[Debugger, list[str]]:
-    """The debugger of the drive that the line is for, and the other words."""
-    target, words = _at_drive(call)
-    if not low <= len(words) <= high:
-        raise call.wrong()
-    return debugging.of(call.session, call.drive(target)), words
+async def trace(call: Call, addr: Address = "", label: Label = "") -> None:
+    from multidrop.shell.verbs import program_lines
+
+    await program_lines.trace(call, [addr, label])
 
 
-async def trace(call: Call) -> None:
-    debugger, words = _parts(call, 0, 1)
-    await debugger.trace("".join(words))
+async def step(call: Call, addr: Address = "", label: Label = "") -> None:
+    from multidrop.shell.verbs import program_lines
+
+    await program_lines.step(call, [addr, label])
 
 
-async def step(call: Call) -> None:
-    debugger, words = _parts(call, 0, 1)
-    if words:
-        await debugger.begin(words[0])
-    else:
-        await debugger.step()
+async def continue_(call: Call, addr: Address = "") -> None:
+    from multidrop.shell.verbs import program_lines
+
+    await program_lines.continue_(call, [addr])
 
 
-async def continue_(call: Call) -> None:
-    debugger, _ = _parts(call, 0, 0)
-    await debugger.go_on()
+async def break_(call: Call, addr: Address = "", place: BreakPoint = "", passes: Passes = "") -> None:
+    from multidrop.shell.verbs import program_lines
+
+    await program_lines.break_(call, [addr, place, passes])
 
 
-async def break_(call: Call) -> None:
-    debugger, words = _parts(call, 0, 2)
-    if not words:
-        debugger.say(LEFT.format(debugger.break_point) if debugger.break_point else "no break point of this session")
-    elif words == ["off"]:
-        await debugger.break_off()
-    elif words == ["now"]:
-        await debugger.break_now()
-    else:
-        await debugger.break_at(words[0], debugging.passes_of(words[1]) if len(words) > 1 else 1)
+async def watch(call: Call, addr: MaybeAddress, names: tuple[Watched, ...]) -> None:
+    from multidrop.shell.verbs import program_lines
+
+    await program_lines.watch(call, [addr, *names])
 
 
-async def watch(call: Call) -> None:
-    debugger, words = _parts(call, 1, inf)
-    await debugger.watch([] if words == ["off"] else words)
+OPERATIONS = (
+    Operation(
+        check,
+        verb="/check",
+        group=GROUP,
+        recorded=typed,
+        concurrent=True,
+        help="""
+Find the errors in a program file, without sending anything.
+
+The file is checked for the selected drive's product, or for another personality (LMDCM, MDI ...).
+Commands that this drive lacks, by its firmware and part number, are named too.
+""",
+    ),
+    Operation(
+        command="program",
+        meaning="check, test and sweep program files; transfer programs",
+        urls=True,
+    ),
+    Operation(
+        check_files,
+        command="program check",
+        meaning="report the errors in program files, by line and column",
+        examples=("program check shuttle.mxt pick.prg", "program check shuttle.mxt --cell 'press.toml#line:b'"),
+    ),
+    Operation(
+        test_files,
+        command="program test",
+        meaning="run program files on a simulated drive in virtual time: prints, errors, a summary",
+        examples=(
+            "program test shuttle.mxt",
+            "program test shuttle.mxt --trace --watch P --break K1,3",
+            "program test shuttle.mxt --cell 'press.toml#line:b' --until 60 --json",
+        ),
+    ),
+    Operation(
+        list_,
+        verb="/list",
+        group=GROUP,
+        recorded=list_recorded,
+        help="""
+List the program of a drive, or write the list into a new file.
+
+A word with a dot or a slash is a file. `/upload` writes a file that can be downloaded again.
+""",
+    ),
+    Operation(
+        list_of_url,
+        command="program list",
+        through=of_url,
+        meaning="print the program in a drive",
+    ),
+    Operation(
+        diff,
+        command="program diff",
+        meaning="compare a program file with the program in a drive; exit code 0: the same, 1: lines differ",
+        examples=("program diff shuttle.mxt press --drive b",),
+    ),
+    Operation(
+        upload,
+        verb="/upload",
+        at=one_of_call,
+        command="program upload",
+        through=of_url_to_files,
+        group=GROUP,
+        recorded=upload_recorded,
+        help="""
+Save the program of a drive, with its variables, to a new file that can be downloaded again.
+
+It has the remarks and the layout of the file that was downloaded last with the same lines.
+""",
+        meaning="save the program in a drive to a new file",
+        examples=("program upload press kept.mxt --drive b",),
+    ),
+    Operation(
+        download,
+        verb="/download",
+        at=one_of_call,
+        command="program download",
+        through=agreed_of_url,
+        group=GROUP,
+        recorded=download_recorded,
+        changes=True,
+        help="""
+Send a program file to a drive: check it, back up what the drive holds, send it, read it back.
+
+The program that it replaces is cleared (CP); a program at another address stays.
+""",
+        meaning="back up what a drive holds, send it a program file, and read that back",
+        examples=("program download press shuttle.mxt --drive b", "program download press shuttle.mxt --save --run G1"),
+    ),
+    Operation(
+        trace,
+        verb="/trace",
+        group=GROUP,
+        recorded=debugger_recorded,
+        changes=True,
+        concurrent=True,
+        help="""
+Run a program of a drive and show each line as it is executed.
+
+It begins at LABEL (or an address), by default at SU, else at address 1, and goes on to the end of the program or to
+its break point. Where programs have numbers, LABEL is one; a drive that cannot step is
+shown at the lines at which its program was seen.
+""",
+    ),
+    Operation(
+        step,
+        verb="/step",
+        group=GROUP,
+        recorded=debugger_recorded,
+        changes=True,
+        help="""
+Execute one line of a program that waits for it; with LABEL, begin there and wait.
+
+The host sends the key of single step only where it is known that the drive waits for it: not in party mode, and not
+with a checksum. The line may start a motion. A stop ends program and single step.
+""",
+    ),
+    Operation(
+        continue_,
+        verb="/continue",
+        group=GROUP,
+        recorded=debugger_recorded,
+        changes=True,
+        help="Let a program that waits run on at normal speed.",
+    ),
+    Operation(
+        break_,
+        verb="/break",
+        group=GROUP,
+        recorded=debugger_recorded,
+        changes=True,
+        help="""
+Set the break point of a drive at a label or an address; at its PASSES-th pass, /trace waits there.
+
+A drive has one break point. Without arguments, show it.
+""",
+    ),
+    Operation(
+        watch,
+        verb="/watch",
+        group=GROUP,
+        recorded=debugger_recorded,
+        help="Show variables now, and whenever a step, a break or the end of a program has changed them.",
+    ),
+)

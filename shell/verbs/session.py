@@ -1,38 +1,67 @@
-"""The work of the verbs on the session: help, waits, the stop, the screen, its transcript, the log."""
+"""Operations on the session: help, the stop, waits, the screen and its transcript, the log."""
 
 from __future__ import annotations
 
-import asyncio
-import difflib
-import re
-from typing import NamedTuple
+from typing import TYPE_CHECKING, Annotated
 
 from multidrop.base.errors import Diagnostic, Stopped
-from multidrop.base.new_file import STANDARD_OUTPUT
-from multidrop.dialects.families import DEFAULT, FAMILIES, languages, program_languages
-from multidrop.dialects.family import Language
-from multidrop.dialects.motions import Outcome
-from multidrop.shell import configuration, stop_report, waits
-from multidrop.shell.events import By
-from multidrop.shell.log import files
-from multidrop.shell.log.writer import SessionLog
-from multidrop.shell.motions import OUTCOME
-from multidrop.shell.operations.conditions import ON_SCREEN
+from multidrop.shell.operations import conditions
+from multidrop.shell.operations.argument_types import FileName
 from multidrop.shell.operations.operation import Operation
-from multidrop.shell.operations.table import SCRIPT_VERBS, VERBS, groups
-from multidrop.shell.operations.usage import split
-from multidrop.shell.quitting import GOES_ON
-from multidrop.shell.roles import EVERYTHING, TIMES, Filter, Transcripts
-from multidrop.shell.verbs.call import Call, words
+from multidrop.shell.operations.parameter import Argument, Listed
+from multidrop.shell.roles import EVERYTHING, TIMES, Filter
+
+if TYPE_CHECKING:
+    from multidrop.shell.roles import Transcripts
+    from multidrop.shell.verbs.call import Call
+
+STOPS, SCREEN = "Stop and end", "The session and its screen"
+Word = Annotated[str, Argument(metavar="WORD|NUMBER", listed=(Listed.WORD,))]
+PageName = Annotated[str, Argument(metavar="NAME")]
+LogPlace = Annotated[
+    str,
+    Argument(
+        metavar="FILE|on|off",
+        words={"on": "a new file in the state folder", "off": "end the log"},
+        read=str,
+        listed=(Listed.FILE,),
+    ),
+]
+Times = Annotated[str, Argument(words=TIMES)]
+Shown = Annotated[
+    str,
+    Argument(
+        metavar="errors|mine|ADDR",
+        words={
+            "errors": "failures and warnings, each with the line that failed",
+            "mine": "what you typed, with its replies, and warnings",
+        },
+        read=str,
+        listed=(Listed.DRIVE,),
+    ),
+]
+Text = Annotated[str, Argument(metavar="TEXT", rest=True)]
 
 
-async def stop(call: Call) -> None:
-    call.words()
+def help_(call: Call, word: Word = "") -> None:
+    from multidrop.shell.verbs import explaining
+
+    lines = explaining.on(call.session, word)
+    if call.session.front.page is not None:
+        call.session.front.page(lines)
+        return
+    for line in lines:
+        call.session.output(line, columns=True)
+
+
+def stop(call: Call) -> None:
     call.session.stop("/stop", follows=False)
 
 
-async def resume(call: Call) -> None:
-    call.words()
+def resume(call: Call) -> None:
+    from multidrop.shell import stop_report
+    from multidrop.shell.events import By
+
     if call.by is not By.OPERATOR:
         raise Stopped("/resume works only when a person types it")
     state = f"; {stop_report.words(call.session.tally())}" if call.session.latched else ""
@@ -46,17 +75,30 @@ async def resume(call: Call) -> None:
         dropped.clear()
 
 
-async def log(call: Call) -> None:
-    words, workspace = call.words(), call.session
-    if not words:
+async def quit_(call: Call) -> None:
+    from multidrop.shell.quitting import GOES_ON
+
+    ask = call.session.front.before_quit
+    if ask is not None and not await ask():
+        raise Diagnostic(GOES_ON, call.verb.name)  # lines that were to follow, as of a paste or a macro, are held back
+    call.session.quit()
+
+
+def log(call: Call, place: LogPlace = "") -> None:
+    from multidrop.base.new_file import STANDARD_OUTPUT
+    from multidrop.shell.log import files
+    from multidrop.shell.log.writer import SessionLog
+
+    workspace = call.session
+    if not place:
         workspace.output(f"log: {workspace.log.path if workspace.log else 'off'}")
         return
-    path = call.output_file(words[0])
+    path = call.output_file(place)
     if path == STANDARD_OUTPUT:
         raise Diagnostic("standard output has the replies", "/log -", "name a file")
     log, before = None, workspace.log
-    if words[0] != "off":
-        log = SessionLog(workspace, files.fresh(workspace.settings) if words[0] == "on" else path)
+    if place != "off":
+        log = SessionLog(workspace, files.fresh(workspace.settings) if place == "on" else path)
     if before is not None:
         before.close()
     workspace.log = log
@@ -64,107 +106,23 @@ async def log(call: Call) -> None:
     workspace.changed()
 
 
-async def quit_(call: Call) -> None:
-    call.words()
-    ask = call.session.front.before_quit
-    if ask is not None and not await ask():
-        raise Diagnostic(GOES_ON, call.verb.name)  # lines that were to follow, as of a paste or a macro, are held back
-    call.session.quit()
-
-
-async def clear(call: Call) -> None:
-    call.words()
+def clear(call: Call) -> None:
     if call.session.front.clear is None:
         raise Diagnostic("no terminal is shown here", call.verb.name)
     call.session.front.clear()
 
 
-_TEXT = re.compile(r"""(?P<quote>["'])(?P<text>.+?)(?P=quote)(?:\s+(?P<seconds>\S+))?""")
-_VALUE = re.compile(r"(?P<condition>(?:@\S+\s+)?[^\s=!<>]+\s*[=!<>]=?\s*(?:\{[^{}]*\}|\S+))(?:\s+(?P<seconds>\S+))?")
+# The screen
 
 
-class Wait(NamedTuple):
-    """A wait as typed: for a text, for a value, or for drives that stand."""
-
-    limit: float
-    text: str = ""
-    value: waits.Condition | None = None
-    idle: bool = False
-    ended: bool = False
-    """However their motions ended."""
-
-
-def duration(verb: Operation, rest: str) -> float:
-    (text,) = words(verb, rest)
-    return waits.seconds(text, verb.wrong)
-
-
-def wanted_wait(verb: Operation, rest: str) -> Wait:
-    """Parse a wait. Raises Diagnostic."""
-    if match := _TEXT.fullmatch(rest):
-        return Wait(_limit(verb, match["seconds"]), text=match["text"])
-    if match := _VALUE.fullmatch(rest):
-        wanted = waits.condition(match["condition"])
-        if wanted is None:
-            raise verb.wrong(f"no condition {match['condition']}; valid: I1=1, @b P>=51200")
-        return Wait(_limit(verb, match["seconds"]), value=wanted)
-    match split(rest, verb.name):
-        case [("stopped" | "idle" | "ended") as state]:
-            return Wait(waits.LIMIT, idle=state == "idle", ended=state == "ended")
-        case [("stopped" | "idle" | "ended") as state, seconds]:
-            return Wait(_limit(verb, seconds), idle=state == "idle", ended=state == "ended")
-    raise verb.wrong()
-
-
-def _limit(verb: Operation, text: str | None) -> float:
-    return waits.LIMIT if text is None else waits.seconds(text, verb.wrong)
-
-
-async def sleep(call: Call) -> None:
-    await waits.sleep(duration(call.verb, call.rest))
-
-
-def with_drive(call: Call) -> str:
-    """Record the line, with the selected drive's address for a value."""
-    line = f"{call.verb.name} {call.rest}".strip()
-    if not _VALUE.fullmatch(call.rest) or call.rest.startswith("@"):
-        return line
-    target = call.session.qualified_address(call.session.drive())
-    return f"{call.verb.name} @{target} {call.rest}" if target else line
-
-
-async def wait(call: Call) -> None:
-    wanted = wanted_wait(call.verb, call.rest)
-    if wanted.text:
-        await waits.wait_text(call.session, wanted.text, wanted.limit)
-    elif wanted.value is not None:
-        drive, units = call.drive(wanted.value.target), call.session.units if wanted.value.quantity else None
-        await waits.wait_value(call.session, drive, wanted.value, wanted.limit, units)
-    else:
-        watch = await waits.wait(call.session, wanted.limit, idle=wanted.idle, ended=wanted.ended)
-        if wanted.ended:
-            ending = watch.worst
-            outcome = Outcome.REACHED if ending is None else ending[1].outcome
-            if (asked := OUTCOME.get()) is not None:
-                asked[:] = [outcome.value]
-            told = "" if ending is None else f" ({ending[1].described(call.session.display_name(ending[0]))})"
-            call.session.notify(f"outcome: {outcome.value}{told}", outcome=True)
-
-
-async def page(call: Call) -> None:
-    (name,) = call.words()
-    await _show(call, name)
-
-
-async def tour(call: Call) -> None:
-    call.words()
-    await _show(call, "tour")
-
-
-async def _show(call: Call, name: str) -> None:
+async def page(call: Call, name: PageName) -> None:
     if call.session.front.screen is None:
         raise Diagnostic("this front end has no screen", call.verb.name, "multidrop tui opens it")
     await call.session.front.screen(name)
+
+
+async def tour(call: Call) -> None:
+    await page(call, "tour")
 
 
 def _transcripts(call: Call) -> Transcripts:
@@ -175,12 +133,14 @@ def _transcripts(call: Call) -> Transcripts:
     return found
 
 
-async def times(call: Call) -> None:
+async def times(call: Call, form: Times = "") -> None:
+    import asyncio
+
+    from multidrop.shell import configuration
+    from multidrop.shell.events import By
+
     transcripts, forms = _transcripts(call), list(TIMES)
-    words = call.words()
-    form = words[0] if words else forms[(forms.index(transcripts.times()) + 1) % len(forms)]
-    if form not in TIMES:
-        raise call.wrong(f"no form {form}")
+    form = form or forms[(forms.index(transcripts.times()) + 1) % len(forms)]
     transcripts.set_times(form)
     kept = ""
     if call.by is By.OPERATOR:
@@ -191,28 +151,25 @@ async def times(call: Call) -> None:
     call.session.notify(f"times: {form}, {TIMES[form]}{kept}", warning=bool(kept))
 
 
-async def filter_(call: Call) -> None:
-    transcripts = _transcripts(call)
-    wanted = _wanted(call)
-    transcripts.choose(wanted)
-    call.session.notify(f"{wanted.words}; /filter off shows all" if wanted else "all lines are shown")
+def show_all(call: Call) -> None:
+    _filter(call, EVERYTHING)
 
 
-def _wanted(call: Call) -> Filter:
-    """The filter of a line. Raises Diagnostic."""
-    what, _, rest = call.rest.strip().partition(" ")
-    if what == "text":
-        if not rest.strip():
-            raise call.wrong()
-        return Filter(text=rest.strip())
-    words = call.words()
-    if words == ["off"]:
-        return EVERYTHING
-    targets = [word for word in words if word not in ("errors", "mine")]
-    if len(targets) > 1 or len({*words}) < len(words):
+def show_text(call: Call, text: Text) -> None:
+    _filter(call, Filter(text=text))
+
+
+def show_some(call: Call, shown: tuple[Shown, ...]) -> None:
+    targets = [word for word in shown if word not in ("errors", "mine")]
+    if len(targets) > 1 or len({*shown}) < len(shown):
         raise call.wrong()
     address = _address(call, targets[0]) if targets else ""
-    return Filter(address, "errors" in words, "mine" in words)
+    _filter(call, Filter(address, "errors" in shown, "mine" in shown))
+
+
+def _filter(call: Call, wanted: Filter) -> None:
+    _transcripts(call).choose(wanted)
+    call.session.notify(f"{wanted.words}; /filter off shows all" if wanted else "all lines are shown")
 
 
 def _address(call: Call, target: str) -> str:
@@ -225,100 +182,148 @@ def _address(call: Call, target: str) -> str:
     raise call.wrong(f"no drive {target} on {bus.name}" + (f"; valid: {named}" if named else ""))
 
 
-async def save(call: Call) -> None:
-    (file,) = call.words()
+async def save(call: Call, file: FileName) -> None:
     saved = await _transcripts(call).save(call.output_file(file))
     call.session.notify(saved, outcome=True)
 
 
 async def unsent(call: Call) -> None:
-    call.words()
     await _transcripts(call).offer_unsent()
 
 
-WIDTH = 28
-"""Columns for usages in the overview."""
+OPERATIONS = (
+    Operation(
+        stop,
+        verb="/stop",
+        group=STOPS,
+        immediate=True,
+        help="""
+Stop every drive on every bus, and macros, scripts and waits.
 
+Ctrl+X does the same from anywhere. Macros and scripts are refused until /resume.
+""",
+    ),
+    Operation(
+        resume, verb="/resume", group=STOPS, immediate=True, help="Let macros and scripts run again after a stop."
+    ),
+    Operation(
+        quit_,
+        verb="/quit",
+        group=STOPS,
+        immediate=True,
+        help="""
+End multidrop; drives go on as they are.
 
-async def help_(call: Call) -> None:
-    word, selected = call.word(), call.session.selected
-    language, product = (selected.family.language, selected.product) if selected else (None, "")
-    lines = explained(word, language, product) if word else overview()
-    if word and selected and call.session.scaled and selected.family.language.knows(word):
-        from multidrop.shell import setting_units
+At a terminal it first names the drives that move or may move, and asks.
+""",
+    ),
+    Operation(quit_, verb="/exit", group=STOPS, immediate=True, help="End multidrop, as /quit does."),
+    Operation(
+        help_,
+        verb="/help",
+        group=SCREEN,
+        immediate=True,
+        help="""
+Explain a verb, a command of the drives or an error number.
 
-        taken = setting_units.example(call.session.units, selected, word.upper())
-        lines = [*lines, f"  {'units':<10} {taken}"] if taken else lines
-    if call.session.front.page is not None:
-        call.session.front.page(lines)
-        return
-    for line in lines:
-        call.session.output(line, columns=True)
+Without a word it lists all verbs. A line without a slash goes to the selected drive, `@ADDR TEXT` to another
+drive, `@* TEXT` to all drives of a bus.
+""",
+    ),
+    Operation(
+        clear,
+        verb="/clear",
+        group=SCREEN,
+        fits=conditions.has_something_to_clear,
+        immediate=True,
+        help="""
+Empty the terminal; on the screen, the transcript of the selected bus.
 
+No drive notices. A log and the history keep their lines.
+""",
+    ),
+    Operation(
+        log,
+        verb="/log",
+        group=SCREEN,
+        immediate=True,
+        help="""
+Append everything typed, sent, received and printed to a file, in JSON lines with the time of day.
 
-def explained(word: str, language: Language | None, product: str = "") -> list[str]:
-    """Return the help on a verb, a command or an error number. Raises Diagnostic for what is none."""
-    if word.isdecimal() and word.isascii():
-        language = language or FAMILIES[DEFAULT].language
-        return language.describe_error(int(word[:9]), product)
-    return described(word, language, product)
+Without a word it shows the file. `multidrop log show` shows what is in it.
+""",
+    ),
+    Operation(
+        page,
+        verb="/page",
+        group=SCREEN,
+        fits=conditions.has_screen,
+        immediate=True,
+        help="""
+Show a page of the screen: /page drives shows all drives of all lines.
 
+Escape goes back. A name that is not a page is answered with the names of all.
+""",
+    ),
+    Operation(
+        tour,
+        verb="/tour",
+        group=SCREEN,
+        fits=conditions.has_screen,
+        immediate=True,
+        help="""
+Walk through the product in two minutes, on the demo cell.
 
-def overview() -> list[str]:
-    """All verbs in their groups, a line each; a long usage has a line of its own."""
-    lines: list[str] = []
-    for title, names in groups().items():
-        lines += ["", f"{title}:"] if lines else [f"{title}:"]
-        for each in map(VERBS.__getitem__, names):
-            if len(each.usage) > WIDTH:
-                lines.append(each.usage)
-            mark = "[screen] " * (each.fits in ON_SCREEN)
-            lines.append(f"{each.usage if len(each.usage) <= WIDTH else '':<{WIDTH}}  {mark}{each.lines[0]}")
-    lines += ["", "In scripts only:"]
-    for usage, meaning in SCRIPT_VERBS.values():
-        lines += [usage] if len(usage) > WIDTH else []
-        lines.append(f"{usage if len(usage) <= WIDTH else '':<{WIDTH}}  {meaning}")
-    return [*lines, "", "[screen]: only on the screen, which multidrop tui shows"]
+Each step names what to type or press, and goes on when it was done. Escape ends the tour.
+""",
+    ),
+    Operation(
+        times,
+        verb="/times",
+        group=SCREEN,
+        fits=conditions.has_transcript,
+        immediate=True,
+        help="""
+Show the times of lines in another form; without a word, in the next one.
 
+They are the time of day, seconds since the first line, seconds since the line above, or no times. The
+configuration keeps the form for the next start.
+""",
+    ),
+    Operation(
+        verb="/filter",
+        group=SCREEN,
+        fits=conditions.has_transcript,
+        help="""
+Show only some lines of the selected bus: /filter mine, /filter errors b, /filter text VX.
 
-def described(name: str, language: Language | None = None, product: str = "") -> list[str]:
-    """Return the help on a verb (with or without its slash) or a command, for a product where that matters.
+All lines are kept; /filter off shows them again. What you type from now on is shown with its replies, whatever
+the filter. Ctrl+F searches instead.
+""",
+    ),
+    Operation(show_all, verb="/filter off", immediate=True, help="show all lines"),
+    Operation(show_text, verb="/filter text", immediate=True, help="lines that hold a text"),
+    Operation(show_some, verb="/filter", immediate=True),
+    Operation(
+        save,
+        verb="/save",
+        group=SCREEN,
+        fits=conditions.has_transcript,
+        help="""
+Write the lines of the transcript that is shown to a new text file, with date and time.
 
-    Where a drive is selected, only its language is explained: a word may mean something else to another drive. Without
-    one (None) each language is. Raises Diagnostic for an unknown name.
-    """
-    if name.startswith("/") and name in VERBS:
-        verb = VERBS[name]
-        return [*verb.described(), *["Needs the screen, which multidrop tui shows."] * (verb.fits in ON_SCREEN)]
-    files = program_languages().items()
-    stored = {key: lines for key, each in files if (lines := each.editing.describe(name, product))}
-    also = f"/{name.lower()}"
-    more = [f"also: the verb {also}; help {also} explains it"] * (also in VERBS or also in SCRIPT_VERBS)
-    for each in [language] if language else languages():
-        if each.knows(name):
-            return [*each.describe(name, product), *more]
-    for key, lines in stored.items():
-        if language is FAMILIES[key].language:
-            return [*lines, *more]
-    if f"/{name}" in VERBS:
-        return described(f"/{name}")
-    word = name.lower() if name.startswith("/") else f"/{name.lower()}"
-    if word in SCRIPT_VERBS:
-        usage, meaning = SCRIPT_VERBS[word]
-        return [
-            usage,
-            f"{meaning[0].upper()}{meaning[1:]}.",
-            "In scripts only: multidrop run SCRIPT, or /play of a macro.",
-        ]
-    if language is None and stored:
-        return [*next(iter(stored.values()))]
-    if language and (others := [key for key, each in FAMILIES.items() if key in stored or each.language.knows(name)]):
-        raise Diagnostic(
-            f"this drive has no command {name}", "/help", f"multidrop help {name} --dialect {others[0]} explains it"
-        )
-    own = language or FAMILIES[DEFAULT].language
-    known = {key.removeprefix("/").upper(): key for key in (*SCRIPT_VERBS, *VERBS)}
-    known |= {} if name.startswith("/") else {each.upper(): each for each in own.names()}
-    near = difflib.get_close_matches(name.removeprefix("/").upper(), known, 3)
-    hint = f"similar: {', '.join(known[each] for each in near)}" if near else "/help lists the verbs"
-    raise Diagnostic(f"no verb or command {name}", "/help", hint)
+With a filter, these are the lines that it shows. It replaces no file. /log on keeps everything, from then on.
+""",
+    ),
+    Operation(
+        unsent,
+        verb="/unsent",
+        group=SCREEN,
+        fits=conditions.has_transcript,
+        help="""
+Offer the lines again that were held back by a failure before them, or dropped by a stop.
+
+Nothing is sent before you agree. They go to the drives for which they were typed.
+""",
+    ),
+)

@@ -1,55 +1,70 @@
-"""The work of `/units`: scales given, confirmed and listed; the display in units."""
+"""Operations on units: scales given, confirmed and listed; the display in units."""
 
 from __future__ import annotations
 
-from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
 from multidrop.base.errors import Diagnostic
-from multidrop.dialects.units import Takes, scale
-from multidrop.shell.verbs.call import Call
+from multidrop.shell.operations import arguments
+from multidrop.shell.operations.operation import Operation
+from multidrop.shell.operations.parameter import Argument, Listed
 
 if TYPE_CHECKING:
     from multidrop.drives.drive import Drive
+    from multidrop.shell.verbs.call import Call
 
 
-async def units(call: Call) -> None:
+GROUP = "Lines and drives"
+Shown = Annotated[str, Argument(words={"on": "show positions in units", "off": "show the drive's own numbers"})]
+Axis = Annotated[str, Argument(metavar="ADDR", listed=(Listed.DRIVE,))]
+MaybeAxis = Annotated[str, Argument(metavar="ADDR", listed=(Listed.DRIVE,), omitted="")]
+Number = Annotated[str, Argument(metavar="NUMBER")]
+Unit = Annotated[str, Argument(metavar="UNIT")]
+PerTurn = Annotated[str, Argument(metavar="UNIT/turn|UNIT/step", read=arguments.per_turn)]
+
+
+def list_(call: Call) -> None:
     session = call.session
-    match call.split():
-        case []:
-            found = [
-                (drive, axis)
-                for bus in session.buses.values()
-                for drive in bus.drives.values()
-                for axis in _axes(call, drive)
-            ]
-            for drive, axis in found:
-                session.output(_described(call, drive, axis))
-            if not found:
-                session.notify("no axis has a scale: /units ADDR 5 mm/turn gives it one", outcome=True)
-        case [("on" | "off") as word]:
-            session.units.shown = word == "on"
-            session.changed()
-        case ["here", *rest] if len(rest) in (2, 3):
-            drive, axis = _meant(call, "".join(rest[:-2]))
-            await session.units.here(drive, axis, " ".join(rest[-2:]))
-            session.output(_described(call, drive, axis))
-        case [target]:
-            drive, axis = _meant(call, target)
-            if axis not in _axes(call, drive):
-                raise Diagnostic(f"{target} has no scale", "/units", f"/units {target} 5 mm/turn gives it one")
-            await session.units.confirm(drive)
-            session.output(_described(call, drive, axis))
-        case [*target, _, unit] if len(target) < 2 and "/" in unit:
-            drive, axis = _meant(call, "".join(target))
-            await _give(call, drive, axis, " ".join(call.split()[-2:]))
-            session.output(_described(call, drive, axis))
-        case _:
-            raise call.wrong()
+    found = [
+        (drive, axis) for bus in session.buses.values() for drive in bus.drives.values() for axis in _axes(call, drive)
+    ]
+    for drive, axis in found:
+        session.output(_described(call, drive, axis))
+    if not found:
+        session.notify("no axis has a scale: /units ADDR 5 mm/turn gives it one", outcome=True)
+
+
+def show(call: Call, shown: Shown) -> None:
+    call.session.units.shown = shown == "on"
+    call.session.changed()
+
+
+async def here(call: Call, target: MaybeAxis, number: Number, unit: Unit) -> None:
+    drive, axis = _meant(call, target)
+    await call.session.units.here(drive, axis, f"{number} {unit}")
+    call.session.output(_described(call, drive, axis))
+
+
+async def confirm(call: Call, target: Axis) -> None:
+    drive, axis = _meant(call, target)
+    if axis not in _axes(call, drive):
+        raise Diagnostic(f"{target} has no scale", "/units", f"/units {target} 5 mm/turn gives it one")
+    await call.session.units.confirm(drive)
+    call.session.output(_described(call, drive, axis))
+
+
+async def give(call: Call, target: MaybeAxis, number: Number, unit: PerTurn) -> None:
+    drive, axis = _meant(call, target)
+    await _give(call, drive, axis, f"{number} {unit}")
+    call.session.output(_described(call, drive, axis))
 
 
 async def _give(call: Call, drive: Drive, axis: str, text: str) -> None:
     """Give an axis a scale; zero and travel of one of the same kind stay, but its places then need a reference."""
+    from dataclasses import replace
+
+    from multidrop.dialects.units import scale
+
     units = call.session.units
     given, before = scale(text, units.own), units.of(drive, axis)
     if before is not None and before.scale.kind == given.kind:
@@ -89,6 +104,8 @@ def _meant(call: Call, target: str) -> tuple[Drive, str]:
 
 def _described(call: Call, drive: Drive, name: str) -> str:
     """A scale in one line: `a: 5 mm/turn, 51200 a turn (MS=256, EE=0), travel 0 mm to 300 mm`."""
+    from multidrop.dialects.units import Takes
+
     session = call.session
     axis = session.units.of(drive, name)
     assert axis is not None  # it was listed
@@ -115,3 +132,23 @@ def _described(call: Call, drive: Drive, name: str) -> str:
     elif axis.measure is not None and not axis.sure:
         parts.append("not confirmed since a program ran")
     return f"{parts[0]}: {', '.join(filter(None, parts[1:]))}"
+
+
+OPERATIONS = (
+    Operation(
+        list_,
+        verb="/units",
+        group=GROUP,
+        help="""
+Give an axis a scale, or list the scales; on and off: show positions in units, or in the drive's numbers.
+
+/units a 5 mm/turn: the motor's turn; /units 00.x 0.4 um/step: the drive's count. A line then takes {12.5 mm},
+{50 mm/s}, {2 m/s2}. /units a takes the scale with the settings as they are now. /units here a 0 mm: the position
+at rest is 0 mm in this session.
+""",
+    ),
+    Operation(show, verb="/units"),
+    Operation(here, verb="/units here", help="the position at rest is this place from now on"),
+    Operation(confirm, verb="/units"),
+    Operation(give, verb="/units"),
+)

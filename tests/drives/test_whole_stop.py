@@ -222,6 +222,42 @@ async def test_the_whole_stop_is_written_where_the_loop_is_held_up_after_it_has_
     await bus.close()
 
 
+async def test_so_is_one_that_the_loop_has_begun_as_by_a_typed_line(monkeypatch):
+    bus, wire = await opened(*NUMBERS)
+    begin = bus.now()
+    bus.stop()
+    waiting = held_up(bus, monkeypatch)
+    await asyncio.sleep(4.0)
+    assert list(first(wire, begin)) == ["01", "02", "03"] and max(first(wire, begin).values()) < 0.25
+    whole = [stop_forms(bus.roster).immediate, *(each.data for each in stop_forms(bus.roster).repeats)]
+    assert [data for _, data in wire.written] == whole and wire.collisions == []
+    monkeypatch.undo()
+    for work in waiting:
+        work()
+    await bus.stopped()
+    await bus.close()
+
+
+async def test_a_loop_that_is_held_up_again_and_again_leaves_no_piece_behind(monkeypatch, pacer):
+    bus, wire = await opened(*NUMBERS)
+    bus.stop_ahead()
+    bus.stop()
+    whole = [stop_forms(bus.roster).immediate, *(each.data for each in stop_forms(bus.roster).repeats)]
+    for pieces in range(2, len(whole) + 1):
+        with monkeypatch.context() as held:
+            held.setattr(pacing, "PACER", pacer)
+            waiting = held_up(bus, held)
+            async with asyncio.timeout(2.0):
+                while len(wire.written) < pieces or not wire.held:
+                    await asyncio.sleep(0.001)
+        for work in waiting:
+            work()
+    await bus.stopped()
+    sent = [data for _, data in wire.written if data[3:5] in (b"AB", b"SR")]
+    assert sent == whole and wire.collisions == []
+    await bus.close()
+
+
 async def test_a_loop_that_is_not_held_up_writes_the_pieces_itself():
     bus, wire = await opened(*NUMBERS)
     bus.stop_ahead()

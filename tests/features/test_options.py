@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import io
 import sys
-from argparse import Namespace
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, nullcontext
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import pytest
 
@@ -19,10 +19,26 @@ from multidrop.base.registry import Entry
 from multidrop.shell import hooks
 from multidrop.shell.configuration import Settings
 from multidrop.shell.hooks import Options
+from multidrop.shell.operations.parameter import Argument
 from multidrop.shell.relaying import Lent, lender, ports
 from multidrop.shell.session import Session
 from multidrop.tui import launch
 from tests.support.front_door import Called, Command, Done, at_terminal
+
+
+@dataclass(frozen=True, kw_only=True)
+class Other:
+    other: Annotated[bool, Argument("do something else")] = False
+
+
+@dataclass(frozen=True, kw_only=True)
+class One:
+    one: bool = False
+
+
+@dataclass(frozen=True, kw_only=True)
+class Two:
+    two: bool = False
 
 
 @pytest.fixture
@@ -69,11 +85,12 @@ def test_a_word_of_a_feature_that_is_no_command_is_none(word: str, multidrop: Co
 
 
 def test_an_option_runs_something_in_place_of_its_command(tmp_path: Path, add: Callable[..., None]) -> None:
-    def instead(chosen: Namespace) -> int | None:
-        return len(chosen.urls) if chosen.other else None
+    def instead(asked: Other, more: bool) -> int | None:
+        return 3 + more if asked.other else None
 
-    add(Options("tui", {"--other": "do something else"}, instead=instead, examples=("tui a --other",)))
-    assert at_terminal(tmp_path, "tui", "a", "b", "c", "--other") == Done(3, "", "")
+    add(Options("tui", Other, instead=instead, examples=("tui a --other",)))
+    assert at_terminal(tmp_path, "tui", "--other") == Done(3, "", "")
+    assert at_terminal(tmp_path, "tui", "a", "b", "c", "--other") == Done(4, "", "")
     helped = at_terminal(tmp_path, "tui", "--help").stdout
     assert "  --other         do something else\n" in helped and "  multidrop tui a --other\n" in helped
 
@@ -83,21 +100,21 @@ def test_options_put_something_around_the_screen(
 ) -> None:
     said = list[Any]()
 
-    def around(word: str) -> Callable[[Any, Namespace], Any]:
+    def around(word: str) -> Callable[[Any, Any], Any]:
         @contextmanager
-        def entered(app: Any, chosen: Namespace) -> Iterator[None]:
-            said.append((word, app, chosen.one))
+        def entered(app: Any, asked: Any) -> Iterator[None]:
+            said.append((word, app, asked))
             yield
             said.append(word)
 
         return entered
 
-    add(Options("tui", {"--one": "first"}, around=around("a")), Options("tui", {"--two": "then"}, around=around("b")))
+    add(Options("tui", One, around=around("a")), Options("tui", Two, around=around("b")))
     screen = Called(0)
     monkeypatch.setattr("multidrop.tui.launch.run", screen)
     assert at_terminal(tmp_path, "tui", "--one") == Done(0, "", "")
     with screen.calls[0][-1]("app"):
-        assert said == [("a", "app", True), ("b", "app", True)]
+        assert said == [("a", "app", One(one=True)), ("b", "app", Two())]
     assert said[2:] == ["b", "a"]
 
 

@@ -10,14 +10,22 @@ from multidrop.base import registry
 from tests.support.front_door import Command
 
 TEXT = """
+from dataclasses import dataclass
+from typing import Annotated
+
 from multidrop.base.feature import Feature
 from multidrop.shell.hooks import Options
+from multidrop.shell.operations.parameter import Argument
 
-async def opened(session, chosen):
-    if chosen.greet:
+@dataclass(frozen=True, kw_only=True)
+class Greeting:
+    greet: Annotated[bool, Argument("say hello")] = False
+
+async def opened(session, asked):
+    if asked.greet:
         session.output("hello")
 
-FEATURE = Feature("greeting", "greets", adds=(Options("shell", {"--greet": "say hello"}, opened=opened),))
+FEATURE = Feature("greeting", "greets", adds=(Options("shell", Greeting, opened=opened),))
 """
 
 

@@ -85,7 +85,7 @@ def test_a_command_by_others_that_fails_is_one_line_and_exit_code_2(tmp_path: Pa
 from multidrop.base.feature import Feature
 from multidrop.shell.operations.operation import Operation
 
-FEATURE = Feature("gate", "a gate", adds=(Operation(command="gate", meaning="open it", run=lambda chosen: 1 / 0),))
+FEATURE = Feature("gate", "a gate", adds=(Operation(lambda: 1 / 0, command="gate", meaning="open it"),))
 """
     write(tmp_path, "gate", text)
     done = multidrop("gate")
@@ -100,25 +100,33 @@ ADDED_BY = {"EndpointKind": "usb", "PlotTargets": "plot_files", "Pictures": "not
 @pytest.mark.parametrize(
     ("adds", "why"),
     [
-        ('Options("shell", {"--yes": "say yes"})', "ArgumentError: argument --yes: conflicting option string: --yes"),
-        ('Options("shell", {"--twin": "run one"})', "shell --twin is taken"),
+        ('Options("shell", Agreed)', "ArgumentError: argument --yes: conflicting option string: --yes"),
+        ('Options("shell", Twin)', "shell --twin is taken"),
+        ('Options("shell", Urls)', "shell: the name urls is taken"),
         ('Section("keys", (), "[keys]", read, dict)', "[keys] is taken"),
         ('Section("mqtt", (), "[mqtt]", read, dict)', "[mqtt] is taken"),
-        ('Operation(usage="/gate", work=read)', "/gate has no help"),
-        ('Operation(usage="/gate", help="Open.")', "/gate has no function"),
-        ('Operation(usage="gate", help="Open.", work=read)', "gate is no name of a verb or a command"),
-        ('Operation(usage=" ", work=read)', "an Operation has neither the usage of a verb nor a command"),
-        ('Operation(command="gate", run=read)', "gate has no meaning"),
+        ('Operation(read, verb="/gate")', "/gate has no help"),
+        ('Operation(verb="/gate", help="Open.")', "/gate has no function"),
+        ('Operation(read, verb="gate", help="Open.")', "gate is no name of a verb or a command"),
+        ('Operation(read)', "an Operation has neither a verb nor a command"),
+        ('Operation(read, command="gate")', "gate has no meaning"),
         ('Operation(command="gate", meaning="open it")', "gate has no function"),
-        ('Operation(command="gate", meaning="open it", run=read, examples=1)',
-         "TypeError: can only join an iterable"),
-        ('Options("send", {"--gate": "open it"})', "send takes no options of features; shell and tui do"),
-        ('Operation(usage="/gate", help="Open.", work=read), Operation(usage="/gate", help="Open.", work=read)',
-         "/gate is taken"),
+        ('Operation("read", command="gate", meaning="open it")', "gate has no function"),
+        ('Operation(read, command="gate", meaning="open it", examples=1)', "TypeError: can only join an iterable"),
+        ('Operation(read, verb="/stop now", help="Stop.")', "/stop is taken"),
+        ('Operation(read, verb="/if", help="Ask.")', "/if is taken"),
+        ('Operation(read, verb="/gate off", help="Close.", extends=True)', "multidrop has no verb /gate to extend"),
+        ('Operation(bare, verb="/gate", help="Open.")', "wide of bare has no annotation"),
+        ('Operation(unknown, verb="/gate", help="Open.")',
+         "the type of wide of unknown cannot be read: name 'Width' is not defined"),
+        ('Operation(many, command="gate", meaning="open it")', "many has **wide, which no line can give"),
+        ('Options("send", Twin)', "send takes no options of features; shell and tui do"),
+        ('Options("shell", read)', "TypeError: must be called with a dataclass type or instance"),
+        ('Operation(read, verb="/gate", help="Open."), Operation(read, verb="/gate", help="Open.")', "/gate is taken"),
         ('Lent("screen:", "a screen", read)', "relay screen: is taken"),
         ('EndpointKind("usbip", read)', "serve usbip: is taken"),
-        ('Forms("/plot", "--to FILE", "Plot.", {"--to": "there"})', "/plot --to is taken"),
-        ('PlotTargets((), (), "", "", "", read, read, read)', "the place of plots outside the screen is taken"),
+        ('Operation(to, verb="/plot", help="Plot.", extends=True)', "/plot --to is taken"),
+        ('PlotTargets("", "", "", read, read)', "the place of plots outside the screen is taken"),
         ('Pictures({"Session": read}, read)', "the live picture is taken"),
         ("Options", "TypeError: adds has the class Options, not an instance of it"),
     ],
@@ -128,17 +136,42 @@ def test_what_is_there_already_is_refused_and_said(adds: str, why: str, tmp_path
     if feature and feature not in THERE:
         pytest.skip(f"the feature {feature} is not in this copy of the tree")
     imports = """
+from dataclasses import dataclass
 from multidrop.api.notebooks import Pictures
 from multidrop.base.feature import Feature
 from multidrop.shell.hooks import Options
-from multidrop.shell.operations.operation import Forms, Operation
+from multidrop.shell.operations.operation import Operation
 from multidrop.shell.plot_targets import PlotTargets
 from multidrop.shell.relaying import Lent
 from multidrop.shell.sections import Section
 from multidrop.simulator.cell.endpoint_kinds import EndpointKind
 
-def read(*given):
+def read(given=None):
     pass
+
+def bare(call, wide):
+    pass
+
+def unknown(call, wide: "Width"):
+    pass
+
+def many(**wide):
+    pass
+
+def to(call, *, to: str = ""):
+    pass
+
+@dataclass(frozen=True, kw_only=True)
+class Agreed:
+    yes: bool = False
+
+@dataclass(frozen=True, kw_only=True)
+class Urls:
+    urls: bool = False
+
+@dataclass(frozen=True, kw_only=True)
+class Twin:
+    twin: bool = False
 
 """
     path = write(tmp_path, "gate", f'{imports}FEATURE = Feature("gate", "a gate", adds=({adds},))\n')
@@ -146,6 +179,7 @@ def read(*given):
     assert done.stderr == f"warning: the feature gate ({path}) cannot be loaded: {why}\n" and done.returncode == 0
 
 
+ENDS = "async def gate(call):\n    raise KeyboardInterrupt"
 VERB = """
 from multidrop.base.feature import Feature
 from multidrop.shell.operations.operation import Operation
@@ -153,19 +187,26 @@ from multidrop.shell.operations.operation import Operation
 print("imported")
 
 def gate(call):
-    pass
+    call.session.output("open")
 
 FEATURE = Feature("gate", "a gate", adds=(
-    Operation(usage="/gate", help="Open it.", work=gate),
-    Operation(command="log gate", meaning="log it", run=lambda chosen: 0),
+    Operation(gate, verb="/gate", help="Open it."),
+    Operation(lambda: 0, command="log gate", meaning="log it"),
 ))
 """
 
 
-def test_a_verb_that_is_not_async_is_one_line(tmp_path: Path, multidrop: Command) -> None:
+def test_a_verb_that_is_not_async_is_done(tmp_path: Path, multidrop: Command) -> None:
     write(tmp_path, "gate", VERB)
     done = multidrop("send", "sim:#press", "/gate")
-    assert (done.returncode, done.stderr) == (2, "imported\n/gate has no async function\n")
+    assert (done.returncode, done.stdout, done.stderr) == (0, "open\n", "imported\n")
+
+
+def test_a_verb_that_interrupts_itself_is_one_line(tmp_path: Path, multidrop: Command) -> None:
+    text = VERB.replace('print("imported")', "").replace('def gate(call):\n    call.session.output("open")', ENDS)
+    write(tmp_path, "gate", text)
+    done = multidrop("send", "sim:#press", "/gate")
+    assert (done.returncode, done.stderr) == (2, "the feature gate failed at gate.py:8: KeyboardInterrupt\n")
 
 
 def test_what_a_feature_prints_as_it_is_imported_is_no_reply(tmp_path: Path, multidrop: Command) -> None:

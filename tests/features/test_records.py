@@ -11,9 +11,9 @@ from multidrop.base import registry
 from multidrop.base.registry import IN_WHEEL
 from multidrop.dialects.families import Dialect
 from multidrop.shell.connect.scheme import NoLine, Scheme
-from multidrop.shell.hooks import AtSession, Options, Switch
-from multidrop.shell.operations.operation import Forms, Operation
-from multidrop.shell.operations.table import VERBS
+from multidrop.shell.hooks import AtSession, Options, Predicting, Switch
+from multidrop.shell.operations.operation import Operation
+from multidrop.shell.operations.table import VERBS, core
 from multidrop.shell.plot_targets import PlotTargets
 from multidrop.shell.relaying import Lent
 from multidrop.shell.sections import Section
@@ -22,10 +22,10 @@ from tests.support.paths import ROOT, THERE
 
 KINDS: tuple[type, ...] = (
     Switch,
+    Predicting,
     Operation,
     AtSession,
     Options,
-    Forms,
     PlotTargets,
     Pictures,
     Section,
@@ -48,21 +48,20 @@ def test_the_table_has_the_words_that_the_record_answers_to(name: str) -> None:
     record = registry.wheel(name)
     assert record is not None and record.name == name and record.meaning
     operations = [each for each in record.adds if isinstance(each, Operation)]
-    words = {word for each in operations for word in (each.name, each.command) if word}
+    words = {word for each in operations for word in ("" if each.extends else each.name, each.command) if word}
+    words |= {claim for each in operations if each.extends for claim in each.claims()}
     words |= {f"[{each.name}]" for each in record.adds if isinstance(each, Section)}
     words |= {f"{each.name}:" for each in record.adds if isinstance(each, Scheme)}
     words |= {claim for each in record.adds if isinstance(each, NoLine) for claim in each.claims()}
     words |= {f"{each.scheme}:" for each in record.adds if isinstance(each, EndpointKind)}
     options = [each for each in record.adds if isinstance(each, Options)]
-    words |= {f"{each.command} {notation.partition(' ')[0]}" for each in options for notation in each.arguments}
+    words |= {claim for each in options for claim in each.claims()}
     words |= {f"relay {each.name}" for each in record.adds if isinstance(each, Lent)}
-    words |= {f"{each.verb} {word}" for each in record.adds if isinstance(each, Forms) for word in each.words}
     words |= {word for each in record.adds for word in FUNCTIONS.get(type(each), ())}
     assert words == set(IN_WHEEL[name])
     assert all(isinstance(each, KINDS) for each in record.adds)
-    for each in operations:
-        assert each.meaning if each.command else each.help
-        assert callable(each.run) or not each.run, "a feature names its functions, not their places"
+    assert all(each.meaning for each in operations if each.command)
+    assert all(VERBS[each.name].help for each in operations if each.verb)
 
 
 @pytest.mark.parametrize("name", registry.FAMILIES)
@@ -76,11 +75,14 @@ def test_the_table_has_the_words_of_a_family(name: str) -> None:
     assert words == set(registry.FAMILIES[name])
 
 
-@pytest.mark.parametrize("forms", [each for record in registry.wheels() for each in record.adds if type(each) is Forms])
-def test_forms_of_a_verb_stand_before_its_own(forms: Forms) -> None:
-    verb = VERBS[forms.verb]
-    assert verb.usage.startswith(f"{forms.verb} [{forms.usage} | ") and verb.lines == forms.help.strip().split("\n")
-    assert [*verb.words][: len(forms.words)] == [*forms.words] != [*verb.words]
+FORMS = [each for each in registry.added(Operation) if each.extends]
+
+
+@pytest.mark.parametrize("form", FORMS, ids=[each.verb for each in FORMS])
+def test_a_form_of_a_feature_takes_the_place_of_the_verbs_own(form: Operation) -> None:
+    verb, own = VERBS[form.name], [each for each in core() if each.name == form.name]
+    assert verb.forms == (form, *(each for each in own if each.verb != form.verb)) and len(own) == len(verb.forms)
+    assert verb.lines == form.help.strip().split("\n")
 
 
 def test_each_extra_of_a_feature_is_one_of_the_wheel() -> None:

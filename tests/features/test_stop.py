@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import asyncio
 import threading
-from argparse import Namespace
 from collections.abc import AsyncIterator, Callable, Iterator
 from contextlib import AsyncExitStack, asynccontextmanager
 from pathlib import Path
@@ -19,10 +18,10 @@ from multidrop.base import registry
 from multidrop.base.errors import Stopped
 from multidrop.base.feature import Feature
 from multidrop.base.registry import Entry
+from multidrop.cli import parse
 from multidrop.drives.events import Changed
-from multidrop.shell import hooks
 from multidrop.shell.configuration import Settings
-from multidrop.shell.hooks import AtSession, Options
+from multidrop.shell.hooks import Added, AtSession, Options
 from multidrop.shell.operations.operation import Operation
 from multidrop.shell.session import Session
 from multidrop.simulator.cells import load
@@ -32,7 +31,7 @@ from multidrop.simulator.serving.running import RunningFloor
 from multidrop.transports import Transport
 from tests.support import foreign_features as foreign
 from tests.support.cell_session import TCP, CellSession, bus, party
-from tests.support.foreign_features import ASYNC, CALLS, NAMES
+from tests.support.foreign_features import ASYNC, CALLS, NAMES, Slowness
 
 PATIENCE = 10.0
 """s; far longer than a thread takes to write."""
@@ -177,11 +176,29 @@ async def test_a_feature_that_cannot_begin_is_a_warning_and_the_session_works(
 
 
 @pytest.mark.virtual
+@pytest.mark.parametrize("place", ["begin", *HOOKS])
+async def test_an_async_hook_is_a_warning_and_the_session_works(
+    place: str, tmp_path: Path, add: Callable[..., None]
+) -> None:
+    async def hook(_: Any) -> None:
+        """Take what it is called with."""
+
+    add(AtSession(hook if place == "begin" else lambda session: at_session(place)(session, hook)))  # type: ignore[arg-type]
+    cell = CellSession(tmp_path, bus("press", party("a")))
+    await asyncio.sleep(0)
+    why = "hook is async, and nothing awaits it; give a plain function, which may start a task"
+    assert cell.warned() == [f"the feature x cannot begin: {why}"]
+    async with cell:
+        await cell.session.run("@a PR P")
+        assert cell.printed() == ["0"]
+
+
+@pytest.mark.virtual
 async def test_a_verb_that_never_returns_ends_with_the_stop(tmp_path: Path, add: Callable[..., None]) -> None:
     async def forever(_: Any) -> None:
         await asyncio.Event().wait()
 
-    add(Operation(usage="/forever", help="Wait.", work=forever))
+    add(Operation(forever, verb="/forever", help="Wait."))
     async with CellSession(tmp_path, bus("press", party("a"))) as cell:
         await cell.session.run("SL 1000")
         verb = asyncio.create_task(cell.session.run("/forever"))
@@ -193,26 +210,23 @@ async def test_a_verb_that_never_returns_ends_with_the_stop(tmp_path: Path, add:
         assert cell.moving() == set()
 
 
-@pytest.mark.parametrize("kind", ["work", "checked", "fits"])
+@pytest.mark.parametrize("kind", ["do", "fits"])
 async def test_a_verb_that_holds_the_loop_up_delays_no_stop(
     kind: str, tmp_path: Path, add: Callable[..., None]
 ) -> None:
     held = Held()
 
     async def work(_: Any) -> None:
-        if kind == "work":
+        if kind == "do":
             held()
 
-    functions: dict[str, Any] = {"work": work, "checked": held, "fits": held}
-    verb = Operation(usage="/slow", help="Be slow.", work=work)._replace(**{kind: functions[kind]})
+    verb = Operation(work, verb="/slow", help="Be slow.", fits=held)
     add(verb)
     async with served(tmp_path) as session:
         thread, wrote = key_thread(session, held)
         match kind:
-            case "work":
+            case "do":
                 await session.run("/slow")
-            case "checked":
-                verb.check("")
             case _:
                 assert verb.fits is not None
                 verb.fits(session)
@@ -226,10 +240,10 @@ async def test_options_that_hold_the_loop_up_delay_no_stop(tmp_path: Path, add: 
     async def opened(*_: Any) -> None:
         held()
 
-    add(Options("shell", {"--slow": "be slow"}, opened=opened))
+    add(Options("shell", Slowness, opened=opened))
     async with served(tmp_path) as session:
         thread, wrote = key_thread(session, held)
-        await hooks.opened(session, Namespace(command="shell", twin=False))
+        await Added("shell", parse(["shell", "--slow"])).opened(session)
         await asyncio.to_thread(thread.join, PATIENCE)
         assert held.was_written and wrote
 

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import ast
+import inspect
 import traceback
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
@@ -12,6 +13,9 @@ import pytest
 import multidrop
 from multidrop import Session, connect
 from multidrop.api import threads
+from multidrop.api.programs import AsyncParameters, AsyncPrograms
+from multidrop.shell.operations.table import COMMANDS
+from tests.support.cases import for_each
 from tests.support.cell_session import bus, party
 from tests.support.paths import ROOT
 from tests.support.virtual import VirtualLoop
@@ -104,3 +108,24 @@ def test_a_checker_of_types_sees_no_module_that_has_every_name(room: str) -> Non
     for path in (ROOT / room).rglob("*.py"):
         found = [each.name for each in ast.parse(path.read_bytes()).body if isinstance(each, ast.FunctionDef)]
         assert "__getattr__" not in found, f"{path}: belongs under `if not TYPE_CHECKING`"
+
+
+@for_each(
+    "method, command",
+    [
+        (AsyncPrograms.download, "program download"),
+        (AsyncPrograms.upload, "program upload"),
+        (AsyncParameters.restore, "params restore"),
+        (AsyncParameters.backup, "params backup"),
+    ],
+)
+def test_a_call_has_the_arguments_of_its_operation(method: Callable[..., object], command: str) -> None:
+    """Under the same names, with the same defaults; `text` is what a file holds, `verify` is the other way round."""
+    declared = {each.name: each for each in COMMANDS[command].command_arguments}
+    for name, given in list(inspect.signature(method).parameters.items())[1:]:
+        if name == "text":
+            continue
+        operation = declared["no_verify" if name == "verify" else name]
+        if given.default is not inspect.Parameter.empty and name != "file":
+            expected = not operation.default if name == "verify" else operation.default
+            assert given.default == expected or not given.default and not expected, name

@@ -50,7 +50,7 @@ from multidrop.shell.operations.operation import Operation
 async def work(call):
     call.session.output("hi")
 
-FEATURE = Feature("{name}", "says hi", adds=(Operation(usage="{verb}", help="Say hi.", work=work),))
+FEATURE = Feature("{name}", "says hi", adds=(Operation(work, verb="{verb}", help="Say hi."),))
 """
 
 

@@ -7,8 +7,6 @@ import os
 import sys
 from importlib.metadata import PackageNotFoundError
 from pathlib import Path
-from types import SimpleNamespace
-from typing import Any
 from unittest import mock
 
 import pytest
@@ -296,8 +294,7 @@ def test_at_a_terminal_a_person_is_asked_once(file: Path, tmp_path: Path, typed:
     path = tmp_path / "r.txt"
     path.unlink(missing_ok=True)
     asking, said = Terminal("" if typed is None else f"{typed}\n"), io.StringIO()
-    chosen: Any = SimpleNamespace(output=str(path), yes=False)
     with mock.patch.multiple(sys, stdin=asking, stdout=Terminal(), stderr=said):
-        assert machine.report(chosen) == 0
+        assert machine.report(str(path), False) == 0
     assert path.exists() is written and said.getvalue().startswith(f"\nWrite the report to {path}? [y/N] ")
     assert said.getvalue().endswith(f"the report is in {path}\n" if written else "nothing was written\n")

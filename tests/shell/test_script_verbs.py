@@ -4,13 +4,13 @@ import pytest
 
 from multidrop.base.errors import Diagnostic
 from multidrop.dialects.families import FAMILIES
-from multidrop.shell.operations.table import SCRIPT_VERBS, VERBS, find
-from multidrop.shell.verbs.session import described, explained, overview
+from multidrop.shell.operations.table import VERBS, find, script_verbs
+from multidrop.shell.verbs.explaining import described, explained, overview
 
 
-@pytest.mark.parametrize("name", SCRIPT_VERBS)
+@pytest.mark.parametrize("name", script_verbs())
 def test_a_script_verb_has_help_with_and_without_its_slash(name: str) -> None:
-    usage, meaning = SCRIPT_VERBS[name]
+    usage, meaning = script_verbs()[name].usage, script_verbs()[name].help
     assert usage.split()[0] == name and name not in VERBS and not meaning.endswith(".")
     assert described(name)[0] == usage and meaning[1:] in described(name)[1]
     assert described(name.upper()) == described(name)

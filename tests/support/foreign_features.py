@@ -9,6 +9,7 @@ import ast
 from argparse import Namespace
 from collections.abc import Awaitable, Callable, Iterator, Mapping
 from contextlib import AsyncExitStack
+from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -27,11 +28,11 @@ from multidrop.dialects.families import Dialect
 from multidrop.dialects.usb import UsbModule
 from multidrop.shell import configuration, hooks, plot_targets, relaying
 from multidrop.shell.configuration import Settings
-from multidrop.shell.connect.scheme import NoLine, Scheme
+from multidrop.shell.connect.scheme import Connection, NoLine, Scheme
 from multidrop.shell.connect.schemes import local_ports
 from multidrop.shell.connect.urls import parse
-from multidrop.shell.hooks import AtSession, Options, Switch
-from multidrop.shell.operations.operation import Examples, Forms, Operation
+from multidrop.shell.hooks import Added, AtSession, Options, Predicting, Switch
+from multidrop.shell.operations.operation import Examples, Operation
 from multidrop.shell.operations.table import COMMANDS, VERBS
 from multidrop.shell.plot_targets import PlotTargets
 from multidrop.shell.relaying import Lent
@@ -42,7 +43,7 @@ from multidrop.simulator.declared import Demo, Simulated
 from multidrop.simulator.floor import Floor
 from multidrop.simulator.serving.endpoints import serve_bus
 from multidrop.simulator.serving.running import RunningFloor
-from multidrop.transports import Unreachable
+from multidrop.transports import Transport, Unreachable
 from multidrop.tui.app import look_troubles
 from tests.support.cell_session import bus, party
 from tests.support.paths import ROOT
@@ -59,9 +60,23 @@ class Slow(Scheme):
 
     name, prefix, example, meaning, port = "slow", "slow://", "slow://HOST:1", "a slow gateway", 1
 
+    async def open(self, connection: Connection, baud: int, within: float | None = None) -> Transport:
+        raise Unreachable(f"{connection.host}: never open")
+
 
 async def _work(*_: Any) -> None:
     """Do nothing."""
+
+
+def _do(where: object) -> None:
+    """Do nothing."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Slowness:
+    """What the options of a command are read into."""
+
+    slow: bool = False
 
 
 async def _served(*_: Any) -> list[str]:
@@ -72,7 +87,6 @@ PLAIN: Mapping[type, Any] = MappingProxyType(
     {
         AtSession: AtSession(lambda session: None),
         EndpointKind: EndpointKind("slow", _served),
-        Forms: Forms("/plot", "--slow", "Plot."),
         Demo: Demo("x"),
         Dialect: Dialect("slow", "x:SLOW"),
         Simulated: Simulated("slow", "x:SLOW", ("SLOW",)),
@@ -81,21 +95,25 @@ PLAIN: Mapping[type, Any] = MappingProxyType(
         Lent: Lent("slow:", "what is slow", lambda rest: None),
         NoLine: NoLine(("slow",), "it leads to no drives", "try another one"),
         Operation: Operation(
-            usage="/slow", help="Be slow.", work=_work, command="slow", meaning="be slow", run=lambda chosen: 0
+            _do,
+            verb="/slow",
+            at=lambda call: call,
+            help="Be slow.",
+            command="slow",
+            through=lambda work: work(None),
+            meaning="be slow",
         ),
-        Options: Options("shell", {"--slow": "be slow"}),
+        Options: Options("shell", Slowness),
         Pictures: Pictures({}, lambda readings: None),  # type: ignore[arg-type,return-value]
         PlotTargets: PlotTargets(
-            ("--to",),
-            (".slow",),
             "--to FILE.slow",
             "FILE.slow",
             "--to slow://h",
-            _work,
             lambda text: (text, _work),
             max,
         ),
         Scheme: Slow(),
+        Predicting: Predicting("nothing slow runs", "/slow on begins it"),
         Switch: Switch("slow", "/slow", "be slow", "be slow, or not", lambda session: False),
         Section: Section("slow", ("key",), "[slow]", lambda table, where: table, lambda found: found),
     }
@@ -113,7 +131,7 @@ async def _serve(session: Any, record: EndpointKind) -> Any:
 
 
 def _around(session: Any, record: Options) -> None:
-    with hooks.around(None, CHOSEN):
+    with Added("shell", CHOSEN).around(None):
         """The screen runs."""
 
 
@@ -132,20 +150,19 @@ CALLS: Mapping[tuple[type, str], Call] = {
     (EndpointKind, "open"): _serve,
     (EndpointKind, "remark"): lambda session, record: kind_of("slow").remark("slow://h:1"),  # type: ignore[union-attr,misc]
     (Lent, "lend"): lambda session, record: relaying.lender("slow:1").lend("1"),  # type: ignore[union-attr]
-    (Operation, "work"): lambda session, record: session.run("/slow"),
+    (Operation, "do"): lambda session, record: session.run("/slow"),
+    (Operation, "at"): lambda session, record: session.run("/slow"),
+    (Operation, "through"): lambda session, record: COMMANDS["slow"].command_work(Namespace()),
     (Operation, "recorded"): lambda session, record: session.run("/slow"),
-    (Operation, "checked"): lambda session, record: VERBS["/slow"].check(""),
     (Operation, "rows"): lambda session, record: VERBS["/slow"].described(),
     (Operation, "fits"): lambda session, record: VERBS["/slow"].offered(session),
-    (Operation, "run"): lambda session, record: COMMANDS["slow"].command_work(CHOSEN),
-    (Options, "prepare"): lambda session, record: hooks.prepare(session, CHOSEN),
-    (Options, "opened"): lambda session, record: hooks.opened(session, CHOSEN),
-    (Options, "instead"): lambda session, record: hooks.instead(CHOSEN),
+    (Options, "prepare"): lambda session, record: Added("shell", CHOSEN).prepare(session),
+    (Options, "opened"): lambda session, record: Added("shell", CHOSEN).opened(session),
+    (Options, "instead"): lambda session, record: Added("shell", CHOSEN).instead(False),
     (Options, "around"): _around,
     (Pictures, "html"): lambda session, record: notebooks.picture("Session", session),
     (Pictures, "live"): lambda session, record: notebooks.live(None),
     (Switch, "is_on"): lambda session, record: record.typed(session),
-    (PlotTargets, "begin"): lambda session, record: session.run("/plot x.slow"),
     (PlotTargets, "save"): lambda session, record: plot_targets.needed().save("x.slow"),
     (PlotTargets, "read"): lambda session, record: read_rrd("x.slow"),
     (Scheme, "parse"): lambda session, record: parse("slow://h:1"),
@@ -167,9 +184,7 @@ CALLS: Mapping[tuple[type, str], Call] = {
 """How the core comes to call each function, of a record by others that was added, in the loop of a session."""
 ASYNC = {
     (EndpointKind, "open"),
-    (Operation, "work"),
     (Options, "opened"),
-    (PlotTargets, "begin"),
     (Scheme, "open"),
 }
 """Those that are awaited."""
@@ -183,7 +198,10 @@ def broken(kind: type, name: str, function: Callable[..., Any]) -> Any:
         found = function(*given, **named)
         return await found if isinstance(found, Awaitable) else found
 
-    called = awaited if (kind, name) in ASYNC else function
+    def one(given: object = None) -> Any:
+        return function(given)
+
+    called = awaited if (kind, name) in ASYNC else one if kind is Operation else function  # which has no **named
     if kind is Scheme:
         return type("Broken", (Slow,), {name: lambda self, *given, **named: called(*given, **named)})()
     if (kind, name) == (Pictures, "html"):

@@ -8,10 +8,11 @@ from contextlib import asynccontextmanager
 from pathlib import Path
 
 import pytest
+from textual import events
 
 from multidrop.shell.session import Session
 from multidrop.tui.screens.dialogs import Confirm
-from tests.support.fake_session import FakeSession, demo_session
+from tests.support.fake_session import FakeSession, demo_session, on_screen
 from tests.support.pty_screen import PtyScreen, demo, on_a_pty
 from tests.support.real_screen import real_app
 
@@ -245,3 +246,14 @@ async def test_keys_count_at_once_behind_a_stop_that_closed_the_question_of_a_qu
         await screen.until(lambda: isinstance(screen.app.screen, Confirm))
         await screen.type(b"\x18PR P\r")
         assert (session.stops, session.sent, screen.exits) == (1, ["press:a PR P"], [])
+
+
+async def test_what_is_typed_once_the_end_is_accepted_is_taken_by_no_part_of_the_screen_and_named() -> None:
+    async with on_screen() as (pilot, app, session):
+        app.leaving.accept()
+        for key in (*"SL", "enter", *"PR"):
+            app.post_message(events.Key(key, "\r" if key == "enter" else key))
+        await pilot.pause()
+        assert (app.main.entry.value, session.lines) == ("", [])
+        named = app.leaving.named()
+        assert [text.rpartition(" ")[2] for text in named] == ["SL", "PR"], named

@@ -11,15 +11,21 @@ from typing import Any
 import multidrop.features.plot_files.plot
 import multidrop.features.publishing.feed
 import multidrop.features.twins.pair
+import multidrop.shell.macro_arguments
+import multidrop.shell.macro_changes
+import multidrop.shell.macro_recording
 import multidrop.shell.prompt.terminal_input
 import multidrop.shell.scripts.executor
 import multidrop.shell.snapshots
 import multidrop.shell.verbs.buses
 import multidrop.shell.verbs.call
-import multidrop.shell.verbs.drives
+import multidrop.shell.verbs.explaining
 import multidrop.shell.verbs.macros
 import multidrop.shell.verbs.programs
+import multidrop.shell.verbs.programs_in_drives
 import multidrop.shell.verbs.session
+import multidrop.shell.verbs.settings
+import multidrop.shell.verbs.waiting
 from multidrop.features.plot_files.request import PlotTarget
 
 

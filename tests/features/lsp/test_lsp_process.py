@@ -17,10 +17,9 @@ from pytest_lsp import client_capabilities
 from pytest_lsp.client import make_test_lsp_client
 
 from multidrop.base.errors import Diagnostic
-from multidrop.cli import run
+from multidrop.cli import parse, run
 from multidrop.features.lsp.server import Server
 from multidrop.features.lsp.serving import serve_port
-from multidrop.shell.operations.operation import add_arguments
 from multidrop.shell.operations.table import COMMANDS
 from tests.support.lsp_session import Editor
 from tests.support.processes import environment
@@ -117,7 +116,7 @@ def test_without_its_extra_it_says_what_to_install(
         monkeypatch.delitem(sys.modules, name)
     monkeypatch.setitem(sys.modules, "pygls", None)
     monkeypatch.setitem(sys.modules, "lsprotocol", None)
-    assert run(argparse.Namespace(run_by=COMMANDS["lsp"], personality="LMDCM", tcp=None)) == 2
+    assert run(parse(["lsp"])) == 2
     line = "the language server needs pygls, which is not installed; pipx install 'multidrop[lsp]'\n"
     assert capsys.readouterr().err == line
 
@@ -134,7 +133,7 @@ def test_without_its_extra_it_says_what_to_install(
 )
 def test_a_port_is_on_this_computer_unless_a_host_is_named(text: str, address: tuple[str, int] | None) -> None:
     parser = argparse.ArgumentParser(exit_on_error=False)
-    add_arguments(parser, COMMANDS["lsp"].arguments)
+    COMMANDS["lsp"].add_to(parser)
     if address is None:
         with pytest.raises(argparse.ArgumentError, match="valid: PORT or HOST:PORT"):
             parser.parse_args(["--tcp", text])

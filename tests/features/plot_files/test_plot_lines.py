@@ -9,13 +9,10 @@ from typing import Any
 import pytest
 
 from multidrop.__main__ import main
-from multidrop.base import registry
 from multidrop.base.errors import Diagnostic
 from multidrop.drives.events import Sample
 from multidrop.features.plot_files.plot import attach
-from multidrop.shell import plot_targets
 from multidrop.shell.events import OnBus
-from multidrop.shell.operations.operation import Forms
 from multidrop.shell.prompt.complete import complete
 from multidrop.shell.roles import Series
 from tests.support.cell_session import ETHERNET, CellSession, bus, party
@@ -55,11 +52,6 @@ def test_wrong_usage_of_the_command_is_one_line_and_exit_2(
         assert ended.code == 2
     done = capsys.readouterr()
     assert done.out == "" and named in done.err and done.err.count("\n") == 1
-
-
-def test_the_options_of_a_plot_are_those_of_its_forms() -> None:
-    (forms,) = (each for each in registry.added(Forms) if each.verb == "/plot")
-    assert (*forms.words,) == plot_targets.options()
 
 
 @pytest.mark.parametrize(

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import sys
-from argparse import Namespace
 from collections.abc import Callable, Sequence
 from datetime import datetime, timedelta
 from math import asin, pi
@@ -254,5 +253,5 @@ def test_a_cell_stays_as_it_is_where_the_output_is_lost(
     (tmp_path / "day.log").write_bytes(line_of(Entry(datetime.now().astimezone(), "log", "session of process 1")))
     monkeypatch.setattr(runner, "run", _done)
     monkeypatch.setattr(stdout, "dropped", ["the output cannot be written: No space left on device"])
-    assert command.run(Namespace(log=str(tmp_path / "day.log"), cell="sim:cell.toml", json=False)) == 0
+    assert command.run(str(tmp_path / "day.log"), "sim:cell.toml", False) == 0
     assert capsys.readouterr().err == "cell.toml is unchanged: its values could not be shown\n"

@@ -243,3 +243,17 @@ async def test_a_drive_has_the_name_of_its_address_and_a_sole_one_the_sole_name(
     drives = {each: SimpleNamespace(address=each, label="old") for each in addresses}
     label(SimpleNamespace(drives=drives), SimpleNamespace(labels=labels))
     assert [each.label for each in drives.values()] == names
+
+
+async def test_a_line_while_the_drives_are_looked_for_is_not_said_to_be_for_a_closed_bus(tmp_path):
+    (tmp_path / "cell.toml").write_text(bus("press", party("a")))
+    session = Session(Settings({}, tmp_path / "c", tmp_path / "s"))
+    opening = asyncio.ensure_future(session.open(f"sim:{tmp_path / 'cell.toml'}"))
+    while not session.buses:
+        await asyncio.sleep(0.001)
+    with pytest.raises(Diagnostic, match="no bus is ready yet") as caught:
+        await session.run("SL 20000")
+    assert "press is being opened" in str(caught.value)
+    await opening
+    await session.run("PR P")
+    await session.close()

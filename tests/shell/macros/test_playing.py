@@ -88,7 +88,10 @@ async def test_the_step_that_lasts_is_shown_however_fast_it_follows(shop: Shop) 
         (("@a MR 1", "/waitt stopped"), "macro m, step 2 ({file}:12): no verb /waitt"),
         (("@a MR 1", "/assert 1"), "macro m, step 2 ({file}:12): /assert: "),
         (("@a MR 1", "/play gone"), "macro m, step 2 ({file}:12): "),
-        (("@a MR 1", "/play inner --times 0"), "macro m, step 2 ({file}:12): /play: no number of rounds 0"),
+        (
+            ("@a MR 1", "/play inner --times 0"),
+            "macro m, step 2 ({file}:12): /play: 0 is not a number from 1 to 1000000000, or forever",
+        ),
         (("@a MR 1", "/play inner x=1"), "macro m, step 2 ({file}:12): macro inner: no line takes the value x"),
         (("@a MR 1", "/play inner n=30"), "macro m, step 2 ({file}:12): macro inner: invalid n = '30'"),
         (("@a MR 1", "/play m"), "macro m, step 2 ({file}:12): /play: m would call itself: m -> m; use /repeat"),

@@ -3,19 +3,17 @@ from types import SimpleNamespace
 import pytest
 
 from multidrop import cli
-from multidrop.base import registry
-from multidrop.base.on_demand import imported
 from multidrop.dialects.families import FAMILIES
 from multidrop.dialects.family import Family
 from multidrop.shell.channel import Front
 from multidrop.shell.connect.schemes import schemes
 from multidrop.shell.connect.urls import KEYS
-from multidrop.shell.operations.operation import Forms
+from multidrop.shell.operations.parameter import Listed
 from multidrop.shell.operations.table import VERBS
-from multidrop.shell.operations.usage import forms, is_placeholder
-from multidrop.shell.prompt.complete import PLACEHOLDERS, complete, hint, kind_of
+from multidrop.shell.prompt.complete import complete, hint
 from multidrop.simulator import USAGES
 from tests.support.cases import for_each
+from tests.support.paths import THERE
 
 BOTH = [("press", "a"), ("press", "b"), ("eth", "!")]
 
@@ -157,36 +155,17 @@ def test_verbs_are_offered_where_the_selected_drive_has_a_use_for_them(session):
         assert "/status" in offered() and ("/register" in offered()) is (family == "modbus")
 
 
-def test_every_placeholder_of_a_usage_is_completed_or_known_to_a_person_only():
+def test_every_argument_of_a_verb_is_completed_or_known_to_a_person_only():
     known_to_a_person = {
-        "NAME",
-        "NAME=VALUE",
-        "SECONDS",
-        "LABEL",
-        "PASSES",
-        "NUMBER",
-        "TEXT",
-        "ADDRESS",
-        "COUNT",
-        "=VALUE",
-        "N",
-        "COUNTS",
-        "STEPS",
-        "BYTE",
-        "MS",
-        "NAMES",
-        "UNIT",
-        "UNIT/turn",
-        "UNIT/step",
+        *('"TEXT" [SECONDS]', "ADDRESS [COUNT|=VALUE]", "BYTE ...", "COUNTS", "LABEL", "MS", "N", "NAME", "NAME,..."),
+        *("NAME=VALUE", "NUMBER", "PASSES", "SECONDS", "STEPS", "TEXT", "TEXT ...", "UNIT", "UNIT/turn|UNIT/step"),
+        *(("N|max", "[HOST:]PORT") if "plot_files" in THERE else ()),
     }
-    known_to_a_person |= {"TEXT", "WORD=VALUE", '"TEXT"'}
-    words = {word for verb in VERBS.values() for form in forms(verb.usage) for place in form for word in place.words}
-    found, known = {kind_of(word) for word in words if is_placeholder(word)}, {*PLACEHOLDERS, *known_to_a_person}
-    added = "".join(each.usage for each in registry.added(Forms))
-    assert found >= known and all(word in added for word in found - known)
-    for verb in VERBS.values():
-        literals = {word for form in forms(verb.usage) for place in form for word in place.words}
-        assert set(verb.words) <= literals, verb.name
+    arguments = [each for verb in VERBS.values() for form in verb.working for each in form.arguments if not each.flag]
+    assert {each.value for each in arguments if not each.argument.listed and not each.words} == known_to_a_person
+    for listed in Listed:
+        if listed is not Listed.BROKER:
+            assert any(listed in each.argument.listed for each in arguments), listed
 
 
 def test_every_word_of_sim_and_every_kind_of_url_is_in_help_and_usage():
@@ -196,22 +175,6 @@ def test_every_word_of_sim_and_every_kind_of_url_is_in_help_and_usage():
     told = "\n".join(VERBS["/open"].described())
     assert all(form.example in told and form.example in cli.urls() for form in schemes().values())
     assert all(key in cli.urls() for key in KEYS)
-
-
-@pytest.mark.parametrize(
-    ("usage", "lines"),
-    [
-        ("/x", [""]),
-        ("/x A|b [C]", ["A|b", "A|b C"]),
-        ("/x [A [--b] | c]", ["", "A", "A --b", "c"]),
-        ("/x A ... --b", ["A+ --b"]),
-        ("/x [[HOST:]PORT]", ["", "[HOST:]PORT"]),
-        ("/x B[:A] | c D", ["B[:A]", "c D"]),
-    ],
-)
-def test_a_usage_is_read_as_its_forms(usage, lines):
-    found = [" ".join("|".join(each.words) + "+" * each.repeats for each in form) for form in forms(usage)]
-    assert found == lines
 
 
 @pytest.mark.parametrize(
@@ -229,10 +192,3 @@ def test_a_usage_is_read_as_its_forms(usage, lines):
 )
 def test_the_hint_narrows_with_what_is_typed(session, text, told):
     assert hint(session, text).startswith(told)
-
-
-@pytest.mark.parametrize("verb", VERBS.values(), ids=VERBS)
-def test_a_declaration_names_functions(verb):
-    named = [each for each in (verb.work, verb.recorded, verb.checked) if each not in ("", "typed")]
-    assert named and all(callable(verb.imported(each)) for each in named)
-    assert not verb.rows or callable(imported(verb.rows))

@@ -15,7 +15,7 @@ from multidrop.shell.macro_arguments import value_fields
 from multidrop.shell.prompt import prompt
 from multidrop.shell.prompt.terminal_input import PAUSE, at_terminal
 from multidrop.shell.prompt.view import PlainOutput
-from multidrop.shell.verbs.session import overview
+from multidrop.shell.verbs.explaining import overview
 from tests.support.typist import typist as typist_in
 from tests.support.until import until
 

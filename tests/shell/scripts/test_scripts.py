@@ -11,9 +11,9 @@ from multidrop.base.errors import Diagnostic, DriveError, Stopped
 from multidrop.macros import Macro, Step
 from multidrop.shell.batch.report import Report
 from multidrop.shell.exit_codes import exit_code
-from multidrop.shell.scripts.execution import CheckFailed
 from multidrop.shell.scripts.executor import run_script
 from multidrop.shell.scripts.reading import read_script
+from multidrop.shell.scripts.use import CheckFailed
 from multidrop.shell.streams.stdout import report
 from tests.support.cell_session import CellSession, bus, party, pmx
 

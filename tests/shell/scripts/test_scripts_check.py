@@ -118,7 +118,7 @@ def test_a_value_that_no_line_takes_is_refused_with_what_its_lines_take(check):
         ("/call gone.txt\n", "s.txt:1: gone.txt: cannot be read: No such file"),
         ("/call gone\n", "s.txt:1: /call: no file and no macro gone"),
         ("/call both\n", "s.txt:1: /call: both is a file and a macro"),
-        ("/call ok.txt x\n", "s.txt:1: /call: no value x; valid: NAME=VALUE"),
+        ("/call ok.txt x\n", "s.txt:1: /call: x is not NAME=VALUE"),
         ("/call ok.txt\n", "ok.txt:1: no value for {x}"),
         ("/call say\n", "s.txt:1: macro say, step 1: no value for {word}"),
         ("/call bad.txt\n", "bad.txt:1: no verb /slep; try /sleep"),

@@ -1,4 +1,4 @@
-"""`multidrop program check|test`: find the errors in program files; run them on a simulated drive in virtual time.
+"""`multidrop program check|test`: errors in program files, and runs on a simulated drive in virtual time.
 
 Prints, facts and summaries go to standard output, errors to standard error. With --json everything is an object on
 standard output.
@@ -6,49 +6,51 @@ standard output.
 
 from __future__ import annotations
 
-import argparse
 import sys
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from multidrop.base.errors import Diagnostic
 from multidrop.base.text import counted
 from multidrop.dialects.program_files import errors
-from multidrop.shell.programs.checking import Checked, examine, rewrite, to_run
+from multidrop.shell.operations.argument_types import Checking, Testing
+from multidrop.shell.programs.checking import USUAL, Checked, examine, rewrite, to_run
 from multidrop.shell.streams.stdout import fail, reader_left, shortened, write
 
 if TYPE_CHECKING:
     from multidrop.simulator.cell.spec import DriveSpec
 
-WRONG = 1
+WRONG = FAILED = 1
+"""The exit codes of files with errors, and of a test that failed."""
 MOST = 100
 """The largest number of problems of a file that are shown."""
 
 
-def check(chosen: argparse.Namespace) -> int:
+def check(files: Sequence[str], how: Checking) -> int:
     """Check the files in turn; return the highest exit code."""
     reported = dict[str, tuple[str, str]]()
-    if chosen.cell is not None:
-        spec = drive(chosen.cell, None)
-        chosen.personality, reported = spec.personality, {spec.personality: (spec.identity.version, spec.identity.part)}
-    return max(_check_file(file, chosen, reported) for file in chosen.files)
+    personality = how.personality or USUAL
+    if how.cell is not None:
+        spec = drive(how.cell, None)
+        personality, reported = spec.personality, {spec.personality: (spec.identity.version, spec.identity.part)}
+    return max(_check_file(file, personality, how, reported) for file in files)
 
 
-def _check_file(file: str, chosen: argparse.Namespace, reported: Mapping[str, tuple[str, str]]) -> int:
+def _check_file(file: str, personality: str, how: Checking, reported: Mapping[str, tuple[str, str]]) -> int:
     try:
-        checked = examine(file, chosen.personality, chosen.language, reported)
-        _report(checked, chosen.json)
-        if chosen.format:
+        checked = examine(file, personality, how.language, reported)
+        _report(checked, how.json)
+        if how.format:
             rewrite(checked)
     except Diagnostic as problem:
         return fail(problem)
-    if chosen.json:
+    if how.json:
         fact = {"file": checked.file, "errors": len(errors(checked.problems)), "summary": checked.facts}
-        _write_fact({**fact, "formatted": checked.respelled} if chosen.format else fact)
+        _write_fact({**fact, "formatted": checked.respelled} if how.format else fact)
     elif checked.right:
         count = counted(checked.respelled, "line")
-        write(sys.stdout, f"{checked.file}: {checked.facts}" + (f"; {count} formatted" if chosen.format else ""))
+        write(sys.stdout, f"{checked.file}: {checked.facts}" + (f"; {count} formatted" if how.format else ""))
     return 0 if checked.right else WRONG
 
 
@@ -71,14 +73,10 @@ def _write_fact(fact: Mapping[str, object]) -> None:
     write(sys.stdout, json.dumps(fact))
 
 
-FAILED = 1
-
-
-def test(chosen: argparse.Namespace) -> int:
+def test(files: Sequence[str], how: Testing) -> int:
     """Test the files in turn; return the highest exit code."""
-    several = len(chosen.files) > 1
-    given = None if chosen.cell is None and chosen.personality is None else drive(chosen.cell, chosen.personality)
-    return max(_test(file, chosen, given, several) for file in chosen.files)
+    given = None if how.cell is None and how.personality is None else drive(how.cell, how.personality)
+    return max(_test(file, how, given, len(files) > 1) for file in files)
 
 
 def drive(cell: str | None, personality: str | None) -> DriveSpec:
@@ -96,24 +94,24 @@ def drive(cell: str | None, personality: str | None) -> DriveSpec:
     return spec if personality is None else replace(spec, personality=personality)
 
 
-def _test(file: str, chosen: argparse.Namespace, given: DriveSpec | None, several: bool) -> int:
+def _test(file: str, how: Testing, given: DriveSpec | None, several: bool) -> int:
     from multidrop.simulator.families import PROGRAMS
     from multidrop.simulator.program_events import Debugging
 
     began = time.perf_counter()
     head = {"file": file} if several else {}
-    debugging = Debugging(chosen.trace, chosen.breaks, chosen.watch)
+    debugging = Debugging(how.trace, how.breaks, how.watch)
     failed = False
     try:
-        text, language = to_run(file, chosen.language or "")
+        text, language = to_run(file, how.language)
         programs = PROGRAMS[language]
         loaded = programs.read(text, file)(given or programs.drive)
-        if several and not chosen.json:
+        if several and not how.json:
             write(sys.stdout, f"{file}:")
-        for event in loaded.run(chosen.run, chosen.until, debugging):
+        for event in loaded.run(how.run, how.until, debugging):
             failed = failed or event.failed
             real = time.perf_counter() - began
-            if chosen.json:
+            if how.json:
                 _write_fact(head | event.fact(real))
             else:
                 for line in event.lines(file, real):
