@@ -20,22 +20,25 @@ from multidrop.families.lexium.manual.grammar import (
     parsed,
     tokens,
 )
-from multidrop.families.lexium.manual.mnemonic import Mnemonic
+from multidrop.families.lexium.manual.groups import (
+    DECLARING,
+    FORM_OF_LINES,
+    HOMINGS,
+    MOTIONS,
+    OPTIONED,
+    PRINTS_LINES,
+    RECOUNTING,
+    RESTORING,
+    SEVERAL,
+    SIGNS_OF_FAILURE,
+    STEPPING,
+)
+from multidrop.families.lexium.manual.mnemonic import Form, Mnemonic
 from multidrop.families.lexium.manual.statements import device_name
-from multidrop.families.lexium.manual.table import PRINTS_LINES, lookup
+from multidrop.families.lexium.manual.table import lookup
 
 WORD = re.compile(r"\s*([A-Za-z_]+)\s*=?\s*(.*)", re.S)
 BLANK = re.compile(r'\s*PR[\s,"]*;?', re.I)
-SLOW = {"S", "IP", "CP", "FD"}
-"""Words that write to flash memory; the drive replies late (MCode reference 5.1.113)."""
-WIRE = {"EM": r"[0-3]", "PY": r"[01]", "CK": r"[0-2]", "ES": r"[0-3]", "DN": r"[A-Za-z0-9]"}
-"""Communication settings, and the values that a drive accepts for them."""
-WHOLE = {"FD", "IP"}
-"""Words that restore all settings at once."""
-HOMINGS = {"HM", "HI"}
-STEPS = {"IC", "DC"}
-SCALE = {"P", "C1", "C2", "MS", "EE", "AS", "RD"}
-"""Words that change what positions count."""
 
 
 @dataclass(frozen=True)
@@ -59,18 +62,24 @@ def setting_of(text: str) -> Setting | None:
     statement = parsed(text)
     if statement is None:  # a drive may find a setting in a line that this grammar does not parse
         word, rest = word_of(text)
-        return Setting(word) if word in WHOLE or (word in WIRE and rest) else None
+        return Setting(word) if word in RESTORING or (word in FORM_OF_LINES and rest) else None
     word, arguments = statement.word, statement.arguments
-    if word in WHOLE:
+    if word in RESTORING:
         return Setting(word)
-    if word in STEPS and arguments and isinstance(arguments[0], Name) and arguments[0].word in WIRE:
+    if word in STEPPING and arguments and isinstance(arguments[0], Name) and arguments[0].word in FORM_OF_LINES:
         return Setting(arguments[0].word)
-    if word not in WIRE or not arguments:
+    if word not in FORM_OF_LINES or not arguments:
         return None
     value = _literal(word, arguments[0]) if len(arguments) == 1 else None
     if value is None:
         return Setting(word)
-    return Setting(word, value) if re.fullmatch(WIRE[word], value) else None
+    return Setting(word, value) if _takes(word, value) else None
+
+
+def _takes(word: str, value: str) -> bool:
+    """Whether drives accept a literal for a communication setting; the literal of DN is a name that they take."""
+    row = lookup(word)
+    return row is not None and (row.setup.form is Form.TEXT or row.accepts(int(value))) and value != ""
 
 
 def _literal(word: str, argument: Argument | None) -> str | None:
@@ -115,7 +124,7 @@ def acts_on_program(text: str) -> bool:
     if statement is None or kind_of(text) in (Kind.PRINT, Kind.LIST):
         return statement is None
     row = lookup(statement.word)
-    sets = bool(statement.arguments) and (row is None or row.kind in ("variable", "flag") or row.name == "BP")
+    sets = bool(statement.arguments) and (row is None or row.valued or row.name == "BP")
     return not sets or (row is not None and row.starts)
 
 
@@ -128,10 +137,6 @@ def starts_motion(text: str) -> bool:
         return True
     row = lookup(statement.word) if statement is not None else None
     return statement is not None and (row is None or row.starts)
-
-
-MOTIONS = frozenset({"MA", "MR", "SL", "HM", "HI"})
-"""Instructions that start one motion. After it nothing moves by itself."""
 
 
 @lru_cache(maxsize=256)
@@ -176,8 +181,6 @@ def refused_by_tables(text: str, product: str) -> bool:
 
 
 OF_DEFINITIONS = frozenset({E.NAME_EXISTS, E.NAME_IS_COMMAND, E.NAME_TABLE_FULL})
-DEFINE = frozenset({"VA", "LB"})
-MOVES = MOTIONS - HOMINGS
 OF_MOVES = errors.BY_ITSELF | {
     E.OUT_OF_RANGE,
     E.ILLEGAL_DATA,
@@ -222,16 +225,16 @@ def may_cause(text: str, code: int, product: str) -> bool:
     if uses_own_name(text):
         return True
     if code in OF_DEFINITIONS:
-        return statement.word in DEFINE
+        return statement.word in DECLARING
     row = lookup(statement.word, product)
-    if code in OF_NO_SETTING and row is not None and row.kind in ("variable", "flag") and statement.arguments:
+    if code in OF_NO_SETTING and row is not None and row.valued and statement.arguments:
         return False
-    return code != E.NO_SUCH_NAME and (statement.word not in MOVES or code in OF_MOVES)
+    return code != E.NO_SUCH_NAME and (statement.word not in MOTIONS - HOMINGS or code in OF_MOVES)
 
 
 def may_displace(text: str) -> bool:
     """Whether a line may change where the drive goes, or what its positions count."""
-    return starts_motion(text) or written_word(text) in SCALE
+    return starts_motion(text) or written_word(text) in RECOUNTING
 
 
 @lru_cache(maxsize=256)
@@ -246,7 +249,7 @@ def written_word(text: str) -> str:
     if statement is None or not statement.arguments or statement.word == "PR":
         return ""
     first = statement.arguments[0]
-    return first.word if statement.word in STEPS and isinstance(first, Name) else statement.word
+    return first.word if statement.word in STEPPING and isinstance(first, Name) else statement.word
 
 
 def target_of(text: str, rest: int | None) -> int | None:
@@ -274,12 +277,6 @@ INTEGER = r"-?\d{1,10}"
 INTEGERS = r"-?\d[\d-]*"
 """Several values without separators."""
 FREE = r"[ -~]*"
-OPTIONED = {"IT", "VT"}
-"""Words that take a number as an option."""
-SEVERAL = OPTIONED | {"LS", "TA", "TC", "TI", "TM", "TP", "TR", "TT"}
-"""Words that print several values."""
-CLEARED = {"ER", "ST"}
-"""Words that a drive clears when it prints them (5.1.40, 5.1.120)."""
 _ESCAPE = re.compile(r"\\(.?)", re.S)
 _CODES = {"r": "", "t": r"\t?", "b": r"[\b]?", "e": r"\x1b?", "g": r"\x07?", "c": r"\x03?"}
 
@@ -334,7 +331,7 @@ def plain_form(text: str) -> str | None:
     if statement is None or statement.quiet or not isinstance(statement.arguments[-1], Name):
         return None
     words = [each.word for each in statement.arguments if isinstance(each, Name)]
-    rows = [lookup(word) for word in words if word not in CLEARED]
+    rows = [lookup(word) for word in words if word not in SIGNS_OF_FAILURE]
     plain = all(isinstance(each, (Name, Text)) for each in statement.arguments)
     whole = len(rows) == len(words) and all(row is not None and _is_whole_number(row) for row in rows)
     return print_form(text) if plain and whole else None
@@ -368,4 +365,4 @@ def _item_form(item: object) -> str:
 
 
 def _is_whole_number(row: Mnemonic) -> bool:
-    return row.kind in ("variable", "flag") and row.whole and row.name not in SEVERAL
+    return row.valued and row.whole and row.name not in SEVERAL

@@ -31,10 +31,13 @@ from multidrop.dialects.state import DriveState, who
 from multidrop.dialects.values import Value
 from multidrop.families.lexium.host import classify
 from multidrop.families.lexium.host.errors import described, earlier_error
-from multidrop.families.lexium.manual import errors, points
+from multidrop.families.lexium.manual import errors, groups, points
 from multidrop.families.lexium.manual.errors import ErrorNumber as E
 from multidrop.families.lexium.manual.grammar import Number, Statement, parsed
+from multidrop.families.lexium.manual.groups import RECOUNTING, RESTORING, those
+from multidrop.families.lexium.manual.mnemonic import Mnemonic, Motion, Quantity
 from multidrop.families.lexium.manual.points import CAUSE
+from multidrop.families.lexium.manual.table import lookup
 
 AXIS = ""
 ONLY = frozenset({AXIS})
@@ -44,10 +47,10 @@ SIGNS = ("EF", "MV", "BY", "ST", "P", "AF", "TE", LOST)
 """What is read before a motion."""
 END = ("EF", "BY", "MP", "ST", "EE", "P", "DB", "AF", "AS")
 """What is read at its end."""
-FLAGS = frozenset({"EF", "MV", "BY", "MP", "ST", "EE", "JE", "FL", "LK", "DE"})
+FLAGS = those(lambda row: row.kind == "flag")
 """Those of one digit: no separator follows them, as a line has at most 64 characters."""
-FREE = ("TE", "JE", "FL")
-"""What lets a drive move without a line of ours: armed trips, jog inputs, a clock that it follows."""
+FREE = sorted(groups.FREE, reverse=True)
+"""What lets a drive move without a line of ours; TE first, which may have several digits."""
 TORQUE = 3
 """The value of AS without targets."""
 CLOSED_LOOP = (1, 2)
@@ -88,15 +91,6 @@ GO = 4
 """The type of an input that starts the program at address 1 (5.1.64)."""
 RUNS = ("BY", "TE")
 """Not 0: a program runs, or a trip may start one; a trip disarms itself (5.1.125)."""
-MOVES = {"MA", "MR"}
-HOMINGS = {"HM", "HI", "HF"}
-PROGRAMS = {"EX", "CL", "BR"}
-WITHOUT_TARGET = {"AS": (TORQUE,), "JE": (1,), "FL": (1,), "SC": (1,)}
-"""Words that with one of these values start, or let inputs start, motion without a target."""
-CLEARED = {"ER", "ST"}
-"""Words whose value is a sign of a failure, which a line clears that sets it."""
-REFERS = {"IP", "FD"}
-"""Words after which a target is not known any more: they set what positions count."""
 
 
 def effect(state: DriveState, text: str) -> Effect:
@@ -104,33 +98,45 @@ def effect(state: DriveState, text: str) -> Effect:
     statement = parsed(text)
     if statement is None:
         return NOTHING
-    word, value = statement.word, _whole(statement)
-    if word in MOVES:
-        absolute, relative = (value, None) if word == "MA" else (None, value)
-        return Effect(begins=(Move(MoveKind.POSITION, AXIS, absolute, relative),))
-    if word == "SL":
-        # A velocity that is not a number may be 0.
-        slew = Move(MoveKind.VELOCITY, AXIS, endless=value is not None)
-        return Effect(ends=ONLY) if value == 0 else Effect(begins=(slew,))
-    if word in HOMINGS and statement.arguments:
-        return Effect(begins=(Move(MoveKind.HOMING, AXIS),))
-    if word in PROGRAMS:
-        return Effect(begins=(Move(MoveKind.PROGRAM, AXIS),))
-    if word in WITHOUT_TARGET and value in WITHOUT_TARGET[word]:
+    row, value = lookup(statement.word, state.product), _whole(statement)
+    if row is not None and (made := _of_instruction(row, statement, value)) is not None:
+        return made
+    if row is not None and value is not None and value == row.turns_at:
         return Effect(begins=(Move(MoveKind.VELOCITY, AXIS),))
-    if word == "PS":
-        return Effect(ends=ONLY)
-    if word == "RS":  # what PS has paused goes on, perhaps to another target
-        return Effect(unknown=ONLY, resumes=True)
-    if word == "E":  # a motion that is under way goes on (5.1.35)
-        return Effect(halts=True)
-    if word == "CF" or classify.written_word(text) in CLEARED:
+    written = lookup(classify.written_word(text), state.product)
+    if written is not None and written.sign:
         return Effect(clears=True)
-    if classify.written_word(text) in FREE:
+    if written is not None and written.name in groups.FREE:
         return Effect(frees=True)
-    if word in REFERS or classify.written_word(text) in classify.SCALE:
+    if statement.word in RESTORING or (written is not None and written.name in RECOUNTING):
         return Effect(unknown=ONLY)
     return NOTHING
+
+
+def _of_instruction(row: Mnemonic, statement: Statement, value: int | None) -> Effect | None:
+    """What an instruction does to motion; None for other words."""
+    match row.motion:
+        case Motion.MOVE:
+            absolute, relative = (value, None) if row.quantity is Quantity.PLACE else (None, value)
+            return Effect(begins=(Move(MoveKind.POSITION, AXIS, absolute, relative),))
+        case Motion.SLEW if value == 0:
+            return Effect(ends=ONLY)
+        case Motion.SLEW:
+            # A velocity that is not a number may be 0.
+            return Effect(begins=(Move(MoveKind.VELOCITY, AXIS, endless=value is not None),))
+        case Motion.HOMING if statement.arguments:
+            return Effect(begins=(Move(MoveKind.HOMING, AXIS),))
+        case Motion.PROGRAM:
+            return Effect(begins=(Move(MoveKind.PROGRAM, AXIS),))
+        case Motion.PAUSE:
+            return Effect(ends=ONLY)
+        case Motion.END:  # a motion that is under way goes on (5.1.35)
+            return Effect(halts=True)
+        case Motion.RELEASE:
+            return Effect(clears=True)
+        case Motion.RESUME:  # what was paused goes on, perhaps to another target
+            return Effect(unknown=ONLY, resumes=True)
+    return None
 
 
 def _whole(statement: Statement) -> int | None:

@@ -8,6 +8,7 @@ from multidrop.dialects.codec import Procedure
 from multidrop.dialects.family import Referencing
 from multidrop.dialects.state import OfDrive
 from multidrop.families.lexium.host import classify
+from multidrop.families.lexium.manual.groups import HOMINGS
 
 
 class LexiumOperations(OfDrive, ABC):
@@ -29,6 +30,6 @@ class LexiumOperations(OfDrive, ABC):
     def referencing(self, text: str) -> Referencing | None:
         """Find out whether a line homes the axis or sets its position; the same over Modbus."""
         word, rest = classify.word_of(text)
-        if word in classify.HOMINGS or (word == "P" and rest):
-            return Referencing("", word in classify.HOMINGS)
+        if word in HOMINGS or (word == "P" and rest):
+            return Referencing("", word in HOMINGS)
         return None

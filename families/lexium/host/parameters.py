@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 
 from multidrop.dialects.values import Change, Parameters, Readings, Value
 from multidrop.families.lexium.manual import parameter_plan
-from multidrop.families.lexium.manual.parameters import WIRE
+from multidrop.families.lexium.manual.groups import SCALES, WIRE
 
 
 class LexiumParameters(Parameters):
@@ -24,7 +24,7 @@ class LexiumParameters(Parameters):
         return parameter_plan.risk(name, value, now)
 
     def rescales(self, name: str) -> bool:
-        return name in parameter_plan.SCALE
+        return name in SCALES
 
     def steps(
         self, present: Readings, wanted: Mapping[str, Value], withheld: Mapping[str, str], cannot: dict[str, str]

@@ -15,23 +15,15 @@ from fractions import Fraction
 from multidrop.dialects.codec import Request
 from multidrop.dialects.units import VALUE, Basis, Field, Takes, Units
 from multidrop.families.lexium.host import classify
-from multidrop.families.lexium.manual.mnemonic import EVERY, MDRIVE_PLUS
+from multidrop.families.lexium.manual.groups import MOVES, RECOUNTING, RESTORING, ROWS, SCALES
+from multidrop.families.lexium.manual.mnemonic import EVERY, MDRIVE_PLUS, Quantity
 from multidrop.families.lexium.manual.table import lookup
 
-TAKES: Mapping[str, Takes] = {
-    "MA": Takes.PLACE,
-    "MR": Takes.DISTANCE,
-    "P": Takes.PLACE,
-    "SL": Takes.VELOCITY,
-    "VM": Takes.SPEED,
-    "VI": Takes.SPEED,
-    "A": Takes.ACCELERATION,
-    "D": Takes.ACCELERATION,
-}
-MOVES = ("MA", "MR")
-READS: Mapping[str, Takes] = {**{word: TAKES[word] for word in ("P", "VM", "VI", "A", "D")}, "V": Takes.VELOCITY}
-RESTS = ("MS", "EE", "AS", "RD", "SA", "EL")
-"""The settings that give a count its length and its sign."""
+_MEASURES = [(row, Takes[row.quantity.name]) for row in ROWS if row.quantity is not Quantity.NONE]
+TAKES: Mapping[str, Takes] = {row.name: takes for row, takes in _MEASURES if row.access in ("RW", "WO", "-")}
+"""What the number that a line gives to a word measures."""
+READS: Mapping[str, Takes] = {row.name: takes for row, takes in _MEASURES if row.access in ("RW", "RO", "RC")}
+"""What the number that PR prints for a word measures."""
 FULL_STEPS = 200
 LINES_LMD, COUNTS_MDI = 1000, 2048
 _LINE = re.compile(rf"\s*({'|'.join(TAKES)})\s*=?\s*{VALUE}\s*(?:,[^'`]*)?(?:['`].*)?", re.I)
@@ -40,7 +32,7 @@ _READ = re.compile(r"\s*PR\s*([A-Z]+)\s*", re.I)
 
 def rests_on(product: str) -> list[str]:
     """The settings that a product has of those; of an unknown one the one that every product has."""
-    return [word for word in RESTS if (row := lookup(word, product)) is not None and product in row.products] or ["MS"]
+    return [word for word in SCALES if (row := lookup(word, product)) is not None and product in row.products] or ["MS"]
 
 
 def counted(product: str, values: Mapping[str, str], full_steps: int | None) -> Basis:
@@ -73,11 +65,11 @@ class LexiumUnits(Units):
         return (Field("", TAKES[word], *found.span(2), word in MOVES),)
 
     def disturbs(self, text: str) -> Collection[str]:
-        counts = classify.written_word(text) in {*classify.SCALE, *RESTS}
-        return ("",) if counts or classify.word_of(text)[0] in classify.WHOLE else ()
+        counts = classify.written_word(text) in RECOUNTING
+        return ("",) if counts or classify.word_of(text)[0] in RESTORING else ()
 
     def recounts(self, request: Request) -> bool:
-        return classify.written_word(request.text) in RESTS or classify.word_of(request.text)[0] in classify.WHOLE
+        return classify.written_word(request.text) in SCALES or classify.word_of(request.text)[0] in RESTORING
 
     def reads(self, text: str) -> tuple[str, Takes] | None:
         found = _READ.fullmatch(text)

@@ -20,6 +20,7 @@ from multidrop.base.files import rows, split_lines
 from multidrop.dialects.program_files import Conversion, Problem
 from multidrop.families.lexium.manual import program_file
 from multidrop.families.lexium.manual.grammar import Number, Statement, parsed, statement_tokens
+from multidrop.families.lexium.manual.groups import EVERY_PLACE
 from multidrop.families.lexium.manual.help import out_of_range
 from multidrop.families.lexium.manual.points import FIRST_OUTPUT
 from multidrop.families.lexium.manual.program_checker import check
@@ -42,8 +43,6 @@ CALCULATED: Mapping[str, Callable[[int], object]] = {
 `outputs(13)` leaves the bits of outputs that the file sets up.
 """
 _CALCULATION = re.compile(r"([a-z]+)\((\d+)\)")
-PLACES = dict.fromkeys(("BP", "BR", "CL", "CP", "EX", "L", "OE", "TC"), 0) | dict.fromkeys(("TI", "TP", "TR", "TT"), 1)
-"""The words with a place in the program, and its position among their arguments. Lines of a Lexium have other ones."""
 STEPS_PER_MICROSTEP = 10_000
 """VM and SL of a Lexium are at most MS times this."""
 
@@ -117,7 +116,7 @@ class _Converter:
         return Conversion(self.end.join(self.raw), self.changes, self.refused, inserted)
 
     def _line(self, line: ProgramLine, statement: Statement) -> None:
-        at = PLACES.get(statement.word)
+        at = EVERY_PLACE.get(statement.word)
         place = statement.arguments[at] if at is not None and len(statement.arguments) > at else None
         if isinstance(place, Number) and place.value not in self.places:
             self._refuse(line, f"{line.text}: address {place.value} is within a program", "give that line a label (LB)")

@@ -10,10 +10,11 @@ from multidrop.base.errors import Diagnostic
 from multidrop.base.files import split_lines
 from multidrop.dialects.editing import Block, EditingLanguage, Offer, Span, Use, UserName, Word, collected, last_line
 from multidrop.families.lexium.manual.grammar import NAME_FORM, Token, divided, is_name, statement_tokens, tokens
+from multidrop.families.lexium.manual.groups import EVERY_PLACE, TURNING
 from multidrop.families.lexium.manual.help import LANGUAGE, rows_offered
 from multidrop.families.lexium.manual.mnemonic import EVERY, Mnemonic
-from multidrop.families.lexium.manual.program_file import LONGEST, MOVES, ProgramLine, bare, remark_at, scan
-from multidrop.families.lexium.manual.program_flow import AT_POWER_UP, PLACES
+from multidrop.families.lexium.manual.program_file import LONGEST, ProgramLine, bare, remark_at, scan
+from multidrop.families.lexium.manual.program_flow import AT_POWER_UP
 from multidrop.families.lexium.manual.table import lookup
 
 STATEMENT, NEW, LABEL, PRINTED, VALUE = "statement", "new", "label", "printed", "value"
@@ -26,8 +27,6 @@ LABELS_AT: Mapping[str, tuple[bool, ...]] = {
     VALUE: (False,),
 }
 """The kinds of names at each place, in order: True for labels, False for variables."""
-_TARGETS: Mapping[str, int] = {**PLACES, "EX": 0}
-"""Words that take a label, and the number of commas before it."""
 
 
 def expected(before: str) -> str:
@@ -38,7 +37,7 @@ def expected(before: str) -> str:
     head, commas = found[0].text.upper(), sum(each.kind == "comma" for each in found)
     if head in ("LB", "VA"):
         return VALUE if head == "VA" and len(found) > 2 else NEW
-    if commas == _TARGETS.get(head) and found[-1].text in (found[0].text, "=", ","):
+    if commas == EVERY_PLACE.get(head) and found[-1].text in (found[0].text, "=", ","):
         return LABEL
     return PRINTED if head == "PR" else VALUE
 
@@ -127,7 +126,7 @@ class MCodeEditing(EditingLanguage):
         yield from (each.offer for each in names if (each.kind == "label") in LABELS_AT[place])
         for row in rows_offered(product) if place != LABEL else ():
             if _fits(row, place):
-                yield Offer(row.name, row.meaning, "starts" if row.name in MOVES else "word")
+                yield Offer(row.name, row.meaning, "starts" if row.name in TURNING else "word")
 
     def outline(self, text: str) -> list[Block]:
         """Return programs with their labels and variables, and the variables declared outside of programs."""

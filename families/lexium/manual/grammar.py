@@ -22,17 +22,13 @@ from typing import NamedTuple
 
 from multidrop.base.comments import grouped_at
 from multidrop.families.lexium.manual.errors import ErrorNumber
+from multidrop.families.lexium.manual.groups import FUNCTIONS, JOINED
 from multidrop.families.lexium.manual.table import MDRIVE, MNEMONICS, lookup
 
-FUNCTIONS = frozenset({"AB", "CS", "C_", "LO", "L_", "SI", "SQ", "S_", "TG", "T_"})
-"""Words that precede their operand (manual 5.2.15 to 5.2.25)."""
 COMPARISONS = frozenset({"=", "<>", "<", "<=", ">", ">="})
 SUMS = frozenset({"+", "-", "*", "/"})
 LOGIC = frozenset({"&", "|", "^"})
 OPERATORS = SUMS | LOGIC
-TAKES_NAME = frozenset({"BP", "BR", "CL", "CP", "DC", "EX", "IC", "IV", "LB", "OE", "PR", "VA"})
-"""Instructions whose first argument may be a name, so that the name may follow without a space."""
-
 
 READ_LINES = 4096
 """The number of lines that are kept as they were read: session, codec and conversation ask for the same one."""
@@ -298,7 +294,7 @@ def divided(found: list[Token], names: Container[str]) -> list[Token]:
         if first[-1].isdigit():  # `R15` is not `R1 5`, and `D15` may be a typing error
             return found
         digits = rest.isdigit() and not (equals and is_name(word))
-        if digits or (first in TAKES_NAME and (is_name(rest) or lookup(rest))):
+        if digits or (first in JOINED and (is_name(rest) or lookup(rest))):
             kind = "number" if rest.isdigit() else "word"
             tail = Token(kind, head.text[length:], head.start + length)
             return [Token("word", head.text[:length], head.start), tail, *found[1:]]

@@ -1,4 +1,4 @@
-"""The lines of MCode that a person must agree to before they are sent: `guards.csv` has their words.
+"""The lines of MCode that a person must agree to before they are sent: the rows of their words say what they do.
 
 A guarded line erases, takes the drive out of reach, or starts it in a way that its word does not show. A stop is never
 guarded. (MCode reference 5.1.6, 5.1.9, 5.1.23, 5.1.33, 5.1.45, 5.1.63, 5.1.75, 5.1.105, 5.1.133.)
@@ -13,36 +13,22 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Mapping
 
-from multidrop.base.files import rows
 from multidrop.dialects.family import ADDRESSES, EVERYONE, Guard, Protection, to_all
 from multidrop.families.lexium.manual.grammar import LineError, Name, Number, Text, parse, parsed
+from multidrop.families.lexium.manual.groups import ENDING_AT_0, GUARDED, STOPPING_AT_0
 from multidrop.families.lexium.manual.mnemonic import ETHERNET
 from multidrop.families.lexium.manual.program_file import bare
 from multidrop.families.lexium.manual.table import MNEMONICS, lookup, words
 
-_ROWS = list(rows(__file__, "guards.csv"))
-AT_ONCE: Mapping[str, str] = {row["word"]: row["what"] for row in _ROWS if not row["value"]}
-"""Instructions, with or without a value."""
-SETTINGS: Mapping[str, str] = {row["word"]: row["what"] for row in _ROWS if row["value"]}
-"""Settings, where a value is written."""
 RESETS = "prints Ctrl+C: every drive of the party line that hears it resets"
 NAMES: Mapping[str, str] = {
-    **AT_ONCE,
-    **SETTINGS,
+    **{word: row.guard for word, row in GUARDED.items()},
     "PR": rf"with \c {RESETS}",
     EVERYONE: "can start every drive of the line",
 }
 """Every guard, and what its lines do."""
-HARMLESS: Mapping[str, frozenset[int]] = {
-    row["word"]: frozenset(map(int, row["harmless"].split())) for row in _ROWS if row["harmless"]
-}
-"""The values of a setting that are not guarded; an expression may have any value, so it is."""
-STOPS_AT_0 = frozenset({"SL", "JE", "DE", "AS", "TQ"})
-"""Words whose 0 ends motion or torque: no address makes them a guarded line."""
-VELOCITIES = frozenset({"SL", "JE"})
-"""Those of them that leave the torque on."""
 _WORD = re.compile(r"\s*([A-Za-z]{2})(?![A-Za-z0-9])\s*=?\s*(.*)", re.DOTALL)
-_ANY = re.compile("|".join((*AT_ONCE, *SETTINGS, r"\\c")), re.IGNORECASE)
+_ANY = re.compile("|".join((*GUARDED, r"\\c")), re.IGNORECASE)
 _RESET = re.compile(r"(?<!\\)(?:\\\\)*\\c")
 _NAMED = re.compile(r"([!-~])[ \t]*(?=[A-Za-z])")
 
@@ -60,13 +46,14 @@ def find(text: str, *, address: str, party: bool, product: str, starts: Callable
         return None
     if word == "PR" and (party or name) and prints_reset(line):
         return Guard(word, f"'{line}' {RESETS}")
-    if word in AT_ONCE or (word in SETTINGS and value != "" and value not in HARMLESS.get(word, ())):
-        meaning = AT_ONCE.get(word) or SETTINGS[word]
+    row = GUARDED.get(word)
+    if row is not None and (not row.valued or (value != "" and value not in row.harmless)):  # an expression may be any
+        meaning = row.guard
         if word == "CP":
             meaning = _erased(line.removeprefix(name), product) or meaning
         return Guard(word, f"'{line}' {meaning}")
     if name in ADDRESSES or address in ADDRESSES:
-        stops = word in STOPS_AT_0 and value == 0
+        stops = word in STOPPING_AT_0 and value == 0
         sent = line.removeprefix(name) if name in ADDRESSES else line
         return to_all(line) if starts(sent) and not stops else None
     return None
@@ -133,7 +120,7 @@ def word_of(text: str, product: str = "") -> str:
 def only_ends(text: str) -> bool:
     """Whether a line is a command of motion that can only end it; one that takes torque away may let a load fall."""
     _, word, value = _head(bare(text), "")
-    return word in VELOCITIES and value == 0
+    return word in ENDING_AT_0 and value == 0
 
 
 def only_reads(text: str) -> bool:
@@ -185,7 +172,7 @@ def _word(text: str) -> str:
     """The variable or flag to which a line gives a value; empty: it gives none."""
     statement = parsed(text)
     row = lookup(statement.word) if statement is not None and statement.arguments else None
-    return row.name if row is not None and row.kind in ("variable", "flag") else ""
+    return row.name if row is not None and row.valued else ""
 
 
 ANOTHER = "another program or a PLC may hold the only connection that the drive serves: close it there; or "

@@ -18,11 +18,17 @@ from multidrop.dialects.values import (
     number,
     same,
 )
+from multidrop.families.lexium.manual import groups
 from multidrop.families.lexium.manual import parameters as manual
-from multidrop.families.lexium.manual.mnemonic import CLOSED_LOOP, EXPANDED, MDRIVE_PLUS
-from multidrop.families.lexium.manual.parameters import CLOCKS, COUNTED, SHARED, TORQUE, TRIPS, writable
+from multidrop.families.lexium.manual.mnemonic import CLOSED_LOOP, EXPANDED, MDRIVE_PLUS, Alone, Kept
+from multidrop.families.lexium.manual.parameters import CLOCKS, SHARED, TORQUE, writable
+from multidrop.families.lexium.manual.table import lookup
 
-IN_UNITS = COUNTED - {"MS"} | {"BL", "LS0", "LS1", "TP", "TR"}
+IN_UNITS = frozenset(
+    each
+    for word in groups.those(lambda row: row.unit_encoder != "" and row.kept is Kept.SAVED)
+    for each in ([f"{word}{n}" for n in groups.LISTS[word]] if word in groups.LISTS else [word])
+)
 """Settings in the unit of motion: steps or encoder counts."""
 FINEST = 256
 """The finest MS: it allows every velocity."""
@@ -30,8 +36,6 @@ PER_MICROSTEP = 10000
 """The highest velocity of a Lexium for each microstep of MS, steps/s."""
 LEAST_WITH_HMT = 10
 LONGEST_DELAY = 65535
-REMOVABLE = frozenset({"TA", "TC", "TM"})
-"""Trips that 0 removes."""
 _INPUT, _OUTPUT = frozenset({0, 1, 2, 3, 4, 5, 6, 7, 8, 11}), frozenset({16, 17, 18, 19, 20, 23})
 _CLOCK, _HMT = frozenset({13, 14, 15}), frozenset({21, 24, 25})
 _LEXIUM_TYPES = {
@@ -71,7 +75,7 @@ def impossible(name: str, value: Value, now: Mapping[str, Value | None], labels:
         return "torque mode (AS=3) fixes it"
     if not writable(value):
         return "a line cannot hold its digits"
-    if name not in TRIPS or (value == 0 and name in REMOVABLE):
+    if name not in groups.TRIPS or (value == 0 and name in groups.REMOVABLE):
         return ""
     if value == 0:
         return "a drive cannot forget a trip; FD does"
@@ -229,11 +233,11 @@ class Steps:
         self.changes.append(Change(name, before, value, manual.line(name, value, new), temporary))
         self.now[name] = value
         if name == "MS":
-            self.forget(COUNTED - {"MS"})
+            self.forget(groups.BANKED)
         if self.counting != counted:
             # Follow a change of the unit of motion: the other values come into force.
             locked = manual.locks_resolution(self.product)
-            self.forget(COUNTED if locked else COUNTED - {"MS"})
+            self.forget(groups.COUNTED if locked else groups.BANKED)
             if locked and self.counting:
                 self.now["MS"] = FINEST
         if name == "AS" and before == TORQUE:
@@ -276,11 +280,6 @@ class Steps:
             self.now[PAIRS[name]] = (0, *other[1:])
 
 
-LAST = ("DE", "CB", "MU", "TD", "TQ", "JE", "FL", "CM", "PM", "AS", "EE")
-"""Settings that can turn the motor, and those that DE or hMT restrict, in this order."""
-WIRE_ORDER = ("CE", "ES", "DG", "QD", "LK", "EM", "DN", "CK", "PY", "BD")
-SCALE = frozenset({"MS", "EE", "AS", "SA", "EL", "RD"})
-"""Settings that decide what a unit of position is."""
 MDRIVE_COUNTS = 2048
 """Encoder counts in a turn of an MDrivePlus; EE=1 needs a VI of one count or more (error 90)."""
 STEPS_PER_TURN = 200
@@ -299,8 +298,8 @@ def steps(
     made = Steps(product, present.values, goal)
     for order in (_leave_counts, _speeds, _resolution, _enter_counts, _velocities, _pairs, _points):
         order(made)
-    made.reach(*(name for name in goal if name not in (*LAST, *WIRE_ORDER)))
-    made.reach(*LAST, *WIRE_ORDER)
+    made.reach(*(name for name in goal if name not in groups.RESTORED_LAST))
+    made.reach(*groups.RESTORED_LAST)
     return made.changes
 
 
@@ -320,10 +319,10 @@ def _goal(
     changed = {name: value for name, value in goal.items() if not same(value, now.get(name))}
     goal |= {name: manual.checked(name, value, product, counts, present.labels) for name, value in changed.items()}
     # Settings that are not wanted keep their values: but MS scales some, and a change of the unit hides them.
-    kept: Mapping[str, Value] = {name: value for name, value in now.items() if name not in COUNTED}
+    kept: Mapping[str, Value] = {name: value for name, value in now.items() if name not in groups.COUNTED}
     if counts == manual.counting(now):
         ratio = number(goal.get("MS", now.get("MS"))) / (number(now.get("MS")) or 1)
-        scaled = {name: round(number(value) * ratio) for name, value in now.items() if name in COUNTED - {"MS"}}
+        scaled = {name: round(number(value) * ratio) for name, value in now.items() if name in groups.BANKED}
         kept = {**now, **scaled}
     check_together(product, {**kept, **goal}, counts, changed)
     return goal
@@ -369,7 +368,7 @@ def _speeds(steps: Steps) -> None:
     if steps.differs("MF"):
         needed, fastest = int(number(steps.goal["MF"])), steps.number("VM")
         if fastest is None or fastest < needed:
-            steps.keep(COUNTED)
+            steps.keep(groups.COUNTED)
             _allow(steps, needed)
             slowest = steps.number("VI")
             if slowest is None or slowest >= needed:
@@ -382,7 +381,7 @@ def _allow(steps: Steps, speed: float) -> None:
     """Make MS fine enough for a velocity in steps."""
     resolution = steps.number("MS")
     if steps.product not in MDRIVE_PLUS and (resolution is None or resolution * PER_MICROSTEP < speed):
-        steps.keep(COUNTED)
+        steps.keep(groups.COUNTED)
         steps.send("MS", FINEST, temporary=True)
 
 
@@ -439,13 +438,13 @@ def _points(steps: Steps) -> None:
         steps.reach(name, PAIRS.get(name, name))
 
 
-SWITCHES = {
-    "JE": "inputs of the jog types turn the motor then",
-    "FL": "the motor follows the clock inputs then",
-    "CM": "the motor follows the clock then",
-    "PM": "the drive then moves back to its position by itself",
+TURNS = {
+    Alone.JOG: "inputs of the jog types turn the motor then",
+    Alone.CLOCK_INPUTS: "the motor follows the clock inputs then",
+    Alone.CLOCK: "the motor follows the clock then",
+    Alone.CORRECTION: "the drive then moves back to its position by itself",
 }
-"""Flags that can move the motor when they are set."""
+"""What moves the motor by itself once a flag is set."""
 
 
 def risk(name: str, value: Value, now: Mapping[str, Value | None]) -> str:
@@ -454,7 +453,7 @@ def risk(name: str, value: Value, now: Mapping[str, Value | None]) -> str:
     `now` has the drive's present values.
     """
     torque = now.get("AS") == TORQUE
-    if name in manual.UNIT:
+    if name in groups.UNIT:
         return "it belongs to the motor unit"
     if name == "LK":
         return "only CP or FD opens a lock again" if value else "it opens the program"
@@ -462,17 +461,18 @@ def risk(name: str, value: Value, now: Mapping[str, Value | None]) -> str:
         return "it switches the motor's current"
     if name == "AS":
         return "it can turn the motor"
-    if name in SWITCHES and value:
-        return SWITCHES[name]
+    row = lookup(name)
+    if row is not None and row.alone in TURNS and value:
+        return TURNS[row.alone]
     if name in ("TD", "TQ", "TS") and torque:
         return "in torque mode (AS=3) it turns the motor"
     if name == "MU" and now.get("AS"):
         return "the drive may make up lost steps at once"
     if name == "EE" and now.get("PM"):
-        return SWITCHES["PM"]
-    if name in TRIPS and isinstance(value, tuple) and isinstance(value[1], int) and value[1]:
+        return TURNS[Alone.CORRECTION]
+    if name in groups.TRIPS and isinstance(value, tuple) and isinstance(value[1], int) and value[1]:
         return "it calls an address, which may hold another program's line"
-    point = name.startswith(tuple(manual.LISTS)) or manual.POINT.fullmatch(name) is not None
+    point = name.startswith(tuple(groups.LISTS)) or manual.POINT.fullmatch(name) is not None
     if not point or name.startswith(("LS", "OS")) or not isinstance(value, tuple):
         return ""
     kind = value[0]
@@ -481,6 +481,6 @@ def risk(name: str, value: Value, now: Mapping[str, Value | None]) -> str:
     if kind == manual.RESET:
         return "the input restarts the drive"
     if kind in (manual.JOG_PLUS, manual.JOG_MINUS) and now.get("JE"):
-        return SWITCHES["JE"]
+        return TURNS[Alone.JOG]
     follows = now.get("FL") or now.get("CM")
     return "the motor follows the clock inputs" if kind in CLOCKS and follows else ""

@@ -16,6 +16,7 @@ from math import isfinite
 from multidrop.base.errors import Diagnostic
 from multidrop.dialects.values import IO, PARAMETERS, VARIABLES, Reading, Scalar, Value, number
 from multidrop.families.lexium.manual.grammar import is_name
+from multidrop.families.lexium.manual.groups import FIELDS, LISTS, STATES, TRIPS, TRIPS_WITH_VALUE, UNIT, WIRE
 from multidrop.families.lexium.manual.mnemonic import (
     CLOSED_LOOP,
     ENCODER,
@@ -30,17 +31,6 @@ from multidrop.families.lexium.manual.mnemonic import (
 from multidrop.families.lexium.manual.supported import lacks
 from multidrop.families.lexium.manual.table import MNEMONICS, lookup, words
 
-WIRE = frozenset({"BD", "CE", "CK", "DG", "DN", "EM", "ES", "PY", "QD"})
-"""Communication settings."""
-STATES = frozenset({"C1", "C2", "ER", "IF", "P", "ST", "TE"})
-"""Words that can be written and are no settings."""
-LISTS = {"IS": (1, 2, 3, 4, 6), "OS": (1, 2, 3), "LS": (0, 1)}
-"""The words whose PR prints a line for each number, and those numbers."""
-COUNTED = frozenset({"A", "D", "VI", "VM", "MS"})
-"""Settings with another value while the unit of motion is the encoder count (7.3.7)."""
-TRIPS = frozenset({"TA", "TC", "TI", "TM", "TP", "TR", "TT"})
-UNIT = frozenset({"FS", "PW"})
-"""Settings of the motor unit itself, which FD keeps (5.1.45)."""
 ANALOG_UNREAD = ("IS5", "PR IS does not print it")
 HANDLER_UNREAD = ("OE", "no drive prints it")
 
@@ -59,7 +49,7 @@ class Form(Enum):
 def settings(product: str, version: str = "", part: str = "") -> tuple[Mnemonic, ...]:
     """The settings that a drive prints beside others, in the order of their forms."""
     lacks, forms, known = _lacking(version, part) | STATES | {"DN"}, list(Form), product in EVERY
-    rows = [row for row in words(product).values() if row.access == "RW" and row.kind in ("variable", "flag")]
+    rows = [row for row in words(product).values() if row.access == "RW" and row.valued]
     rows = [row for row in rows if (product in row.products if known else row.products >= LEXIUM)]
     rows = [row for row in rows if not row.lines and row.name not in lacks]
     return tuple(sorted(rows, key=lambda row: forms.index(form_of(row))))
@@ -158,9 +148,6 @@ CLOCKS = frozenset({13, 14, 15, 33, 34, 35, 49, 50, 51})
 """Types of points that are a clock; both points of a pair have one."""
 SHARED = frozenset({0, 16}) | CLOCKS
 """Types that several points may have."""
-FIELDS = {"PF": 4, "PW": 4}
-PAIRED = frozenset({"S5", "S7", "S8"})
-"""Points of an MDrivePlus whose set-up has two fields; others have three."""
 PRINT_FORMAT = (16, 16, 1, 1)
 """The highest fields of PF."""
 MOST_REPEATS = 65000
@@ -214,7 +201,7 @@ def checked(name: str, value: Value, product: str, counts: bool, labels: Collect
     if name in TRIPS:
         # A trip: a target alone, or a number, a target, and for TR the repeats.
         fields = value if isinstance(value, tuple) else (value,)
-        alone, most = name in ("TC", "TM"), 3 if name == "TR" else 2
+        alone, most = name not in TRIPS_WITH_VALUE, 3 if name == "TR" else 2
         target = fields[0 if alone else 1 : 1 if alone else 2]
         valid = len(fields) == 1 if alone else 2 <= len(fields) <= most or value == 0
         valid = valid and all(isinstance(each, int) or (each in target and isinstance(each, str)) for each in fields)
@@ -231,7 +218,7 @@ def checked(name: str, value: Value, product: str, counts: bool, labels: Collect
             if not 0 <= number(each) <= most:
                 raise Diagnostic(f"{name} = {list(value)}: valid: up to {list(PRINT_FORMAT)}")
         return value
-    if row.access != "RW" or row.kind not in ("variable", "flag"):
+    if row.access != "RW" or not row.valued:
         raise Diagnostic(f"{name}: is not a setting ({row.title})")
     if name == "DN":
         if not (isinstance(value, str) and len(value) == 1 and value.isascii() and value.isalnum()):
@@ -247,9 +234,7 @@ def checked(name: str, value: Value, product: str, counts: bool, labels: Collect
 def _fields_of(name: str) -> int | None:
     if _SETUP.fullmatch(name):
         return 2
-    if name in FIELDS:
-        return FIELDS[name]
-    return (2 if name in PAIRED else 3) if POINT.fullmatch(name) else None
+    return FIELDS.get(name)
 
 
 def writable(value: Value) -> bool:

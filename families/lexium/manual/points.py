@@ -13,6 +13,8 @@ from multidrop.families.lexium.manual.parameters import counting
 INPUTS = (1, 2, 3, 4)
 EXPANDED_INPUTS = (*INPUTS, 9, 10, 11, 12)
 """The inputs of IN, lowest bit first."""
+SETTINGS = ("EE", "AS", "RC", "HC", "VI", "VM", "A", "D")
+"""The settings that `conditions` takes, beside what changes by itself."""
 STATUS = ("P", "V", "MV", "BY", "EF", "IN")
 """The words to read for a status, in the order of `in_words`."""
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Container, Iterable, Iterator, Sequence
 from functools import reduce
 from operator import or_
 
@@ -18,6 +18,7 @@ from multidrop.families.lexium.manual.grammar import (
     parse,
     words,
 )
+from multidrop.families.lexium.manual.groups import CHANGING, PLACES, TRIPS
 from multidrop.families.lexium.manual.help import form_of, out_of_range
 from multidrop.families.lexium.manual.mnemonic import EVERY, Mnemonic
 from multidrop.families.lexium.manual.program_file import ProgramLine
@@ -32,8 +33,6 @@ Read = Sequence[tuple[ProgramLine, Statement]]
 """The lines of a file that can be parsed, each with its statement."""
 LISTED = 4
 """Words that a message names."""
-CHANGE = frozenset({"IC", "DC", "IV"})
-"""Instructions that write the variable after them."""
 
 
 def check_products(read: Read, names: frozenset[str], product: str) -> Iterator[Problem]:
@@ -43,7 +42,7 @@ def check_products(read: Read, names: frozenset[str], product: str) -> Iterator[
         for word in words_of(statement):
             if lookup(word) is not None:
                 used.setdefault(word, line)
-            if word == statement.word or statement.word in CHANGE:
+            if word == statement.word or statement.word in CHANGING:
                 changed.add(word)
 
     def lacks(word: str, row: Mnemonic | None, each: str) -> bool:
@@ -74,9 +73,7 @@ def check_products(read: Read, names: frozenset[str], product: str) -> Iterator[
 # Warnings of trips that are set up and never enabled, and the reverse (MCode reference 5.1.125 to 5.1.132).
 
 
-BITS: Mapping[str, int] = {"TI": 1, "TP": 2, "TC": 4, "TT": 8, "TR": 16, "TA": 32, "TM": 64}
-"""The trips, each with the number by which TE enables it."""
-EXCLUSIVE = BITS["TP"] | BITS["TR"]
+EXCLUSIVE = TRIPS["TP"] | TRIPS["TR"]
 
 
 def check_trips(read: Read, mentioned: Container[str]) -> Iterator[Problem]:
@@ -91,7 +88,7 @@ def check_trips(read: Read, mentioned: Container[str]) -> Iterator[Problem]:
             enables.append((line, statement, int(number.value) if isinstance(number, Number) and shown else None))
     if all(bits is not None for *_, bits in enables) and "TE" not in mentioned:
         enabled = reduce(or_, (bits or 0 for *_, bits in enables), 0)
-        for word, bit in BITS.items():
+        for word, bit in TRIPS.items():
             if word in first and not enabled & bit:
                 line, statement = first[word]
                 what = f"{word} is set up, but TE never enables it"
@@ -102,7 +99,7 @@ def check_trips(read: Read, mentioned: Container[str]) -> Iterator[Problem]:
             what = "TE enables TP and TR together, which exclude each other: a drive refuses it (error 39)"
             hint = "enable one of them: 2 is TP, 16 is TR"
             yield Problem(line.number, line.column + statement.column, what, hint, warning=True)
-    missing = {word: bit for word, bit in BITS.items() if word not in first and word not in mentioned}
+    missing = {word: bit for word, bit in TRIPS.items() if word not in first and word not in mentioned}
     # Report the first TE for each set of trips that nothing sets up.
     reported = set[str]()
     for line, statement, bits in enables:
@@ -115,8 +112,6 @@ def check_trips(read: Read, mentioned: Container[str]) -> Iterator[Problem]:
             )
 
 
-TARGETS = {"BR": 0, "CL": 0, "OE": 0, "TA": 1}
-"""Words with a target, and the position of the target among their arguments."""
 read = program_file.read
 formatted = program_file.formatted
 parts = program_file.parts
@@ -238,7 +233,7 @@ class _Reader:
         self.labels.setdefault(first.word, line.number)
 
     def places(self, line: ProgramLine, statement: Statement) -> Iterator[Problem]:
-        at = TARGETS.get(statement.word)
+        at = PLACES.get(statement.word)
         for place, argument in enumerate(statement.arguments):
             for name in names_in(argument):
                 state = lookup(name.word, self.product) is not None

@@ -19,6 +19,7 @@ from multidrop.base.comments import outside
 from multidrop.base.files import SourceLine, split_lines, wrong_characters
 from multidrop.dialects.program_files import Entry, Part, Problem, check_comment, check_enter, refuse, respelled
 from multidrop.families.lexium.manual.grammar import LineError, Token, check_groups, parse, tokens
+from multidrop.families.lexium.manual.groups import DECLARING, TURNING
 from multidrop.families.lexium.manual.statements import canonical
 from multidrop.families.lexium.manual.table import lookup
 
@@ -216,20 +217,16 @@ def _is_setting(text: str, names: frozenset[str]) -> bool:
 
 def _holds_value(word: str, names: frozenset[str]) -> bool:
     row = lookup(word)
-    return word in names or (row is not None and row.kind in ("variable", "flag"))
+    return word in names or (row is not None and row.valued)
 
 
 # The parts of a line of an MCode program for an editor, and the places at which a program can begin.
 
 
-_DECLARE = ("LB", "VA")
-MOVES = frozenset({"CF", "HF", "HI", "HM", "MA", "MR", "SL"})
-
-
 def parts(line: str) -> list[Part]:
     end = remark_at(line)
     found = tokens(line[:end])
-    declares = bool(found) and found[0].text.upper() in _DECLARE
+    declares = bool(found) and found[0].text.upper() in DECLARING
     kinds = [(token, _kind(token, number, declares)) for number, token in enumerate(found)]
     shown = [Part(token.start, token.stop, kind) for token, kind in kinds if kind]
     return [*shown, Part(end, len(line), "remark")] if end < len(line) else shown
@@ -245,7 +242,7 @@ def _kind(token: Token, number: int, declares: bool) -> str:
     row = lookup(token.text.upper())
     if row is None:
         return ""
-    return "starts" if number == 0 and row.name in MOVES else "word"
+    return "starts" if number == 0 and row.name in TURNING else "word"
 
 
 def entries(text: str) -> list[Entry]:

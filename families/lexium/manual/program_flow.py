@@ -11,11 +11,9 @@ from dataclasses import dataclass
 
 from multidrop.dialects.program_files import Problem, nearest, walk, way_to
 from multidrop.families.lexium.manual.grammar import Argument, Name, Number, Statement, words
+from multidrop.families.lexium.manual.groups import CONDITIONAL, HOLDING, HOMINGS, MOVES, PLACES, WATCHING
 from multidrop.families.lexium.manual.program_file import ProgramLine
-from multidrop.families.lexium.manual.statements import CONDITIONAL
-
-PLACES = {"BR": 0, "CL": 0, "OE": 0, "TC": 0, "TM": 0, "TI": 1, "TP": 1, "TT": 1, "TR": 1, "TA": 1}
-"""Words that go to a place or name one, and the position of that place among their arguments."""
+from multidrop.families.lexium.manual.table import lookup
 
 
 @dataclass(frozen=True)
@@ -206,15 +204,6 @@ def _without_call(flow: Flow, begin: int, end: int) -> Problem:
 # every move.
 
 
-MOVES = frozenset({"MA", "MR"})
-HOMINGS = frozenset({"HM", "HI", "HF"})
-DISTURBING = frozenset({"P", "C1", "C2", "AS", "RD"})
-"""Variables that must not be set while the drive moves."""
-REFUSED = frozenset({"S", "IP", "CP", "FD", "SC"})
-"""Instructions that a moving drive refuses."""
-WATCHES = frozenset({"MV", "MP", "VC", "V", "AV", "P", "PC", "C1", "C2", "ST", "LL", "AF", "EF", "ER"})
-"""Words by which a program watches the motion."""
-WAITS = frozenset({"H", "PS", "SL", "IV", "E", "RT", "DE"})
 FARTHEST = 500
 """Lines after a move that are looked at."""
 
@@ -252,17 +241,20 @@ def _has_an_end(step: Step) -> bool:
 def _disturbs(step: Step) -> bool:
     if step.statement is None:
         return False
-    if step.word in REFUSED or not step.statement.word:
+    if not step.statement.word:
         return True
-    return bool(step.statement.arguments) and step.word in MOVES | HOMINGS | DISTURBING
+    row = lookup(step.word)
+    if row is None or not (row.rest or step.word in MOVES):
+        return False
+    return bool(step.statement.arguments) or not (row.valued or step.word in MOVES | HOMINGS)
 
 
 def _waits(flow: Flow, at: int, move: int) -> bool:
     """Whether a line may wait for the end of the move in the line `move`."""
     step = flow.steps[at]
-    if step.statement is None or step.word in WAITS:
+    if step.statement is None or step.word in HOLDING:
         return True
-    if step.word != "PR" and words(step.line.text) & WATCHES:
+    if step.word != "PR" and words(step.line.text) & WATCHING:
         return True
     if step.word not in CONDITIONAL:
         return False
@@ -276,5 +268,5 @@ def _waits(flow: Flow, at: int, move: int) -> bool:
 
 def _is_busy(step: Step) -> bool:
     """Whether a subroutine with this line may wait: it holds, watches the motion, moves, or calls another."""
-    calm = step.statement is not None and step.word not in WAITS - {"RT"} and step.word != "CL"
-    return not calm or _disturbs(step) or bool(words(step.line.text) & WATCHES)
+    calm = step.statement is not None and step.word not in HOLDING - {"RT"} and step.word != "CL"
+    return not calm or _disturbs(step) or bool(words(step.line.text) & WATCHING)

@@ -7,7 +7,6 @@ from collections.abc import Container, Iterator
 from string import ascii_lowercase, ascii_uppercase, digits
 
 from multidrop.families.lexium.manual.grammar import (
-    FUNCTIONS,
     LOGIC,
     Argument,
     Binary,
@@ -22,6 +21,7 @@ from multidrop.families.lexium.manual.grammar import (
     parse,
     tokens,
 )
+from multidrop.families.lexium.manual.groups import CONDITIONAL, FUNCTIONS
 from multidrop.families.lexium.manual.table import lookup
 
 # The canonical spelling of a line of MCode, by which two listings are compared and a file is formatted.
@@ -56,7 +56,7 @@ def _takes_equals(statement: Statement, names: Container[str]) -> bool:
     if not statement.arguments:
         return statement.equals
     row = None if statement.word in names else lookup(statement.word)
-    return bool(statement.word) and (row is None or row.kind in ("variable", "flag"))
+    return bool(statement.word) and (row is None or row.valued)
 
 
 def _spelled(part: Argument | None) -> str:
@@ -81,10 +81,6 @@ def _spelled(part: Argument | None) -> str:
 # left to right. `+ - * /` after a comparison belong to its right side: `P<R1+100` is P<(R1+100). `& | ^` after a
 # comparison take its result, 0 or 1: `R1=1&MV` is (R1=1)&MV. A second comparison takes everything to its left:
 # `KF&12=12` is (KF&12)=12, `I1=1&I2=1` is ((I1=1)&I2)=1. `grammar.parse` builds its trees by this rule.
-
-
-CONDITIONAL = frozenset({"BR", "CL"})
-"""The words whose second argument is a condition."""
 
 
 def condition_of(statement: Statement) -> Expression | None:

@@ -5,10 +5,10 @@ Motion Control, firmware 3.010: base, with encoder, and the Plus2 with expanded 
 MCode reference of 2012 (R062812); words of the Hybrid's firmware are absent. The base unit knows the words of expanded
 I/O and refuses them (37). So does a unit without an encoder with the nine encoder words, of which it prints three as 0.
 
-A row has the fields of a `Mnemonic`. Marks: `starts` and `lines`; `stored` is a word of programs only, `typed` one of
-typed lines only; `six` needs firmware 6, `large` a unit larger than NEMA 17 (of a Lexium only). Empty: all products of
-the table, and for a step error 25; `-` is none. A row of an MDrivePlus gives what differs from the Lexium's row of that
-word, and always its own section, products and note; one that is marked `own` takes nothing from it.
+A row has a cell for every fact of a `Mnemonic`, where the words of each column are explained. `-` is none, `all` all
+products of the table, `any` any firmware or size. An empty cell is an error, so that a new word answers every question.
+Only a row of an MDrivePlus may leave cells empty, for what the Lexium's row of the same word says. It always gives its
+own section, products and note. One that is marked `own` takes nothing from the Lexium.
 """
 
 from __future__ import annotations
@@ -16,74 +16,141 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from multidrop.base.files import rows
-from multidrop.families.lexium.manual.mnemonic import EVERY, LEXIUM, MDRIVE_PLUS, READ_ONLY, Mnemonic, Number
+from multidrop.families.lexium.manual.mnemonic import (
+    EVERY,
+    LEXIUM,
+    MDRIVE_PLUS,
+    Alone,
+    AtZero,
+    Default,
+    Form,
+    Kept,
+    Leads,
+    Memory,
+    Mnemonic,
+    Motion,
+    Named,
+    Number,
+    Position,
+    Prints,
+    Quantity,
+    Setup,
+    Use,
+    Waiting,
+    Wire,
+)
+
+NONE = "-"
+_FLAGS = {"yes": True, "no": False}
+_OWN = frozenset({"section", "note", "products", "reserved_on", "zero_on"})
+"""What a row of an MDrivePlus never takes from the Lexium's row."""
 
 
 def _number(text: str) -> Number | None:
-    if not text:
+    if text == NONE:
         return None
     return int(text) if text.lstrip("-").isdigit() else float(text)
 
 
+def _numbers(text: str) -> tuple[Number, ...]:
+    return tuple(int(n) if n.isdigit() else float(n) for n in text.split()) if text != NONE else ()
+
+
+def _whole(text: str) -> int | None:
+    return None if text == NONE else int(text)
+
+
+def _text(text: str) -> str:
+    return "" if text == NONE else text
+
+
+def _default(text: str) -> Default:
+    return text if text == "!" or "," in text else _number(text)
+
+
 def _products(text: str, everywhere: frozenset[str]) -> frozenset[str]:
-    return frozenset(text.split()) - {"-"} if text else everywhere
+    return everywhere if text == "all" else frozenset(text.split()) - {NONE}
 
 
-def _mnemonic(row: Mapping[str, str], products: frozenset[str]) -> Mnemonic:
-    marks, default = row["marks"].split(), row["default"]
-    values, gap = ([int(n) if n.isdigit() else float(n) for n in row[field].split()] for field in ("values", "gap"))
+def _setup(text: str) -> Setup:
+    form, *more = text.split()
+    return Setup(Form(form), tuple(int(each) for each in more if each.isdigit()), "removable" in more)
+
+
+def record(row: Mapping[str, str], everywhere: frozenset[str]) -> Mnemonic:
+    """Make the record of a row; `everywhere` are the products of its table. Raises ValueError for a wrong cell."""
+    if empty := [column for column, text in row.items() if not text]:
+        raise ValueError(f"the row of {row['name']} says nothing of: {', '.join(empty)}")
+    lexium = everywhere is LEXIUM
+    leads, _, place = row["leads"].partition(" ")
+    position, _, turn = row["position"].partition(" ")
     return Mnemonic(
         name=row["name"],
         title=row["title"],
         meaning=row["meaning"],
         section=row["section"],
-        syntax=row["syntax"],
+        syntax=_text(row["syntax"]),
         access=row["access"],
         kind=row["kind"],
-        immediate="stored" not in marks,
-        program="typed" not in marks,
         low=_number(row["low"]),
         high=_number(row["high"]),
-        unit=row["unit"],
-        default=default if default == "!" or "," in default else _number(default),
+        unit=_text(row["unit"]),
+        default=_default(row["default"]),
         low_encoder=_number(row["low_encoder"]),
         high_encoder=_number(row["high_encoder"]),
-        unit_encoder=row["unit_encoder"],
+        unit_encoder=_text(row["unit_encoder"]),
         default_encoder=_number(row["default_encoder"]),
-        values=tuple(values),
-        gap=tuple(gap),
-        step=int(row["step"] or READ_ONLY),
-        starts="starts" in marks,
-        lines="lines" in marks,
-        products=_products(row["products"], products),
-        reserved_on=_products(row["reserved_on"], products),
-        zero_on=_products(row["zero_on"], frozenset()),
-        note=row["note"],
-        firmware=6 if "six" in marks and products is LEXIUM else 0,
-        large="large" in marks and products is LEXIUM,
+        values=_numbers(row["values"]),
+        gap=_numbers(row["gap"]),
+        step=int(row["step"]),
+        products=_products(row["products"], everywhere),
+        reserved_on=_products(row["reserved_on"], everywhere),
+        zero_on=_products(row["zero_on"], everywhere),
+        firmware=0 if row["firmware"] == "any" or not lexium else int(row["firmware"]),
+        large=row["size"] != "any" and lexium,
+        use=Use(row["use"]),
+        joined=_FLAGS[row["joined"]],
+        leads=Leads(leads),
+        place=int(place or 0) - 1,
+        variable=Named(row["variable"]),
+        prints=Prints(row["prints"]),
+        setup=_setup(row["setup"]),
+        kept=Kept(row["kept"]),
+        restored=0 if row["restored"] == "any" else _whole(row["restored"]),
+        wire=Wire(row["wire"]),
+        read_back=0 if row["read_back"] == "exact" else _whole(row["read_back"]),
+        quantity=Quantity(row["quantity"]),
+        position=Position(position),
+        turn=int(turn or 0),
+        starts=_FLAGS[row["starts"]],
+        motion=Motion(row["motion"]),
+        turns_at=_whole(row["turns_at"]),
+        at_zero=AtZero(row["at_zero"]),
+        alone=Alone(row["alone"]),
+        rest=_FLAGS[row["rest"]],
+        waiting=Waiting(row["waiting"]),
+        sign=_FLAGS[row["sign"]],
+        memory=Memory(row["memory"]),
+        guard=_text(row["guard"]),
+        harmless=frozenset(map(int, row["harmless"].split())) if row["harmless"] != NONE else frozenset(),
+        note=_text(row["note"]),
     )
 
 
-def _like(row: Mapping[str, str]) -> Mapping[str, str]:
-    """A row of an MDrivePlus, with what it does not give taken from the Lexium's row of the word."""
-    base = {} if "own" in row["marks"].split() else _ROWS.get(row["name"], {})
-    return {field: text or (base.get(field, "") if field in _SHARED else "") for field, text in row.items()}
+def whole_row(row: Mapping[str, str], lexium: Mapping[str, Mapping[str, str]]) -> Mapping[str, str]:
+    """Return a row of an MDrivePlus with what it takes from the Lexium's row of the word, given all of these."""
+    base = {} if row["own"] == "yes" else lexium[row["name"]]
+    cells = {column: text for column, text in row.items() if column != "own"}
+    return {column: text or ("" if column in _OWN else base.get(column, "")) for column, text in cells.items()}
 
 
 _ROWS = {row["name"]: row for row in rows(__file__, "lexium.csv")}
-_SHARED = frozenset(next(iter(_ROWS.values()))) - {"section", "note", "products", "reserved_on", "zero_on"}
-MNEMONICS: Mapping[str, Mnemonic] = {name: _mnemonic(row, LEXIUM) for name, row in _ROWS.items()}
+MNEMONICS: Mapping[str, Mnemonic] = {name: record(row, LEXIUM) for name, row in _ROWS.items()}
 """The Lexium's words by name, in capitals; each indexed word has its own row (`D1`, `O3`, `F8`)."""
 MDRIVE: Mapping[str, Mnemonic] = {
-    row["name"]: _mnemonic(_like(row), MDRIVE_PLUS) for row in rows(__file__, "mdrive_plus.csv")
+    row["name"]: record(whole_row(row, _ROWS), MDRIVE_PLUS) for row in rows(__file__, "mdrive_plus.csv")
 }
 """The MDrivePlus's words by name."""
-
-PRINTS_LINES = frozenset(name for name, row in MNEMONICS.items() if row.lines)
-"""The words whose PR prints several lines without an end of their own."""
-
-NO_STEP: Mapping[str, int] = {name: row.step for name, row in MNEMONICS.items() if row.step}
-"""The error of `IC` and `DC` on a word that cannot be stepped: 25 or 26 (section 5.1.29)."""
 
 
 def words(product: str) -> Mapping[str, Mnemonic]:

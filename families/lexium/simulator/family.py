@@ -16,6 +16,7 @@ from multidrop.dialects.family import Motion
 from multidrop.dialects.units import Scale
 from multidrop.dialects.values import VARIABLES, Reading, Scalar, Snapshot, Value, same
 from multidrop.families.lexium.manual.grammar import is_name, parsed
+from multidrop.families.lexium.manual.groups import LISTS, TRIPS
 from multidrop.families.lexium.manual.statements import UNNAMED, canonical, size_of
 from multidrop.families.lexium.manual.table import lookup, words
 from multidrop.families.lexium.simulator.device import MCodeDevice
@@ -73,8 +74,7 @@ def _check(personality: str, table: Table, word: str, value: Value) -> None:
         raise table.wrong(word, f"must be {wanted}, not {shown(value)}")
 
 
-TRIPS = frozenset({"TA", "TC", "TI", "TM", "TP", "TR", "TT"})
-_LISTED = re.compile(r"(IS|OS|LS)(\d+)")
+_LISTED = re.compile(rf"({'|'.join(LISTS)})(\d+)")
 """Settings of which a cell file has one list."""
 _NAMED = re.compile(r"\s*(?:LB|VA)[\s=]+([A-Z][A-Z0-9]{0,2})", re.I)
 Row = tuple[int, str]
@@ -320,7 +320,7 @@ class SimulatedLexium(SimulatedFamily):
         if not MODELS[spec.personality].ethernet:
             found |= {"PY": int(spec.party)} if spec.name == UNNAMED else {"DN": spec.name, "PY": int(spec.party)}
         for name, held in spec.set.items():
-            if name in ("IS", "OS", "LS"):
+            if name in LISTS:
                 for row in held if isinstance(held, tuple) else (str(held),):
                     number, *fields = row.split(",")
                     found[f"{name}{number.strip()}"] = tuple(map(_scalar, fields))

@@ -9,13 +9,14 @@ from __future__ import annotations
 
 from multidrop.families.lexium.manual.errors import ErrorNumber as E
 from multidrop.families.lexium.manual.grammar import Name
+from multidrop.families.lexium.manual.groups import UNIT
 from multidrop.families.lexium.simulator.motion.axis import MOVES
 from multidrop.families.lexium.simulator.motion.counters import FRESH
 from multidrop.families.lexium.simulator.motion.motor import Motor
 from multidrop.families.lexium.simulator.motion.outputs import Outputs
 from multidrop.families.lexium.simulator.state.errors import Fault
 from multidrop.families.lexium.simulator.state.interpreter import Core
-from multidrop.families.lexium.simulator.state.memory import KEPT_BY_FD, Memory, Store
+from multidrop.families.lexium.simulator.state.memory import Memory, Store
 from multidrop.families.lexium.simulator.state.program_memory import Program
 
 ETHERNET_BOOT = 20.0
@@ -56,8 +57,8 @@ class Nvm:
             raise Fault(E.MOVING_SAVE)
         fresh, kept = Store(program=self._kept(Program(product=self._memory.product))), self.store
         Memory(self._memory.product).save(fresh)
-        fresh.values.update({name: value for name, value in kept.values.items() if name in KEPT_BY_FD})
-        fresh.texts.update({name: value for name, value in kept.texts.items() if name in KEPT_BY_FD})
+        fresh.values.update({name: value for name, value in kept.values.items() if name in UNIT})
+        fresh.texts.update({name: value for name, value in kept.texts.items() if name in UNIT})
         fresh.program.clear()
         self.store = fresh
 

@@ -11,19 +11,16 @@ from collections.abc import Container, Iterator, Sequence
 from typing import NamedTuple
 
 from multidrop.families.lexium.manual.grammar import Name, Statement, parsed
+from multidrop.families.lexium.manual.groups import CONDITIONAL, LABELLING, LAST_LINES, PLACES, SETUPS
 from multidrop.families.lexium.manual.program_file import ProgramLine
-from multidrop.families.lexium.manual.program_flow import PLACES
 from multidrop.families.lexium.manual.statements import names_in
 from multidrop.families.lexium.simulator.device import MCodeDevice
 from multidrop.families.lexium.simulator.state.program_memory import Program
 from multidrop.simulator.cell.spec import DriveSpec
 from multidrop.simulator.world import World
 
-SETUPS = frozenset({"DN", "IS", "LS", "MU", "OS", "PF", "PW", "TA", "TC", "TI", "TM", "TP", "TR", "TT"}) | {
-    f"S{n}" for n in (*range(1, 6), *range(7, 14))
-}
-JOINS = frozenset({"LB", "CL"})
-"""After these other lines may have been executed before."""
+JOINS = LABELLING | (CONDITIONAL - LAST_LINES)
+"""After these other lines may have been executed before: a label, and the return of a call."""
 
 
 class RefusedLater(NamedTuple):

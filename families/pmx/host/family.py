@@ -30,21 +30,17 @@ from multidrop.dialects.values import Values
 from multidrop.families.pmx.host.codec import FACTORY, STOP_BYTES, Pmx, PmxState
 from multidrop.families.pmx.host.operations import SEARCH, PmxCertifying, PmxOperations, find
 from multidrop.families.pmx.manual import help
-from multidrop.families.pmx.manual.table import head, lookup, reads, starts_motion
+from multidrop.families.pmx.manual.table import COMMANDS, Motion, head, lookup, reads, starts_motion
 
 FIRST = "X"
 """The first axis."""
 
 
 GUARDS: Mapping[str, str] = {
-    "STORE": "writes the present settings over the kept ones, device name and baud rate included",
-    "DN": "changes the number by which the controller is addressed, after STORE and a power cycle",
-    "DB": "changes the baud rate, after STORE and a power cycle",
+    **{row.name: row.guard for row in COMMANDS.values() if row.guard},
     EVERYONE: "can start every drive of the line",
 }
 """Every guard, and what its commands do."""
-QUIET: Mapping[str, frozenset[str]] = {"SR": frozenset({"0", "2"}), "EO": frozenset({"0"}), "SL": frozenset({"0"})}
-"""Values that stop a program, a motor or its correction: no address makes them a guarded command."""
 _NUMBER = re.compile(r"\A\s*@\d{2}", re.ASCII)
 _ADDRESSED = re.compile(r"\s*@?(\d{2})\s*(?=[A-Za-z])", re.ASCII)
 
@@ -100,9 +96,10 @@ class PmxFamily(PmxOperations, Family):
     def guard(self, text: str) -> Guard | None:
         line = text.strip()
         word, value = self.word_of(line), line.partition("=")[2].strip()
-        if word == "STORE" or (word in GUARDS and value):
-            return Guard(word, f"'{line}' {GUARDS[word]}")
-        quiet = value in QUIET.get(word, ())
+        row = COMMANDS.get(word)
+        if row is not None and row.guard and (value or row.access == "-"):
+            return Guard(word, f"'{line}' {row.guard}")
+        quiet = row is not None and value in row.quiet
         return to_all(line) if self.state.address in ADDRESSES and starts_motion(line) and not quiet else None
 
     @classmethod
@@ -115,7 +112,8 @@ class PmxFamily(PmxOperations, Family):
     @classmethod
     def only_ends(cls, text: str) -> bool:
         """Whether a command of motion can only end it: that ends a program (SR)."""
-        return cls.word_of(text.strip()) == "SR" and text.partition("=")[2].strip() in QUIET["SR"]
+        row = COMMANDS.get(cls.word_of(text.strip()))
+        return row is not None and row.motion is Motion.PROGRAM and text.partition("=")[2].strip() in row.quiet
 
     @classmethod
     def only_reads(cls, text: str) -> bool:

@@ -105,9 +105,8 @@ class PmxExchange(Exchange):
 
 
 OK = "OK"
-LATER = ("DN", "DB")
 """Words that take effect after STORE and a power cycle (6.2.2, 6.3)."""
-HOMING = re.compile(r"(?:H|L|ZH|Z|HL)([XY])[+-]", re.ASCII)
+HOMING = re.compile(rf"(?:{'|'.join(table.HOMINGS)})([XY])[+-]", re.ASCII)
 SETS = re.compile(r"P([XY])=", re.ASCII)
 PROGRAMS = (0, 1)
 POINTS = (("DI", "inputs on"), ("DO", "outputs on"), ("EO", "motor drivers on"))
@@ -124,7 +123,7 @@ class PmxOperations(OfDrive):
         self.check(text)
         reply = yield from PmxExchange(known).answered(known.codec.request(known.address, text))
         name, sets, _ = text.strip().partition("=")
-        if sets and name in LATER:
+        if sets and name in table.WIRE:
             known.remark(f"{who(known)}: {name} acts after STORE and a power cycle")
         return () if reply.text == OK else reply.lines
 

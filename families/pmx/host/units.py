@@ -14,16 +14,14 @@ from multidrop.dialects.codec import Procedure, Request
 from multidrop.dialects.units import VALUE, Basis, Field, Takes, Units
 from multidrop.families.pmx.host.codec import PmxState
 from multidrop.families.pmx.host.operations import number
-from multidrop.families.pmx.manual.table import AXES
+from multidrop.families.pmx.manual.table import AXES, RECOUNTING, SCALES
 
-RESTS = ("SL", "POL")
-"""Words of an axis: what it counts, and in which direction."""
 SPEEDS = ("HSPD", "LSPD", "SSPD")
 _MOVE = re.compile(rf"\s*(?:X{VALUE})?(?:Y{VALUE})?\s*|\s*I{VALUE}:{VALUE}\s*")
 _SET = re.compile(rf"\s*(P|{'|'.join(SPEEDS)})([XY])={VALUE}\s*")
 _READ = re.compile(rf"\s*(P|PS|{'|'.join(SPEEDS[:2])})([XY])\s*")
-_RECOUNTS = re.compile(rf"\s*(?:{'|'.join(RESTS)})[XY]=")
-_DISTURBS = re.compile(r"\s*(?:P|SL|SLR|POL)([XY])=")
+_RECOUNTS = re.compile(rf"\s*(?:{'|'.join(SCALES)})[XY]=")
+_DISTURBS = re.compile(rf"\s*(?:{'|'.join(RECOUNTING)})([XY])=")
 
 
 class PmxUnits(Units):
@@ -45,7 +43,7 @@ class PmxUnits(Units):
         return [Field(axis, Takes.TARGET, *found.span(n), True) for n, axis in groups if found is not None and found[n]]
 
     def basis(self, axis: str, full_steps: int | None) -> Procedure[Basis]:
-        names = [f"{word}{axis.upper()}" for word in RESTS]
+        names = [f"{word}{axis.upper()}" for word in reversed(SCALES)]  # StepNLoop first
         settings = []
         for name in names:
             settings.append((name, str((yield from number(self.state, name)))))

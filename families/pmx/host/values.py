@@ -43,7 +43,6 @@ from multidrop.dialects.values import (
 from multidrop.dialects.values import number as number_of
 from multidrop.families.pmx.host.codec import PmxState
 from multidrop.families.pmx.host.operations import (
-    LATER,
     PROGRAMS,
     PmxExchange,
     PmxOperations,
@@ -52,23 +51,9 @@ from multidrop.families.pmx.host.operations import (
 from multidrop.families.pmx.host.programs import PmxPrograms
 from multidrop.families.pmx.manual import table
 from multidrop.families.pmx.manual.program_file import RAW
+from multidrop.families.pmx.manual.table import Corrects, Kept
 
-WIRE = ("DN", "DB")
-LOOP = ("SLR", "SLT", "SLE", "SLA")
-"""StepNLoop: while it is on, a change can make it correct the position by a move."""
-JOYSTICK = ("JV", "JL")
-"""Speeds, dead zones and limits of the joystick, whose switch cannot be read."""
-STATES = frozenset({"P", "E", "EO", "DO", "SA"})
 UNREAD = (("JO", "the controller does not report whether the joystick is on"),)
-SPEED_LIMITS = ("LSPD", "HSPD")
-FASTEST = 6_000_000
-LARGEST = 2**31 - 1
-RANGES: Mapping[str, tuple[int, int]] = {
-    "LSPD": (0, FASTEST), "HSPD": (0, FASTEST), "SCV": (0, 1), "EDEC": (0, 1), "IERR": (0, 1), "RZ": (0, 1),
-    "SL": (0, 1), "SSPDM": (0, 9), "EOBOOT": (0, 3), "DOBOOT": (0, 255), "SLOAD": (0, 3), "DB": (1, 5),
-}  # fmt: skip
-"""Ranges of whole numbers; others are whole numbers of 32 bits."""
-SIGNED = ("V", "JL")
 RATIO = "SLR"
 _AXIS = re.compile(rf"([A-Z]+?)([{''.join(table.AXES)}])\Z")
 
@@ -89,20 +74,16 @@ def reading(name: str, value: Value) -> Reading:
     word = base(name)
     if word == "V":
         return Reading(name, value, VARIABLES, default=0)
-    unit = "ms" if word in ("ACC", "DEC", "TOC") else "pulses/s" if word in SPEED_LIMITS else ""
-    return Reading(name, value, unit=unit, fixed=name in WIRE)
+    return Reading(name, value, unit=table.COMMANDS[word].unit, fixed=name in table.WIRE)
+
+
+def _turn(row: table.Command) -> tuple[bool, bool]:
+    """Speeds first, and last what switches StepNLoop on or lets it correct."""
+    return row.unit != "pulses/s", row.corrects in (Corrects.LOOP, Corrects.WHILE_ON)
 
 
 NAMES = tuple(
-    sorted(
-        (
-            word
-            for row in table.COMMANDS.values()
-            if row.access == "RW" and row.name not in STATES
-            for word in row.words()
-        ),
-        key=lambda name: (base(name) not in SPEED_LIMITS, base(name) in (*LOOP, "SL")),
-    )
+    word for row in sorted(table.ROWS, key=_turn) if row.kept in (Kept.SETTING, Kept.WIRE) for word in row.words()
 )
 """The settings in the order in which they are written."""
 
@@ -132,7 +113,7 @@ class PmxParameters(ListedParameters):
 
     language = "PMX"
     saving = "STORE"
-    later = frozenset(LATER)
+    later = frozenset(table.WIRE)
     unread = UNREAD
 
     def names(self) -> Sequence[str]:
@@ -147,17 +128,19 @@ class PmxParameters(ListedParameters):
         return reading(name, reply.text if name == "DN" else float(reply.text) if ratio else int(reply.text))
 
     def communicates(self, name: str) -> bool:
-        return name in WIRE
+        return name in table.WIRE
 
     def risk(self, name: str, value: Value, now: Mapping[str, Value]) -> str:
-        word, on = base(name), now.get(f"SL{axis(name)}")
-        if word == "SL" and value:
-            return "StepNLoop corrects the position by moves"
-        if word in JOYSTICK:
-            return "the joystick may be on, and then it can turn the motor"
-        if word in LOOP and on:
-            return "StepNLoop is on and may correct the position by a move"
-        return "programs run after power-up" if name == "SLOAD" and value else ""
+        match table.COMMANDS[base(name)].corrects:
+            case Corrects.LOOP if value:
+                return "StepNLoop corrects the position by moves"
+            case Corrects.JOYSTICK:
+                return "the joystick may be on, and then it can turn the motor"
+            case Corrects.WHILE_ON if now.get(f"SL{axis(name)}"):
+                return "StepNLoop is on and may correct the position by a move"
+            case Corrects.POWER_UP if value:
+                return "programs run after power-up"
+        return ""
 
     def checked(self, name: str, value: Value) -> Value:
         if name not in NAMES:
@@ -168,14 +151,11 @@ class PmxParameters(ListedParameters):
             return value
         if isinstance(value, (str, tuple)):
             raise Diagnostic(f"{name} = {value}: takes a number")
-        if base(name) == RATIO:
-            low, high = 0.001, 999.999
-        else:
-            low, high = RANGES.get(base(name), (-LARGEST - 1 if base(name) in SIGNED else 0, LARGEST))
-            if not float(value).is_integer():
-                raise Diagnostic(f"{name} = {value}: takes a whole number")
-        if not low <= value <= high:
-            raise Diagnostic(f"{name} = {value}: valid: {low} to {high}")
+        row = table.COMMANDS[base(name)]
+        if isinstance(row.low, int) and not float(value).is_integer():
+            raise Diagnostic(f"{name} = {value}: takes a whole number")
+        if row.low is None or row.high is None or not row.low <= value <= row.high:
+            raise Diagnostic(f"{name} = {value}: valid: {row.low} to {row.high}")
         return value
 
     def ordered(self, names: list[str], now: Mapping[str, Value], goal: Mapping[str, Value]) -> list[str]:
@@ -187,7 +167,7 @@ class PmxParameters(ListedParameters):
         return f"{name}={_written(name, value)}"
 
     def rescales(self, name: str) -> bool:
-        return base(name) in ("POL", "SLR", "SL")
+        return base(name) in table.RESCALING
 
     def ready(self) -> Procedure[str]:
         if (yield from PmxOperations(self.state).moving()):

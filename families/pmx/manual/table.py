@@ -3,14 +3,16 @@
 `commands.csv` has the commands, `states.csv` the status numbers, `refusals.csv` the refusals. `shape` is the
 continuation of a name: `bare` nothing, `axis` X or Y, `sign` an axis and a direction, `both` a direction for both axes,
 `1-8` a number, `place` positions. `access` is R, W or RW for a value (`NAME` reads, `NAME=value` writes), `-` for an
-action. (PMX-2ED-SA manual, table 9.0, and the text for J+, J- and CLRS.)
+action. The other columns are the fields of `Command`. Every cell says something, `-` for none, so that a new command
+answers every question. (PMX-2ED-SA manual, table 9.0, and the text for J+, J- and CLRS.)
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
+from enum import StrEnum
 
 from multidrop.base.files import rows
 
@@ -20,7 +22,56 @@ PROBE, PROBED = "MULTIDROP", "simulator"
 """The request that distinguishes our simulator from a unit, and its reply."""
 
 
-@dataclass(frozen=True)
+class Motion(StrEnum):
+    """What a command begins."""
+
+    NONE = "-"
+    MOVE = "move"
+    JOG = "jog"
+    HOMING = "homing"
+    PROGRAM = "program"
+
+
+class Kept(StrEnum):
+    """What a value is."""
+
+    NONE = "-"
+    """The command has no value that can be written and read."""
+    STATE = "state"
+    """One of the moment: nothing restores it."""
+    SETTING = "setting"
+    WIRE = "wire"
+    """A setting of communication, which acts after STORE and a power cycle."""
+
+
+class Position(StrEnum):
+    """What writing a value does to positions."""
+
+    NOTHING = "-"
+    SETS = "position"
+    COUNTS = "counter"
+    """It sets a counter from which StepNLoop takes the position."""
+    SCALES = "scale"
+    """It changes the length or the direction of a count."""
+    RATIO = "ratio"
+    """It changes how many pulses StepNLoop makes for a count."""
+
+
+class Corrects(StrEnum):
+    """What may move an axis once a setting is written."""
+
+    NOTHING = "-"
+    LOOP = "on"
+    """StepNLoop, which it switches on."""
+    WHILE_ON = "while on"
+    """StepNLoop, if it is on."""
+    JOYSTICK = "joystick"
+    """The joystick, whose switch cannot be read."""
+    POWER_UP = "power-up"
+    """A program after power-up."""
+
+
+@dataclass(frozen=True, kw_only=True)
 class Command:
     """A row of the table."""
 
@@ -28,12 +79,25 @@ class Command:
     shape: str
     access: str
     meaning: str
-    takes: str = ""
-    """Range and unit of its value."""
-    section: str = ""
-    note: str = ""
-    starts: bool = False
+    takes: str
+    """Range and unit of its value, in words."""
+    section: str
+    note: str
+    starts: bool
     """Whether it can start motion or a program; for a value, when written. StepNLoop corrects a position by moving."""
+    motion: Motion
+    low: float | None
+    high: float | None
+    """The range of a value that can be written and read; None: it is no number. Whole, unless with a point."""
+    unit: str
+    """The unit of a setting."""
+    kept: Kept
+    position: Position
+    corrects: Corrects
+    guard: str
+    """What a line does to which a person must agree first, a setting where a value is written; empty: it needs none."""
+    quiet: frozenset[str]
+    """Values that stop a program, a motor or its correction: no address makes them a guarded command."""
 
     @property
     def shapes(self) -> list[str]:
@@ -55,10 +119,39 @@ class Command:
                 yield from (f"{self.name}{number}" for number in range(int(low), int(high) + 1))
 
 
-ROWS: tuple[Command, ...] = tuple(
-    Command(**{**row, "starts": bool(row["starts"])})  # type: ignore[arg-type]
-    for row in rows(__file__, "commands.csv")
-)
+def _bound(text: str) -> float | None:
+    if text == "-":
+        return None
+    return float(text) if "." in text else int(text)
+
+
+def record(row: Mapping[str, str]) -> Command:
+    """Make the record of a row. Raises ValueError for a wrong cell."""
+    if empty := [column for column, text in row.items() if not text]:
+        raise ValueError(f"the row of {row['name']} says nothing of: {', '.join(empty)}")
+    said = {column: "" if text == "-" else text for column, text in row.items()}
+    return Command(
+        name=row["name"],
+        shape=row["shape"],
+        access=row["access"],
+        meaning=row["meaning"],
+        takes=said["takes"],
+        section=row["section"],
+        note=said["note"],
+        starts={"yes": True, "no": False}[row["starts"]],
+        motion=Motion(row["motion"]),
+        low=_bound(row["low"]),
+        high=_bound(row["high"]),
+        unit=said["unit"],
+        kept=Kept(row["kept"]),
+        position=Position(row["position"]),
+        corrects=Corrects(row["corrects"]),
+        guard=said["guard"],
+        quiet=frozenset(said["quiet"].split()),
+    )
+
+
+ROWS: tuple[Command, ...] = tuple(map(record, rows(__file__, "commands.csv")))
 COMMANDS: Mapping[str, Command] = {row.name: row for row in ROWS}
 WORDS: Mapping[str, Command] = {word: row for row in ROWS for word in row.words()}
 """Every word, with its axis, direction or number."""
@@ -111,9 +204,22 @@ def starts_motion(text: str) -> bool:
     return row is None or (row.starts and not reads(text))
 
 
-MOTIONS = frozenset({"X", "Y", "I", "T", "J", "H", "L", "ZH", "Z", "HL"})
+def those(fact: Callable[[Command], bool]) -> tuple[str, ...]:
+    """The commands for which a fact holds, in the order of the table."""
+    return tuple(row.name for row in ROWS if fact(row))
+
+
+MOTIONS = those(lambda row: row.motion in (Motion.MOVE, Motion.JOG, Motion.HOMING))
 """Commands that start one motion. After it nothing moves by itself."""
-PROGRAMS = frozenset({"SR", "GS"})
+HOMINGS = those(lambda row: row.motion is Motion.HOMING)
+PROGRAMS = those(lambda row: row.motion is Motion.PROGRAM)
+WIRE = those(lambda row: row.kept is Kept.WIRE)
+"""Settings of communication, which act after STORE and a power cycle."""
+SCALES = those(lambda row: row.position is Position.SCALES)
+"""Settings of an axis that give a count its length and its direction."""
+RESCALING = those(lambda row: row.position in (Position.SCALES, Position.RATIO))
+RECOUNTING = those(lambda row: row.position is not Position.NOTHING)
+"""Values that change what positions count, or the positions."""
 
 
 def axes_of(text: str) -> frozenset[str] | None:

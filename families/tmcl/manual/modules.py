@@ -1,7 +1,8 @@
 """The parameters of TMCL modules, with the numbers that the maker's library lists for each module.
 
 `parameters.csv` has the axis parameters, those that modules which count in units of their chip have otherwise (`chip`),
-and the global ones of bank 0; `?` is a range that is not public, so any value of 32 bits is taken. `modules.csv` has
+and the global ones of bank 0. `valid` is `-` for a parameter that is only read, and `?` for a range that is not public:
+any value of 32 bits is taken. Every cell says something. `modules.csv` has
 the modules. Positions are microsteps. Velocities and accelerations are microsteps/s and microsteps/s2 on modules with a
 TMC5130, TMC5160 or TMC4361; those with a TMC428 or TMC429 count in units of that chip. (TMCL firmware manuals, "Axis
 parameters", "Global parameters".)
@@ -53,22 +54,30 @@ def _limits(text: str) -> Sequence[int]:
     return ranges[0] if len(ranges) == 1 else tuple(n for each in ranges for n in each)
 
 
-def _parameters(group: str) -> Mapping[int, Parameter]:
-    return {
-        int(row["number"]): Parameter(
-            row["title"],
-            INT32 if row["valid"] == "?" else _limits(row["valid"]) if row["valid"] else range(0),
-            row["unit"],
-            int(row["fresh"] or 0),
-            bool(row["live"]),
-            row["valid"] != "?",
-        )
-        for row in rows(__file__, "parameters.csv")
-        if row["group"] == group
-    }
+def record(row: Mapping[str, str]) -> Parameter:
+    """Make the record of a row. Raises ValueError for a wrong cell."""
+    if empty := [column for column, text in row.items() if not text]:
+        raise ValueError(f"the row of {row['group']} {row['number']} says nothing of: {', '.join(empty)}")
+    return Parameter(
+        title=row["title"],
+        limits=INT32 if row["valid"] == "?" else _limits(row["valid"]) if row["valid"] != "-" else range(0),
+        unit="" if row["unit"] == "-" else row["unit"],
+        fresh=int(row["fresh"]),
+        live={"yes": True, "no": False}[row["live"]],
+        known=row["valid"] != "?",
+    )
 
 
-_AXIS, _CHIP, _GLOBAL = map(_parameters, ("axis", "chip", "global"))
+def _groups() -> Mapping[str, Mapping[int, Parameter]]:
+    found: dict[str, dict[int, Parameter]] = {}
+    for row in rows(__file__, "parameters.csv"):
+        found.setdefault(row["group"], {})[int(row["number"])] = record(row)
+    return found
+
+
+GROUPS = _groups()
+"""The parameters by group and number: `axis`, `chip`, `global`, and the name of a module for those that only it has."""
+_AXIS, _CHIP, _GLOBAL = GROUPS["axis"], GROUPS["chip"], GROUPS["global"]
 GLOBAL: Mapping[int, Parameter] = {number: row for number, row in _GLOBAL.items() if row.known}
 RELATIVE_FROM: Mapping[int, str] = {
     0: "counts from the last target",
@@ -123,7 +132,7 @@ VOLTAGE, TEMPERATURE = 8, 9
 
 def _module(row: Mapping[str, str]) -> Module:
     chip_units = row["units"] == "chip"
-    axis = {**_AXIS, **(_CHIP if chip_units else {}), **_parameters(row["module"])}
+    axis = {**_AXIS, **(_CHIP if chip_units else {}), **GROUPS.get(row["module"], {})}
     return Module(
         row["version"],
         {number: axis[number] for number in _numbers(row["axis"])},

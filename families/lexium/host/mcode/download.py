@@ -53,6 +53,7 @@ from multidrop.families.lexium.host.mcode.program_readout import (
     size,
 )
 from multidrop.families.lexium.host.mcode.state import MCodeState
+from multidrop.families.lexium.manual.groups import SLOW
 from multidrop.families.lexium.manual.program_checker import slips
 from multidrop.families.lexium.manual.program_file import ProgramLine
 
@@ -257,7 +258,7 @@ def _needs_own_echo(text: str) -> bool:
     """Whether a line may save the settings, change how the drive replies, or start a program that does."""
     if classify.enters_program(text):
         return False
-    slow = classify.word_of(text)[0] in classify.SLOW
+    slow = classify.word_of(text)[0] in SLOW
     return slow or classify.kind_of(text) is Kind.SETTING or classify.starts_motion(text)
 
 

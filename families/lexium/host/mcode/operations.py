@@ -24,6 +24,7 @@ from multidrop.families.lexium.host.mcode.state import MCodeState, Place, refuse
 from multidrop.families.lexium.host.operations import LexiumOperations
 from multidrop.families.lexium.manual import grammar
 from multidrop.families.lexium.manual.grammar import Number, Unary, parsed
+from multidrop.families.lexium.manual.groups import READ_BACK
 from multidrop.families.lexium.manual.mnemonic import EXPANDED
 from multidrop.families.lexium.manual.points import EXPANDED_INPUTS, INPUTS, STATUS, in_words
 from multidrop.families.lexium.manual.program_file import commented
@@ -204,13 +205,6 @@ def _make_sure(state: MCodeState, request: Request, fate: str) -> Procedure[None
 # Everything else is reported as not confirmed. (MCode reference 5.1.21, 5.1.39; decision 0010.)
 
 
-READ_BACK = {
-    *("A", "D", "DB", "DE", "DT", "EE", "HC", "HT", "JE", "LK", "LM", "MS", "MT", "NE"),
-    *("PM", "R1", "R2", "R3", "R4", "RC", "SF", "SM", "VI", "VM", "WT"),
-}
-"""Words that print the number that was written, until something writes another one."""
-ROUNDED = {"A": 100, "D": 100}
-"""Greatest difference between the number written and the number read, where a drive rounds."""
 ACTIVITY = 'BY," ",MV," ",P', f"[01] [01] {INTEGER}"
 """Items of PR and their form: whether a program runs, whether the drive moves, its position."""
 
@@ -234,7 +228,7 @@ def confirm_effect(state: MCodeState, request: Request, before: list[int]) -> Pr
     if (setting := written(request.text)) is not None:
         word, number = setting
         found = yield from _numbers(state, f'{word}," ",BY', f"{INTEGER} [01]")
-        if found and abs(found[0] - number) <= ROUNDED.get(word, 0):
+        if found and abs(found[0] - number) <= READ_BACK[word]:
             return
         if found and not found[1]:  # a running program may have written another number meanwhile
             fate = "it is not known whether it was executed; it was sent once"

@@ -23,6 +23,7 @@ from multidrop.families.lexium.host.mcode.settings import listed
 from multidrop.families.lexium.host.mcode.state import MCodeState
 from multidrop.families.lexium.manual import editing, help, program_file
 from multidrop.families.lexium.manual.grammar import Compare, Name, parsed
+from multidrop.families.lexium.manual.groups import LAST_LINES
 from multidrop.families.lexium.manual.statements import size_of
 
 # The programs of a file and of a listing.
@@ -36,8 +37,6 @@ from multidrop.families.lexium.manual.statements import size_of
 
 GAP = 64
 """Bytes between the addresses of two lines, more than one line takes: another program begins."""
-ENDS = {"E", "RT", "BR"}
-"""The words that a program ends with."""
 GLOBAL, LOCAL, LABEL = "G", "L", "label"
 """Kinds of names in a drive: a variable of the two scopes that PR UV prints, or a label of the program."""
 _LISTED = re.compile(r"(\d+)\s+(\S.*)", re.ASCII)
@@ -100,7 +99,7 @@ def programs(lines: Sequence[Stored], product: str = "", fine: bool = False) -> 
     end = -1
     for line in lines:
         before = found[-1][-1] if found else None
-        ends = before is not None and (fine or classify.word_of(before.text)[0] in ENDS)
+        ends = before is not None and (fine or classify.word_of(before.text)[0] in LAST_LINES)
         if before is None or line.at - before.at > GAP or (line.at > end and ends):
             found.append([])
         found[-1].append(line)

@@ -20,6 +20,7 @@ from typing import NamedTuple
 from multidrop.dialects.codec import Kind, Request
 from multidrop.families.lexium.host import classify
 from multidrop.families.lexium.host.mcode import framing
+from multidrop.families.lexium.manual.groups import SLOW
 
 SHORT, PATIENT, FLASH = 0.02, 0.15, 3.0
 LIST_QUIET = 0.25
@@ -80,7 +81,7 @@ class Received:
     @property
     def is_slow(self) -> bool:
         """Whether the command writes to the flash memory, which takes seconds."""
-        return classify.word_of(self.request.text)[0] in classify.SLOW
+        return classify.word_of(self.request.text)[0] in SLOW
 
     @property
     def ends_in_last_line(self) -> bool:

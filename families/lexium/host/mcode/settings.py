@@ -35,6 +35,7 @@ from multidrop.families.lexium.host.mcode.state import MCodeState, refuse_in_pro
 from multidrop.families.lexium.host.parameters import LexiumParameters
 from multidrop.families.lexium.host.values import rows_of_list
 from multidrop.families.lexium.manual import parameters as manual
+from multidrop.families.lexium.manual.groups import BANKED, COUNTED, LISTS
 from multidrop.families.lexium.manual.mnemonic import ENCODER, MDRIVE_ENCODER, Mnemonic
 from multidrop.families.lexium.manual.parameters import Form, form_of
 from multidrop.families.lexium.manual.program_file import LONGEST
@@ -75,7 +76,7 @@ def _readings(
         if (row[2] or "").upper() == "G":
             rows.append(Reading(row[1].upper(), float(row[3]) if "." in row[3] else int(row[3]), VARIABLES))
     if state.product in ENCODER | MDRIVE_ENCODER:
-        *names, last = sorted(manual.COUNTED if manual.locks_resolution(state.product) else manual.COUNTED - {"MS"})
+        *names, last = sorted(COUNTED if manual.locks_resolution(state.product) else BANKED)
         here, other = ("encoder counts", "steps") if counts else ("steps", "encoder counts")
         why = f"the drive moves in {here} now, and prints only the values for these"
         unread = [*unread, (f"{', '.join(names)} and {last} for {other}", why)]
@@ -147,7 +148,7 @@ def _numbered(state: MCodeState, word: str, numbers: Sequence[int]) -> Procedure
 
     Drives without an encoder may print its index mark, input 6, all the same.
     """
-    if numbers[-1] != manual.LISTS[word][-1]:
+    if numbers[-1] != LISTS[word][-1]:
         return (yield from listed(state, f"PR {word}"))
     yield from before_request(state, question(state, "EF", "[01]"))
     reply = yield list_request(state, word, numbers)

@@ -44,7 +44,7 @@ from multidrop.families.lexium.host.motions import POINTS, cause
 from multidrop.families.lexium.host.values import SNAPSHOT_WORDS, LexiumValues, number_in, rows_of_list
 from multidrop.families.lexium.manual import parameters as manual
 from multidrop.families.lexium.manual import points
-from multidrop.families.lexium.manual.mnemonic import EVERY
+from multidrop.families.lexium.manual.mnemonic import EVERY, LEXIUM, MDRIVE_PLUS
 from multidrop.families.lexium.manual.parameters import Form, form_of
 from multidrop.families.lexium.manual.statements import UNNAMED
 from multidrop.families.lexium.manual.table import lookup, words
@@ -58,11 +58,8 @@ from multidrop.families.lexium.manual.table import lookup, words
 
 STATE = ("EF", "BY", "MV", "VC", "MP", "DE", "ST", "P", "IN", "I5", "AF")
 """What changes by itself, or by a program; the flags first, which need no separator."""
-SETTINGS = ("EE", "AS", "RC", "HC", "VI", "VM", "A", "D")
 SETTLED = "IS1"
 """Among the facts once the set-ups were read."""
-UNSURE = frozenset({"EE", "AS", "AF", "I5", "ST"})
-"""Words that not every Lexium has."""
 REFUSAL = "refuses to print its conditions"
 NUMBER = r"-?\d{1,10}(?:\.\d+)?"
 """What a value for a plot prints: one signed print each, and never a word whose reading clears it."""
@@ -108,7 +105,7 @@ class MCodeValues(LexiumValues):
             return ()
         found = [
             Part("state", partial(self._state, before=facts)),
-            Part("settings", partial(self._values, names=SETTINGS), slow=True),
+            Part("settings", partial(self._values, names=points.SETTINGS), slow=True),
         ]
         if facts.get("BY") and SETTLED in facts:
             return found  # a list has no signature, and a program prints lines, too
@@ -173,7 +170,9 @@ class MCodeValues(LexiumValues):
         state = self.state
         table, known = words(state.product), state.product in EVERY
         batch = [table[name] for name in names if name in table]
-        batch = [row for row in batch if (state.product in row.products if known else row.name not in UNSURE)]
+        batch = [
+            row for row in batch if (state.product in row.products if known else row.products in (LEXIUM, MDRIVE_PLUS))
+        ]
         items, forms = items_and_forms(batch)
         answer = "".join(f"(?:{form})" for form in forms)
         yield from before_request(state, replace(question(state, items, answer), priority=Priority.POLL))

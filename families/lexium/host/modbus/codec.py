@@ -15,6 +15,7 @@ from multidrop.dialects.state import DriveState
 from multidrop.families.lexium.host import classify
 from multidrop.families.lexium.host.modbus import framing
 from multidrop.families.lexium.manual.grammar import LineError, parse
+from multidrop.families.lexium.manual.groups import CALM_AT_0
 from multidrop.families.lexium.manual.modbus.registers import REGISTERS
 from multidrop.families.lexium.manual.table import lookup
 
@@ -31,8 +32,6 @@ UNKNOWN = "this device did not identify itself as a Lexium drive"
 """What is said of a device whose identification (43/14) does not name a Lexium drive, or was not read."""
 USER = frozenset(f"V{n}" for n in range(1, 9))
 """The user variables that have a register."""
-ENDS_AT_0 = frozenset({"SL", "JE", "TE"})
-"""Words that start nothing with the value 0."""
 
 
 @cache
@@ -136,7 +135,7 @@ class Modbus(Codec):
         if statement is None or statement.word in USER:
             return False
         row, values = lookup(statement.word), [getattr(each, "value", None) for each in statement.arguments]
-        return row is None or (row.starts and not (row.name in ENDS_AT_0 and values == [0]))
+        return row is None or (row.starts and not (row.name in CALM_AT_0 and values == [0]))
 
     def started(self, text: str) -> Started:
         return classify.started(text)

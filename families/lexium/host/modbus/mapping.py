@@ -26,15 +26,12 @@ from multidrop.families.lexium.manual.modbus.registers import (
     REGISTERS,
     SETUPS,
     Register,
+    Takes,
 )
 from multidrop.families.lexium.manual.table import lookup
 
 READ_ONLY, UNREADABLE = ErrorNumber.READ_ONLY, ErrorNumber.NOT_PRINTABLE
 """The drive's own errors for a word that can only be read, or not be printed."""
-TRIGGERS = frozenset({"S", "IP", "CF", "SC"})
-"""Commands without a value; their registers take a 1."""
-STEPS = frozenset({"IC", "DC"})
-"""Commands that name a variable; their registers take its address."""
 OBJECTS = ("vendor", "part number", "revision", "web page", "product", "serial number", "version")
 """The objects of the device identification on these drives (4.1.1)."""
 EVERY_OBJECT, ONE_OBJECT = 3, 4
@@ -66,13 +63,14 @@ def command(statement: Statement) -> bytes:
         raise unavailable(word)
     if not register.writable:
         raise Refused(f"{word} cannot be written: error {READ_ONLY}: {errors.text(READ_ONLY)}", READ_ONLY)
-    return write(register, _value(word, arguments))
+    return write(register, _value(register, arguments))
 
 
-def _value(word: str, arguments: Sequence[Argument | None]) -> int:
-    if word in TRIGGERS and not arguments:
+def _value(register: Register, arguments: Sequence[Argument | None]) -> int:
+    word = register.name
+    if register.takes is Takes.COMMAND and not arguments:
         return 1
-    if word in STEPS:
+    if register.takes is Takes.VARIABLE:
         name = arguments[0] if len(arguments) == 1 else None
         if not isinstance(name, Name):
             raise Inexpressible(f"{word} needs a variable, as in {word} R1")

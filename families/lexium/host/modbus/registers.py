@@ -10,7 +10,7 @@ from multidrop.families.lexium.host.modbus import framing, mapping
 from multidrop.families.lexium.host.modbus.codec import ModbusState, pdu_codec
 from multidrop.families.lexium.host.modbus.identity import WARNING, identification, recognise
 from multidrop.families.lexium.host.modbus.operations import answered, carried_out, request
-from multidrop.families.lexium.manual.modbus.registers import AT, Register
+from multidrop.families.lexium.manual.modbus.registers import AT
 
 MOST = 2
 """Most registers in one request (4.2.4, 4.2.5)."""
@@ -43,11 +43,10 @@ class ModbusRegisters(Registers):
         if len(values) == 1 and row is not None and row.address == address:
             pdu = mapping.write(row, values[0])
         else:
-            plain = Register("", address, 1, 2, "RW", "")
             if not 1 <= len(values) <= MOST:
                 raise Inexpressible(f"a request carries 1 or {MOST} registers, not {len(values)}")
             if wrong := [value for value in values if not -0x8000 <= value <= 0xFFFF]:
-                raise Inexpressible(f"{wrong[0]} does not fit into a register at 0x{plain.address:04X}")
+                raise Inexpressible(f"{wrong[0]} does not fit into a register at 0x{address:04X}")
             pdu = pdu_codec().write_registers(address, [value & 0xFFFF for value in values])
         text = ",".join(map(str, values))
         yield from carried_out(self.state, f"/register 0x{address:04X} ={text}", pdu)

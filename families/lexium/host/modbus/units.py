@@ -5,10 +5,10 @@ from __future__ import annotations
 from multidrop.dialects.codec import Procedure, Request
 from multidrop.dialects.units import Basis
 from multidrop.families.lexium.host import units
-from multidrop.families.lexium.host.classify import WHOLE
 from multidrop.families.lexium.host.modbus import framing
 from multidrop.families.lexium.host.modbus.codec import ModbusState
 from multidrop.families.lexium.host.modbus.operations import value
+from multidrop.families.lexium.manual.groups import RESTORING, SCALES
 from multidrop.families.lexium.manual.modbus.registers import AT, REGISTERS
 
 
@@ -32,4 +32,4 @@ class ModbusUnits(units.LexiumUnits):
             return False
         first, count = int.from_bytes(request.body[1:3]), int.from_bytes(request.body[3:5])
         written = (AT.get(address) for address in range(first, first + count))
-        return any(row.name in (*units.RESTS, *WHOLE) for row in written if row is not None)
+        return any(row.name in (*SCALES, *RESTORING) for row in written if row is not None)

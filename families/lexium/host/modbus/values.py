@@ -45,13 +45,12 @@ from multidrop.families.lexium.host.parameters import LexiumParameters
 from multidrop.families.lexium.host.values import SNAPSHOT_WORDS, LexiumValues, rows_of_list
 from multidrop.families.lexium.manual import parameters as manual
 from multidrop.families.lexium.manual import points
+from multidrop.families.lexium.manual.groups import LISTS
 from multidrop.families.lexium.manual.mnemonic import EVERY
 from multidrop.families.lexium.manual.modbus.registers import IDENTITY, REGISTERS, SETUPS
 from multidrop.families.lexium.manual.parameters import reading_of
 from multidrop.families.lexium.manual.table import words
 
-OTHER_FORM = frozenset({"TS", "TA"})
-"""Registers whose values are not those of the word."""
 NO_REGISTER = "no Modbus register; MCode/TCP (tcp://HOST:503) reads it"
 DECLARED = tuple((f"V{n}", "reading it is an error unless a program declares it") for n in range(1, 9))
 
@@ -61,7 +60,7 @@ def _why_not(name: str, value: Value) -> str:
     if re.fullmatch(r"[IO]S\d", name):
         return ""
     row = REGISTERS.get(name)
-    if row is None or name in OTHER_FORM:
+    if row is None or "values" in row.differs:
         return NO_REGISTER.replace("reads", "writes")
     if isinstance(value, (int, float)) and not row.allows(int(number(value))):
         return f"its register takes {row.limits}; MCode/TCP (tcp://HOST:503) may take it"
@@ -77,7 +76,7 @@ class ModbusParameters(LexiumParameters):
         """Read every setting that a register has. Raises NoAnswer; nothing is changed or cleared."""
         state = self.state
         settings = [each.name for each in manual.settings(state.product, state.version, state.part)]
-        names = [name for name in settings if name in REGISTERS and name not in OTHER_FORM]
+        names = [name for name in settings if name in REGISTERS and "values" not in REGISTERS[name].differs]
         lists = {word: rows for word, rows in manual.lists(state.product, state.version).items() if word != "LS"}
         found: dict[str, Value] = {}
         unread = [*manual.unread(state.product), *DECLARED]
@@ -126,7 +125,6 @@ class ModbusParameters(LexiumParameters):
 FLAGS = ("EF", "BY", "MV", "DE")
 SIGNS = ("ST", "AF")
 """What shows the cause of an error, on drives that have it."""
-SETTINGS = ("EE", "AS", "RC", "HC", "VI", "VM", "A", "D")
 INPUTS = 4
 
 
@@ -171,7 +169,7 @@ class ModbusValues(LexiumValues):
         table = words(state.product)
         signs = [n for n in SIGNS if state.product in EVERY and state.product in table[n].products]
         found = [Part("state", partial(self._state, names=(*FLAGS, *signs), before=facts))]
-        has = [n for n in SETTINGS if state.product not in EVERY or state.product in table[n].products]
+        has = [n for n in points.SETTINGS if state.product not in EVERY or state.product in table[n].products]
         found += [Part(name, partial(self._registers, names=(name,)), slow=True) for name in has]
         lists = manual.lists(state.product, state.version)
         found += [Part(word, partial(self._setups, word=word), slow=True) for word in ("IS", "OS") if word in lists]
@@ -221,4 +219,4 @@ class ModbusValues(LexiumValues):
         return found
 
     def _setups(self, word: str) -> Procedure[Facts]:
-        return _rows(word, manual.LISTS[word], (yield from printed(self.state, word, Priority.POLL)))
+        return _rows(word, LISTS[word], (yield from printed(self.state, word, Priority.POLL)))

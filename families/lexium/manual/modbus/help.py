@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable
+from dataclasses import replace
 
 from multidrop.base.errors import Diagnostic
 from multidrop.families.lexium.manual import help as mcode
@@ -15,6 +16,7 @@ from multidrop.families.lexium.manual.mnemonic import ETHERNET, INT_HIGH, INT_LO
 from multidrop.families.lexium.manual.modbus.registers import (
     ALTERNATIVE,
     AT,
+    BY_FUNCTION,
     CONTROLS,
     IDENTITY,
     INPUTS,
@@ -23,19 +25,15 @@ from multidrop.families.lexium.manual.modbus.registers import (
     SETUPS,
     Register,
 )
-from multidrop.families.lexium.manual.table import lookup, words
+from multidrop.families.lexium.manual.table import MNEMONICS, lookup, words
 
 LAST = max(AT)
 _ADDRESS = re.compile(r"0[xX]([0-9A-Fa-f]{1,4})")
 _USER = re.compile(r"V[1-8]")
 _ELSEWHERE = re.compile(r"BR <|.*<operator>|.*,<1/2>")
 """Forms of MCode that no register carries: conditions, expressions, a second parameter of PR."""
-REACHED = REGISTERS.keys() | SETUPS | CONTROLS | IDENTITY.keys() | {"E", "PR", "AL"}
+REACHED = REGISTERS.keys() | BY_FUNCTION | {"PR", "AL"}
 """Every word that Modbus carries."""
-SAID_BY_FORM = frozenset({"AF", "ER"})
-"""Names whose note for MCode says what the form of the register contradicts."""
-OWN_FORM = frozenset({"TS", "OT"})
-"""Names whose register has a range of its own, which MCode's does not narrow."""
 LABELS = (
     *("syntax", "register", "function", "range", "form", "over MCode", "default", "access", "products", "here", "note"),
     "manual",
@@ -107,16 +105,15 @@ def _place_of(register: Register, address: int) -> str:
 
 
 def _user_variable(name: str) -> Mnemonic:
-    return Mnemonic(
-        name,
-        f"User variable {name[1:]}",
-        "a variable of a program in the drive",
-        "",
-        f"{name}=<integer>, PR {name}",
-        "RW",
-        "variable",
-        low=INT_LOW,
-        high=INT_HIGH,
+    """A number of the user's own, as R1 is."""
+    return replace(
+        MNEMONICS["R1"],
+        name=name,
+        title=f"User variable {name[1:]}",
+        meaning="a variable of a program in the drive",
+        section="",
+        syntax=f"{name}=<integer>, PR {name}",
+        default=None,
     )
 
 
@@ -140,7 +137,7 @@ def _facts(row: Mnemonic, product: str) -> dict[str, str]:
             "over MCode": _of_the_drive(register, row),
             "default": _default(register, said["default"]),
             "access": mcode.ACCESS[register.access],
-            "note": "" if row.name in SAID_BY_FORM else said["note"],
+            "note": "" if "note" in register.differs else said["note"],
         }
     return {label: merged.get(label, "") for label in LABELS}
 
@@ -173,7 +170,7 @@ def _range(register: Register, row: Mnemonic) -> str:
     if not register.limits:
         return ""
     text = shown(register.limits)
-    other = register.name == "TS"
+    other = "values" in register.differs
     unit = "" if other else row.unit
     if unit and row.unit_encoder and row.unit_encoder != unit:
         unit += f" (EE=0), {row.unit_encoder} (EE=1)"
@@ -195,7 +192,7 @@ def _of_the_drive(register: Register, row: Mnemonic) -> str:
     same = same or set(row.values) == {low for low, _ in register.spans}
     if same:
         return ""
-    both = "; a write must satisfy both" if register.writable and register.name not in OWN_FORM else ""
+    both = "; a write must satisfy both" if register.writable and "range" not in register.differs else ""
     return f"{mcode.range_of(row)}{both}"
 
 

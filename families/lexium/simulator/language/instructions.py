@@ -16,19 +16,18 @@ from functools import partial
 
 from multidrop.families.lexium.manual.errors import ErrorNumber as E
 from multidrop.families.lexium.manual.grammar import Argument, Name, Number, Statement, Text
+from multidrop.families.lexium.manual.groups import LISTS, TRIPS, TRIPS_WITH_VALUE
 from multidrop.families.lexium.manual.mnemonic import Mnemonic
 from multidrop.families.lexium.manual.table import MNEMONICS
 from multidrop.families.lexium.simulator.event_loop import EventLoop
 from multidrop.families.lexium.simulator.language.motor_commands import MotorCommands, Setups
 from multidrop.families.lexium.simulator.language.program_commands import ProgramCommands
 from multidrop.families.lexium.simulator.language.variables import Compile, Variables, bare, is_place, only
-from multidrop.families.lexium.simulator.motion.counters import BITS
 from multidrop.families.lexium.simulator.state.errors import CRLF, Fault
 from multidrop.families.lexium.simulator.state.expressions import FLOATS, Read, Value, whole, wrap
 from multidrop.families.lexium.simulator.state.memory import slot
 from multidrop.families.lexium.simulator.state.program_memory import Action
 
-PRINTED_INPUTS = (1, 2, 3, 4, 6)
 Item = Callable[[], str]
 Optional = Callable[[int], str]
 
@@ -55,7 +54,7 @@ class Prints:
             "ER": self._error,
             "AL": lambda: _listed(self._parameters()),
             "UV": lambda: _listed(self._names()),
-            **{word: partial(self._joined, word) for word in ("IS", "OS", "LS")},
+            **{word: partial(self._joined, word) for word in LISTS},
             "DN": lambda: f'"{texts("DN")}"',
             "MD": lambda: texts("MD"),
             "PF": lambda: texts("PF") or str(MNEMONICS["PF"].default),
@@ -66,7 +65,7 @@ class Prints:
             "VR": lambda: model.version,
             "CR": lambda: f"{values['CR']:.3f}",
             **{f"S{n}": partial(self._point, n) for n in (*range(1, 6), *range(7, 14))},
-            **{word: partial(self._trip, word) for word in BITS},
+            **{word: partial(self._trip, word) for word in TRIPS},
         }
         self._with_option: Mapping[str, Optional] = {"IT": self._temperature, "VT": self._voltage}
 
@@ -156,7 +155,7 @@ class Prints:
         for name, row in self._memory.words.items():
             if row.kind not in ("variable", "flag") or row.access == "WO" or self._memory.product not in row.products:
                 continue
-            if name in ("IS", "OS", "LS"):
+            if name in LISTS:
                 rows += self._setups(name)
             else:
                 rows.append(f"{name} = {self._parameter(name)}")
@@ -172,7 +171,7 @@ class Prints:
     def _setups(self, word: str) -> list[str]:
         """The lines of PR IS, PR OS or PR LS."""
         if word == "IS":
-            return [f"IS = {n}, {self._point(n)}" for n in PRINTED_INPUTS]
+            return [f"IS = {n}, {self._point(n)}" for n in LISTS["IS"]]
         rows = self._outputs.types if word == "OS" else self._motor.limits.software
         return [f"{word} = {n}, {_fields(each)}" for n, each in rows.items()]
 
@@ -181,12 +180,12 @@ class Prints:
 
     def _trip(self, word: str) -> str:
         """PR of a trip; 0 for one that is not set up."""
-        trip = self._motor.trips.defined.get(BITS[word])
+        trip = self._motor.trips.defined.get(TRIPS[word])
         if trip is None:
             return "0"
         target = trip.target
         name = target.word if isinstance(target, Name) else str(target.value if isinstance(target, Number) else 0)
-        if word in ("TC", "TM"):
+        if word not in TRIPS_WITH_VALUE:
             return name
         return f"{trip.value}, {name}" + (f", {trip.repeats}" if word == "TR" else "")
 

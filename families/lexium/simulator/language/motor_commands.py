@@ -12,11 +12,11 @@ from math import inf
 
 from multidrop.families.lexium.manual.errors import ErrorNumber as E
 from multidrop.families.lexium.manual.grammar import Argument, Number, Statement
+from multidrop.families.lexium.manual.groups import TRIPS, TRIPS_WITH_VALUE
 from multidrop.families.lexium.manual.statements import device_name as device_name_of
 from multidrop.families.lexium.manual.table import lookup
 from multidrop.families.lexium.simulator.event_loop import EventLoop
 from multidrop.families.lexium.simulator.language.variables import Compile, Variables, bare, is_place, missing, only
-from multidrop.families.lexium.simulator.motion.counters import BITS
 from multidrop.families.lexium.simulator.motion.inputs import ANALOG
 from multidrop.families.lexium.simulator.state.errors import Fault
 from multidrop.families.lexium.simulator.state.expressions import whole
@@ -143,8 +143,8 @@ class Setups:
             "PF": numbers(self._print_format, 1, 4),
             "PW": numbers(partial(self._keep, "PW"), 4, 4),
             **{f"S{n}": self._point(n) for n in self._points.fresh if self._points.shared},
-            **{word: partial(self._place_trip, word) for word in ("TC", "TM")},
-            **{word: partial(self._value_trip, word) for word in ("TI", "TP", "TT", "TR", "TA")},
+            **{word: partial(self._place_trip, word) for word in TRIPS.keys() - TRIPS_WITH_VALUE},
+            **{word: partial(self._value_trip, word) for word in TRIPS_WITH_VALUE},
         }
 
     # Inputs and outputs.
@@ -243,7 +243,7 @@ class Setups:
         if not arguments:
             raise missing(statement)
         if word == "TA" and arguments == (Number(0),):
-            return lambda: self._motor.trips.forget(BITS[word])
+            return lambda: self._motor.trips.forget(TRIPS[word])
         if len(arguments) < 2 and not repeats_too:
             raise Fault(E.NO_SEPARATOR)
         value_at, *more = arguments
@@ -277,4 +277,4 @@ class Setups:
     def _define(self, word: str, trip: Trip) -> None:
         if trip.target is not None:
             self._program.check(trip.target)
-        self._motor.trips.define(BITS[word], trip)
+        self._motor.trips.define(TRIPS[word], trip)

@@ -13,11 +13,11 @@ from math import inf
 
 from multidrop.families.lexium.manual.errors import ErrorNumber as E
 from multidrop.families.lexium.manual.grammar import Argument, Compare, Name, Number, Statement, Text
+from multidrop.families.lexium.manual.groups import BANKED, TRIPS, TRIPS_WITH_VALUE
 from multidrop.families.lexium.simulator.event_loop import EventLoop
-from multidrop.families.lexium.simulator.motion.counters import BITS
 from multidrop.families.lexium.simulator.state.errors import Fault
 from multidrop.families.lexium.simulator.state.expressions import PI, Compiler, Read, Value, whole
-from multidrop.families.lexium.simulator.state.memory import BANKED, slot, within
+from multidrop.families.lexium.simulator.state.memory import slot, within
 from multidrop.families.lexium.simulator.state.program_memory import Action
 
 Write = Callable[[Value], None]
@@ -32,8 +32,6 @@ WATCHED = ("HC", "LD", "LG", "LT", "RC", "SM", "TD", "TQ", "WT", "CM")
 """Plain variables on which it depends what happens next."""
 POINTS = (1, 2, 3, 4, 9, 10, 11, 12)
 """Inputs and outputs that bear a word each."""
-WITH_VALUE = ("TI", "TP", "TT", "TR", "TA")
-"""Trips that read as the first number of their set-up."""
 Compile = Callable[[Statement], Action]
 """Compiles the statement of one instruction. Raises Fault for a wrong form."""
 
@@ -130,7 +128,7 @@ class Variables:
             return defined.value if defined else 0
 
         return {
-            **{word: partial(trip, BITS[word]) for word in WITH_VALUE},
+            **{word: partial(trip, TRIPS[word]) for word in TRIPS_WITH_VALUE},
             "IN": lambda: inputs.levels((*low, *high)),
             "IL": lambda: inputs.levels(low),
             "IH": lambda: inputs.levels(high),

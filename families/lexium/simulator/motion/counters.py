@@ -14,6 +14,7 @@ from collections.abc import Mapping
 from math import floor, inf, nextafter
 
 from multidrop.families.lexium.manual.errors import ErrorNumber as E
+from multidrop.families.lexium.manual.groups import TRIPS
 from multidrop.families.lexium.simulator.motion.inputs import MINUS, PLUS, Inputs
 from multidrop.families.lexium.simulator.motion.rotor import Rotor
 from multidrop.families.lexium.simulator.state.errors import Fault
@@ -165,10 +166,9 @@ class Limits:
         return inf if t == inf else counters.passing(place, t, direction)
 
 
-INPUT, POSITION, CAPTURE, TIME, RELATIVE, HMT, POWER = 1, 2, 4, 8, 16, 32, 64
-BITS: Mapping[str, int] = {
-    "TI": INPUT, "TP": POSITION, "TC": CAPTURE, "TT": TIME, "TR": RELATIVE, "TA": HMT, "TM": POWER,
-}  # fmt: skip
+INPUT, POSITION, CAPTURE, TIME, RELATIVE, HMT, POWER = (
+    TRIPS[word] for word in ["TI", "TP", "TC", "TT", "TR", "TA", "TM"]
+)
 
 
 class Trips:
@@ -210,7 +210,7 @@ class Trips:
 
     def arm(self, bits: int, t: float) -> None:
         """Set TE. Raises Fault (12, 27, 39)."""
-        if any(bits & bit and bit not in self.defined for bit in BITS.values()):
+        if any(bits & bit and bit not in self.defined for bit in TRIPS.values()):
             raise Fault(E.TRIP_NOT_SET_UP)
         if bits & POSITION and bits & RELATIVE:
             raise Fault(E.TRIPS_EXCLUSIVE)

@@ -34,7 +34,17 @@ from collections.abc import Callable, Mapping, Sequence
 from struct import pack, unpack
 
 from multidrop.families.lexium.manual.grammar import Name, Number
-from multidrop.families.lexium.manual.modbus.registers import AT, REGISTERS, Register
+from multidrop.families.lexium.manual.groups import MOTIONS
+from multidrop.families.lexium.manual.modbus.registers import (
+    AT,
+    CONTROLS,
+    IDENTITY,
+    OUTPUTS,
+    POINTS,
+    REGISTERS,
+    SETUPS,
+    Register,
+)
 from multidrop.families.lexium.simulator.device import Answer, MCodeDevice
 from multidrop.families.lexium.simulator.motion.counters import HMT, RELATIVE
 
@@ -43,15 +53,14 @@ VALUE_ERRORS = frozenset({21, 22, 23, 76, 77})
 """Codes of ER that say that a number is out of range."""
 MOST_REGISTERS = 2
 """Registers in one request (4.2.4)."""
-POINTS = 4
+COUNTED_POINTS = 4
 """Inputs; outputs are counted to four too, though there are three."""
-OUTPUTS = 3
 INPUT_REGISTERS = REGISTERS["I1"].address
 OSCILLATOR = 10_000_000
 MASKS = range(32)
 CRLF = "\r\n"
-READ_BY_NAME = ("IS", "OS", "TR", "MU", *(f"S{n}" for n in range(1, 6)))
-WRITTEN_BY_NAME = ("EX", "PS", "RS", *READ_BY_NAME)
+READ_BY_NAME = SETUPS | POINTS.keys()
+WRITTEN_BY_NAME = CONTROLS | READ_BY_NAME
 END = "E"
 """Both functions take it (4.3.1)."""
 LONGEST_DATA = 28
@@ -129,7 +138,7 @@ class Registers:
         return [active.get(n, False) for n in range(start + 1, start + count + 1)]
 
     def write_coil(self, address: int, on: bool, now: float) -> None:
-        if not address < OUTPUTS:
+        if not address < len(OUTPUTS):
             raise Refusal(ILLEGAL_ADDRESS)
         self.carry_out(f"O{address + 1}={int(on)}", now)
 
@@ -142,9 +151,9 @@ class Registers:
             return ""
         if name not in READ_BY_NAME:
             raise Refusal(ILLEGAL_VALUE)
-        if name in POINT_OF:
+        if name in POINTS:
             self._drive.advance(now)
-            return ", ".join(str(each) for each in (*self._inputs.types[POINT_OF[name]], 0)[:3])
+            return ", ".join(str(each) for each in (*self._inputs.types[POINTS[name]], 0)[:3])
         if name == "TR" and RELATIVE not in self._trips.defined:
             return "0, 0, 0"
         return CRLF.join(self.carry_out(f"PR {name}", now).lines)[:LONGEST_TEXT]
@@ -156,9 +165,9 @@ class Registers:
         if len(data) > LONGEST_DATA or any(not 0x20 <= byte < 0x7F for byte in data):
             raise Refusal(ILLEGAL_VALUE)
         text = data.decode("ascii")
-        if name in POINT_OF:
+        if name in POINTS:
             kind, active, *_ = (*text.removeprefix("=").split(","), "", "")
-            name, text = "IS", f"={POINT_OF[name]},{kind},{active}".removesuffix(",")
+            name, text = "IS", f"={POINTS[name]},{kind},{active}".removesuffix(",")
         self.carry_out(f"{name}{text}" if text.startswith("=") else f"{name} {text}", now)
 
     def _trip(self, now: float) -> int:
@@ -200,9 +209,9 @@ def _rows(start: int, count: int) -> list[Register]:
 
 
 def _check_points(start: int, count: int) -> None:
-    if not 1 <= count <= POINTS:
+    if not 1 <= count <= COUNTED_POINTS:
         raise Refusal(ILLEGAL_VALUE)
-    if not 0 <= start <= start + count <= POINTS:
+    if not 0 <= start <= start + count <= COUNTED_POINTS:
         raise Refusal(ILLEGAL_ADDRESS)
 
 
@@ -244,13 +253,10 @@ def _line(row: Register, value: int) -> str:
             if mask not in MASKS:
                 raise Refusal(ILLEGAL_VALUE)
             return f"TA={mask},{place}"
-    return f"{name} {value}" if name in ORDERS else f"{name}={value}"
+    return f"{name} {value}" if name in MOTIONS else f"{name}={value}"
 
 
-ORDERS = frozenset({"MA", "MR", "SL", "HM", "HI"})
-"""Instructions with a value."""
-
-READ_ALSO = frozenset({"O1", "O2", "O3"})
+READ_ALSO = OUTPUTS.keys()
 """Write only by name, but a note of 4.2.2 has them read."""
 
 SHOWN: Mapping[str, Callable[[int], int]] = {
@@ -261,10 +267,6 @@ SHOWN: Mapping[str, Callable[[int], int]] = {
     "TS": lambda speed: min(max(round(OSCILLATOR / speed) - 2, 0), 255) if speed else 0,
 }
 """Where a register's form is another than MCode's."""
-
-POINT_OF: Mapping[str, int] = {f"S{n}": n for n in range(1, 6)}
-"""The inputs by the name that the manual's example has for their set-up (4.3.3), the older drives' own."""
-
 
 HEADER = 6
 """Bytes before those that the length counts."""
@@ -378,7 +380,7 @@ class ModbusPort:
         listed = b""
         for number in wanted:
             given = PRINTED.get(number)
-            value = (self._registers.text(given, now) if given else IDENTITY[number]).encode("ascii")
+            value = (self._registers.text(given, now) if given else TEXTS[number]).encode("ascii")
             listed += bytes((number, len(value))) + value
         return bytes((DEVICE_ID, code, CONFORMITY, 0, 0, len(wanted))) + listed
 
@@ -401,12 +403,12 @@ def _mnemonic(raw: bytes) -> str:
     return raw.decode("latin-1").lstrip(" ")[::-1]
 
 
-IDENTITY: Mapping[int, str] = {
+TEXTS: Mapping[int, str] = {
     0: "SEM USA",
     2: "4.0.0.0",
     3: "www.motion.schneider-electric.com",
     4: "Lexium MDrive Ethernet",
 }
 """The objects that are the same in every drive."""
-PRINTED: Mapping[int, str] = {1: "PN", 5: "SN", 6: "VR"}
+PRINTED: Mapping[int, str] = {number: word for word, number in IDENTITY.items()}
 """Those that a drive prints: its part number, serial number and firmware."""

@@ -13,7 +13,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 from multidrop.families.lexium.manual.errors import ErrorNumber as E
-from multidrop.families.lexium.manual.grammar import FUNCTIONS, Binary, Compare, Expression, Name, Number, Unary
+from multidrop.families.lexium.manual.grammar import Binary, Compare, Expression, Name, Number, Unary
+from multidrop.families.lexium.manual.groups import FUNCTIONS
 from multidrop.families.lexium.manual.statements import compares
 from multidrop.families.lexium.simulator.state.errors import Fault
 

@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 from multidrop.families.lexium.manual.errors import ErrorNumber as E
 from multidrop.families.lexium.manual.grammar import Argument
+from multidrop.families.lexium.manual.groups import BANKED, COUNTED, STATES, UNIT
 from multidrop.families.lexium.manual.mnemonic import Mnemonic
 from multidrop.families.lexium.manual.table import lookup, words
 from multidrop.families.lexium.simulator.state.errors import Fault
@@ -29,14 +30,8 @@ STATOR_BOUNDS = (1.1, 1.3, 1.5, 1.7)
 """Full steps between rotor and stator, by CB (manual 5.1.18)."""
 TABLE_SIZE = 192
 """Labels and user variables together (manual 3.3.1)."""
-BANKED = ("A", "D", "VI", "VM")
-"""Variables with one value for steps and another for encoder counts (manual 7.3.7)."""
 ENCODER_MS = 256
 """MS of all but an LMM while it counts (manual 7.3.7)."""
-NOT_KEPT = frozenset({"P", "C1", "C2", "PC", "ER", "EF", "IF", "TE", "ST", "LR", "AF", "OF", "LL", "V"})
-"""Counters, states and armed trips, which S does not keep; power-up resets them."""
-KEPT_BY_FD = frozenset({"FS", "PW"})
-"""What survives FD (manual 5.1.45)."""
 
 
 @dataclass
@@ -106,7 +101,7 @@ class Memory:
 
     def defaults(self) -> None:
         """Reset everything to factory defaults, and delete user variables."""
-        kept = {name: self.values[name] for name in KEPT_BY_FD if name in self.values}
+        kept = {name: self.values[name] for name in UNIT if name in self.values}
         self.values.clear()
         self.scopes.clear()
         self.values.update(_factory_values(self.product))
@@ -218,7 +213,7 @@ class Memory:
         was = self.counting
         self.values[word] = value
         if self.counting != was:
-            for name in BANKED if self.model.free_ms else (*BANKED, "MS"):
+            for name in BANKED if self.model.free_ms else COUNTED:
                 self.values[name], self.bank[name] = self.bank[name], self.values[name]
 
     def declare(self, name: str, scope: str, value: Value) -> None:
@@ -236,7 +231,7 @@ class Memory:
 
     def save(self, store: Store) -> None:
         users = {slot(name) for name in self.scopes}
-        store.values = {key: value for key, value in self.values.items() if key not in NOT_KEPT and key not in users}
+        store.values = {key: value for key, value in self.values.items() if key not in STATES and key not in users}
         store.bank, store.texts = dict(self.bank), {name: text for name, text in self.texts.items() if name != "MD"}
         store.users = {name: self.values[slot(name)] for name, scope in self.scopes.items() if scope == "G"}
 

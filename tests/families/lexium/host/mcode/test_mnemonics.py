@@ -6,8 +6,9 @@ import re
 import pytest
 
 from multidrop.families.lexium.manual import errors
+from multidrop.families.lexium.manual.groups import PRINTS_LINES
 from multidrop.families.lexium.manual.mnemonic import LEXIUM, MDRIVE_PLUS, Mnemonic
-from multidrop.families.lexium.manual.table import MDRIVE, MNEMONICS, NO_STEP, PRINTS_LINES, lookup, words
+from multidrop.families.lexium.manual.table import MDRIVE, MNEMONICS, lookup, words
 from tests.support.cases import for_each
 from tests.support.paths import FACTS
 
@@ -167,9 +168,9 @@ def test_words_that_print_lines() -> None:
 
 def test_what_may_not_be_stepped_and_with_which_error() -> None:
     allowed = {"A", "D", "P", "C1", "C2", "VI", "VM", "HC", "RC", "HT", "MT", "R1", "F8", "D1"}
-    assert {NO_STEP.get(word) for word in allowed} == {None}
-    assert {NO_STEP[word] for word in ("MS", "EM", "LM", "EE", "AS", "BD", "TE", "O1", "IS")} == {26}
-    assert {NO_STEP[word] for word in ("V", "MV", "I1", "BY", "VR", "PC", "MR")} == {25}
+    assert {row(word).step for word in allowed} == {0}
+    assert {row(word).step for word in ("MS", "EM", "LM", "EE", "AS", "BD", "TE", "O1", "IS")} == {26}
+    assert {row(word).step for word in ("V", "MV", "I1", "BY", "VR", "PC", "MR")} == {25}
 
 
 @for_each(

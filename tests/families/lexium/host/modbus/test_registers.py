@@ -1,28 +1,11 @@
 """The register map is whole, and its ranges say what they seem to say."""
 
-import csv
-
 import pytest
 
 from multidrop.dialects.families import FAMILIES
 from multidrop.families.lexium.host.modbus.codec import Modbus, ModbusState
 from multidrop.families.lexium.manual.modbus.registers import AT, REGISTERS, ROWS
 from multidrop.families.lexium.manual.table import lookup
-from tests.support.paths import FACTS
-
-TABLE_OF_FACTS = FACTS / "modbus-registers.csv"
-
-
-@pytest.mark.skipif(not TABLE_OF_FACTS.exists(), reason="the table of facts is not part of the product")
-def test_every_row_of_the_manual_is_there_and_no_other():
-    with TABLE_OF_FACTS.open(newline="") as file:
-        facts = [
-            (r["mnemonic"], int(r["address"], 16), int(r["registers"]), int(r["bytes"]), r["access"], r["range"])
-            + (int(r["default"]) if r["default"] else None,)
-            for r in csv.DictReader(file)
-        ]
-    ours = [(r.name, r.address, r.count, r.width, r.access, r.limits, r.default) for r in ROWS]
-    assert ours == facts
 
 
 def test_no_two_names_share_a_register():
