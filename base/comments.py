@@ -13,7 +13,7 @@ from typing import NamedTuple
 MARKS = "'`\\;#"
 """Every character that begins a comment in a language here; `//` does, too."""
 _GROUPS = re.compile(rf"(?:[{re.escape(MARKS)}][0-9]{{3}})+(?![0-9])(?:\.[0-9]*)?")
-_END = re.compile(rf"[ \t]*(?:\Z|[{re.escape(MARKS)}]|//)")
+_END = re.compile(r"[^ \t]|[ \t]*(?:\Z|[^ \tA-Za-z0-9])")
 _SCRIPTED = re.compile(r"(?:^|(?<=[ \t]))#")
 _SCRIPT = re.compile(r"""\"[^"]*(?:"|\Z)|(?<![^\s=])'[^']*'|(?P<comment>(?:^|(?<=[ \t]))\#.*)""", re.DOTALL)
 """A text in quotation marks, of which single ones begin a word of a verb's line; or a comment."""
@@ -46,7 +46,8 @@ class Grouped(NamedTuple):
 def grouped_at(line: str, mark: int) -> Grouped | None:
     """Return the number that the comment mark at this index divides in groups of three digits; None for a comment.
 
-    Groups of exactly three digits extend to the end of the line, or to another comment.
+    Groups of exactly three digits extend to the end of the line, to another comment, or to what goes on with the line:
+    the next field, an operator, an axis (`MA 51'200,1`). Behind a blank a word or a number is a comment's.
     """
     start = _number(line, mark)
     groups = _GROUPS.match(line, mark)

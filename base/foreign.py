@@ -14,13 +14,14 @@ from collections.abc import Awaitable, Callable, Iterator, Mapping
 from contextlib import AbstractContextManager, contextmanager
 from contextvars import ContextVar
 from functools import wraps
+from inspect import iscoroutinefunction
 from os.path import basename
 from types import GeneratorType
 from typing import Any
 
 from multidrop.base.errors import Diagnostic, DriveError, FeatureFailed, TransportLost, kind_and_text
 from multidrop.base.feature import Feature, Kinds
-from multidrop.base.isolation import LOG, OTHERS
+from multidrop.base.isolation import LOG, OTHERS, at_once, takes_signals
 
 READ: Kinds = (Diagnostic, DriveError, TransportLost, BrokenPipeError)
 """What passes as it is: the errors that a person reads, and the end of the reader of standard output."""
@@ -35,14 +36,19 @@ class Guard:
 
     @contextmanager
     def calling(self, passes: Kinds = ()) -> Iterator[None]:
-        """Call it in the body. Raises Diagnostic for all that it raises besides `READ` and `passes`; an exit, too."""
+        """Call it in the body. Raises Diagnostic for all that it raises besides `READ` and `passes`; an exit, too.
+
+        An interrupt in an event loop is its own, and would end the program without a word: see `takes_signals`.
+        """
         before = _calling.get()
         _calling.set(self)
         try:
             yield
         except (*READ, *passes):
             raise
-        except (Exception, SystemExit) as failure:
+        except (Exception, SystemExit, KeyboardInterrupt) as failure:
+            if isinstance(failure, KeyboardInterrupt) and not takes_signals():
+                raise  # Ctrl+C
             if LOG.hasHandlers():  # a screen keeps it; elsewhere it would be a traceback
                 LOG.getChild(OTHERS).error("the feature %s", self._name, exc_info=failure)
             raise FeatureFailed(
@@ -55,11 +61,16 @@ class Guard:
         """The function, guarded: also what it awaits, yields, enters and returns in a tuple."""
 
         @wraps(function)
+        async def awaited(*given: Any, **named: Any) -> Any:
+            with self.calling(passes):
+                return await function(*given, **named)
+
+        @wraps(function)
         def guarded(*given: Any, **named: Any) -> Any:
             with self.calling(passes):
                 return self._result(function(*given, **named), passes)
 
-        return guarded
+        return awaited if iscoroutinefunction(function) else guarded
 
     def _result(self, found: Any, passes: Kinds) -> Any:
         if isinstance(found, GeneratorType):
@@ -129,7 +140,11 @@ def guarded(feature: Feature) -> Feature:
 
 
 def callback(function: Callable[..., Any]) -> Callable[..., Any]:
-    """A function to be called later, which is guarded if a feature by others is being called: it is from there."""
+    """A function to be called later, which is guarded if a feature by others is being called: it is from there.
+
+    Raises Diagnostic for one that is async.
+    """
+    at_once(function)
     guard = _calling.get()
     return function if guard is None else guard.function(function)
 

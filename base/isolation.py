@@ -3,7 +3,11 @@
 from __future__ import annotations
 
 import logging
+import sys
+from collections.abc import Callable
+from inspect import iscoroutinefunction
 from types import TracebackType
+from typing import Any
 
 from multidrop.base.errors import Diagnostic, FeatureFailed, TransportLost
 from multidrop.base.text import visible
@@ -24,6 +28,22 @@ def _report(what: str, failure: Exception) -> None:
             LOG.error("%s", visible(text))
     elif not isinstance(failure, FeatureFailed):
         LOG.error("%s failed", what, exc_info=failure)
+
+
+def at_once(function: Callable[..., Any]) -> None:
+    """Raise Diagnostic for an async function where a plain one is called: nothing would await it."""
+    called = function if iscoroutinefunction(function) else getattr(function, "__call__", function)  # noqa: B004
+    if iscoroutinefunction(called):
+        name = getattr(function, "__name__", type(function).__name__)
+        raise Diagnostic(
+            f"{name} is async, and nothing awaits it", hint="give a plain function, which may start a task"
+        )
+
+
+def takes_signals() -> bool:
+    """Whether an event loop runs in this thread: it takes the signals, so Ctrl+C raises no KeyboardInterrupt."""
+    asyncio = sys.modules.get("asyncio")
+    return asyncio is not None and asyncio._get_running_loop() is not None
 
 
 class isolated:  # noqa: N801

@@ -104,8 +104,13 @@ class Attempt:
     def __exit__(
         self, kind: type[BaseException] | None, failure: BaseException | None, _: TracebackType | None
     ) -> bool:
-        if failure is None or isinstance(failure, KeyboardInterrupt):
+        if failure is None:
             return False
+        if isinstance(failure, KeyboardInterrupt):
+            from multidrop.base.isolation import takes_signals
+
+            if not takes_signals():
+                return False  # Ctrl+C
         self._failed.append(str(failure) if isinstance(failure, Diagnostic) else kind_and_text(failure))
         return True
 

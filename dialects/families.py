@@ -16,7 +16,8 @@ from multidrop.base.text import visible
 from multidrop.dialects.program_files import FileLanguage, ProgramFiles, errors
 
 if TYPE_CHECKING:
-    from multidrop.dialects.family import Family, Language
+    from multidrop.dialects.family import Family
+    from multidrop.dialects.language import Language
     from multidrop.dialects.state import DriveState
 
 

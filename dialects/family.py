@@ -10,12 +10,13 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import TYPE_CHECKING, ClassVar, NamedTuple, Protocol
+from typing import TYPE_CHECKING, ClassVar, NamedTuple
 
 from multidrop.base.comments import unsent
-from multidrop.base.errors import Diagnostic, Inexpressible
+from multidrop.base.errors import Inexpressible
 from multidrop.base.files import SourceLine, lines_of_text
 from multidrop.dialects.codec import Codec, Priority, Procedure
+from multidrop.dialects.language import Language
 from multidrop.dialects.program_files import Difference, Held, first_difference
 from multidrop.dialects.state import DriveState, OfDrive, Owed, Remembered, who
 
@@ -95,56 +96,6 @@ Printed = Procedure[tuple[str, ...]]
 """A conversation that returns lines to print."""
 Progress = Callable[[int, int], None]
 """Called with lines done and lines in all."""
-
-
-class Language(Protocol):
-    """Help on the words that a person types to a drive."""
-
-    def names(self) -> list[str]:
-        """The words that have help."""
-
-    def knows(self, word: str) -> bool:
-        """Whether a word has help."""
-
-    def describe(self, word: str, product: str = "") -> list[str]:
-        """The help on a word of a product, line by line. Raises Diagnostic with similar words."""
-
-    def describe_error(self, code: int, product: str = "") -> list[str]:
-        """Meaning and remedy of an error number, line by line. Raises Diagnostic for an unknown number."""
-
-    def complete(self, prefix: str, product: str = "") -> list[tuple[str, str]]:
-        """Words of a product that begin with the prefix, each with its meaning."""
-
-    def hint(self, text: str, product: str = "") -> str:
-        """One line on the line being typed; empty where there is nothing to say."""
-
-    def typing(self, text: str) -> str:
-        """The word at the end of a line that may be completed; empty where none may."""
-
-
-class NoLanguage:
-    """A language of which nothing is known."""
-
-    def names(self) -> list[str]:
-        return []
-
-    def knows(self, word: str) -> bool:
-        return False
-
-    def describe(self, word: str, product: str = "") -> list[str]:
-        raise Diagnostic(f"no help on {word}", hint="its drives have no help here")
-
-    def describe_error(self, code: int, product: str = "") -> list[str]:
-        raise Diagnostic(f"no error {code} is known", hint="its drives have no help here")
-
-    def complete(self, prefix: str, product: str = "") -> list[tuple[str, str]]:
-        return []
-
-    def hint(self, text: str, product: str = "") -> str:
-        return ""
-
-    def typing(self, text: str) -> str:
-        return ""
 
 
 class Programs(OfDrive, ABC):
@@ -291,7 +242,7 @@ class Family(OfDrive, ABC):
     """Its name in `dialect=`, and in `Codec.family`."""
     codec: ClassVar[Codec]
     """The codec for a drive of which nothing is known; a stop of an unknown line uses it."""
-    language: ClassVar[Language] = NoLanguage()
+    language: ClassVar[Language] = Language()
     """Help and completion for what a person types to it."""
     rests_in_place: ClassVar[bool] = False
     """At rest the position, too, is the same in both readings: in motion the velocity may read 0."""

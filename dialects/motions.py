@@ -7,7 +7,7 @@ ended a motion, and whether that is a failure, is decided once for all families 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import Enum
 from types import MappingProxyType
 
@@ -62,6 +62,8 @@ class Move:
     """The distance, where the target counts from where the axis is when the line is executed."""
     endless: bool = False
     """Only a command or a fault ends it."""
+    group: frozenset[str] = frozenset()
+    """The axes that move together: a stop of one of them stops all."""
 
 
 @dataclass(frozen=True)
@@ -75,6 +77,8 @@ class Effect:
     """Axes whose positions or targets have another meaning after it, so that a target is not known any more."""
     halts: bool = False
     """It ends programs on purpose, and no motion that a line began."""
+    resumes: bool = False
+    """What a line has paused goes on."""
     frees: bool = False
     """It lets the drive move, or end a motion, by itself: a trip, jog inputs, a clock."""
     clears: bool = False
@@ -96,6 +100,7 @@ def joined(effects: Sequence[Effect]) -> Effect:
         frozenset(axis for each in effects for axis in each.ends),
         frozenset(axis for each in effects for axis in each.unknown),
         any(each.halts for each in effects),
+        any(each.resumes for each in effects),
         any(each.frees for each in effects),
         any(each.clears for each in effects),
     )
@@ -115,6 +120,8 @@ class Evidence:
     """This session has stopped it since, so that an error of a line cut off by the stop says nothing of the motion."""
     program: bool = False
     """A program may have moved the axis since: one was started, or seen to run, right before it, too."""
+    alone: bool = False
+    """This host has sent the drive nothing but questions since, so that a setting is what it was before."""
 
 
 @dataclass(frozen=True)
@@ -129,6 +136,8 @@ class Ending:
     """In a few words, as after `a stopped at 1200 of 4000: `."""
     failed: bool = False
     """Set by the one who knows the sequences, not by the family."""
+    restart: str = ""
+    """The sign that the drive was restarted; empty: none."""
 
     def described(self, name: str) -> str:
         """In words: `a stopped at 1200 of 4000: stalled`."""
@@ -143,6 +152,11 @@ class Ending:
     @property
     def _verb(self) -> str:
         return "is at rest" if self.outcome is Outcome.REACHED else "stopped"
+
+
+def restarted(ending: Ending, sign: str) -> Ending:
+    """The end of a motion by a restart of its drive, and how that shows."""
+    return replace(ending, outcome=Outcome.POWER, reason=f"it was restarted ({sign})", restart=sign)
 
 
 class Motions(OfDrive):

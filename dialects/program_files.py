@@ -1,4 +1,4 @@
-"""Programs of a family: files, their language, problems, canonical spelling and editing; what a drive holds.
+"""Programs of a family: files, their language, problems and canonical spelling; what a drive holds.
 
 The language is imported at its first use. In canonical spelling indents, remarks and their columns stay.
 `walk` and `nearest` go breadth-first through the statements of a program, which are numbered.
@@ -12,12 +12,15 @@ from collections import deque
 from collections.abc import Callable, Container, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import Any, NamedTuple, Protocol, cast
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, cast
 
 from multidrop.base.comments import ENTER, behind_number, enter_in, grouped_at
 from multidrop.base.errors import Diagnostic, Refused
 from multidrop.base.files import SourceLine
-from multidrop.base.on_demand import imported_if
+from multidrop.base.on_demand import imported, imported_if
+
+if TYPE_CHECKING:
+    from multidrop.dialects.editing import EditingLanguage
 
 
 class Problem(NamedTuple):
@@ -206,8 +209,8 @@ class ProgramFiles(NamedTuple):
     """The endings of the files' names."""
     module: str
     """The module that is the `FileLanguage`."""
-    editing_module: str
-    """The module that is the `EditingLanguage`."""
+    editing_at: str
+    """The place of the `EditingLanguage`."""
     ids: tuple[str, ...]
     """The names by which editors know the language."""
     converters: Mapping[str, str] = MappingProxyType({})
@@ -231,7 +234,8 @@ class ProgramFiles(NamedTuple):
     @property
     def editing(self) -> EditingLanguage:
         """Names, help and completion of a text under editing."""
-        return cast("EditingLanguage", importlib.import_module(self.editing_module))
+        found: EditingLanguage = imported(self.editing_at)
+        return found
 
 
 def numbered(lines: Sequence[str]) -> list[SourceLine]:
@@ -285,106 +289,6 @@ def _filled(code: str, column: int, gap: str) -> str:
 
 def _width(text: str) -> int:
     return len(text.expandtabs(TAB))
-
-
-# The text of a program under editing: names and where they are, what may be typed next, the outline.
-#
-# Lines and columns count from 0 here, in characters.
-
-
-class Span(NamedTuple):
-    """A part of one line."""
-
-    line: int
-    start: int
-    stop: int
-
-
-class Word(NamedTuple):
-    """A word of a line, as the language divides it."""
-
-    start: int
-    stop: int
-    text: str
-
-
-class UserName(NamedTuple):
-    """A name that a program gives: `kind` is label, variable, constant, subroutine or program."""
-
-    word: str
-    """As a message writes it: `G1`, `SUB 3`."""
-    kind: str
-    declared: tuple[Span, ...]
-    """The places that declare it, or that set it where the language declares nothing."""
-    places: tuple[Span, ...]
-    """All its places, those that declare it included."""
-    remark: str = ""
-    """The remark of the line that declares it."""
-
-    @property
-    def about(self) -> str:
-        line = f", line {self.declared[0].line + 1}" if self.declared else ""
-        return f"{self.kind}{line}{': ' if self.remark else ''}{self.remark}"
-
-
-class Offer(NamedTuple):
-    """A word that may be typed next, with its meaning. `kind`: word, starts, or that of a `UserName`."""
-
-    text: str
-    meaning: str
-    kind: str
-
-
-class Block(NamedTuple):
-    """A part of a program in its outline. `kind` is that of a `UserName`, or block (IF, WHILE)."""
-
-    kind: str
-    name: str
-    detail: str
-    place: Span
-    """The place of its name."""
-    last: int
-    """Its last line."""
-    parts: tuple[Block, ...] = ()
-
-
-class EditingLanguage(Protocol):
-    """A language as an editor uses it beyond the check: a module of a family's manual. None of it fails for any text.
-
-    `names` are the words of the text's names.
-    """
-
-    def names(self, text: str) -> Sequence[UserName]:
-        """Return the names of a text, in order of their first places."""
-
-    def words(self, line: str, names: Container[str]) -> Sequence[Word]:
-        """Return the words of a line that may have help."""
-
-    def describe(self, word: str, product: str) -> Sequence[str]:
-        """Return the help on a word of the language, line by line; empty where there is none."""
-
-    def typing(self, before: str) -> str:
-        """Return the word at the end of the begun line `before`, which may be completed."""
-
-    def offers(self, before: str, names: Iterable[UserName], product: str) -> Sequence[Offer]:
-        """Return what may follow the begun line `before` in place of its last word."""
-
-    def fixed(self, name: UserName) -> str:
-        """Return why a name cannot be another one; empty if it can."""
-
-    def renamed(self, text: str, name: UserName, new: str, product: str) -> str:
-        """Return what to write at each place of a name to rename it. Raises Diagnostic where that is wrong."""
-
-    def outline(self, text: str) -> Sequence[Block]:
-        """Return programs, labels, subroutines, declared variables and blocks."""
-
-
-def replaced(lines: Sequence[str], places: Iterable[Span], new: str) -> list[str]:
-    found = list(lines)
-    for place in sorted(places, reverse=True):
-        line = found[place.line]
-        found[place.line] = line[: place.start] + new + line[place.stop :]
-    return found
 
 
 Ways = Callable[[int], Iterable[int]]

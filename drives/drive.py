@@ -427,10 +427,11 @@ class Drive:
     def start(self, procedure: Procedure[T], on_over: OnOver[T], typed: bool = False) -> Conversation[T]:
         state = self.state
         address, *_ = before = (state.address, state.programming, state.codec)
-        commanded = self._neighbours.conversation_begins(self)
+        commanded, replied = self._neighbours.conversation_begins(self), False
 
         def watch(transaction: Transaction) -> None:
-            nonlocal commanded
+            nonlocal commanded, replied
+            replied = transaction.replied
             self.requests += transaction.sent
             if transaction.request.kind not in ASKING:
                 commanded, self.commands = True, self.commands + transaction.sent
@@ -440,15 +441,15 @@ class Drive:
 
         def over(outcome: Outcome[T]) -> None:
             self._neighbours.conversation_ended(self, address, commanded or isinstance(outcome.error, Stopped))
-            state, link = self.state, self.link
-            if isinstance(outcome.error, NoAnswer):
+            if isinstance(outcome.error, NoAnswer) and not replied:
                 self.missing = True
-            elif self.missing and outcome.error is None and not state.programming:
+                self.motions.missed()
+            elif self.missing and outcome.error is None and not self.state.programming:
                 self.missing = False
                 self.state.counts_may_have_changed()  # it may have been switched off and on
                 self._neighbours.replied_again(self)
-            if (state.address, state.programming, state.codec) != before:
-                link.publish(Changed(link.now(), state.address))
+            if (self.state.address, self.state.programming, self.state.codec) != before:
+                self.link.publish(Changed(self.link.now(), self.address))
             on_over(outcome)
 
         return self._conversations.start(procedure, state, over, watch, typed=typed)

@@ -13,8 +13,8 @@ from dataclasses import dataclass
 from typing import Any, Generic, NamedTuple, TypeVar
 
 from multidrop.base.errors import TransportLost
-from multidrop.base.isolation import isolated
-from multidrop.dialects import DriveState, Reply, Request
+from multidrop.base.isolation import at_once, isolated
+from multidrop.dialects import DriveState, End, Reply, Request
 from multidrop.dialects.values import Conditions
 
 
@@ -29,6 +29,11 @@ class Transaction(NamedTuple):
     """When the last byte of the request had left, calculated from the baud rate."""
     sent: bool = True
     """Whether the request was written; one that was stopped before that was not."""
+
+    @property
+    def replied(self) -> bool:
+        """Whether its drive has replied to it, a refusal included."""
+        return self.reply.end in (End.DONE, End.REFUSED, End.NAK) and not self.reply.doubtful
 
 
 class Sent(NamedTuple):
@@ -192,8 +197,9 @@ class Publisher(Generic[E]):
     def subscribe(self, callback: Callable[[E], None], *kinds: type) -> Callable[[], None]:
         """Call back with every event of these kinds, by default of all, from the event loop.
 
-        The function returned ends the subscription.
+        The function returned ends the subscription. Raises Diagnostic for an async callback.
         """
+        at_once(callback)
         return self.subscribers.add(callback, kinds)
 
     def publish(self, event: E) -> None:

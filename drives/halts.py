@@ -90,6 +90,14 @@ class Halt:
         """Whether the programs of a drive go on, as none of them was started."""
         return self.single and drive.codec.spares and not self.started[drive].program
 
+    def part_of(self, drive: Drive) -> str:
+        """The axes of a drive that it stops, in words behind its name, ` X` or ` motor 1`; empty: all of them."""
+        axes = self.started[drive].axes if self.spares_programs(drive) else None
+        known = () if axes is None else drive.family.units.axes()
+        if axes is None or axes.issuperset(known) or known == [""]:
+            return ""
+        return "".join(f" {'motor ' * each.isdigit()}{each.upper()}" for each in known if each in axes)
+
     def fate(self, drive: Drive) -> Fate:
         """What is known of one of its drives now."""
         if self.started_since(drive):

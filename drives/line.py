@@ -168,6 +168,8 @@ class Line:
         self._stops = 0
         self.only_stop = False
         """What was written last is a stop or a piece of one: no part of anything else can be on the wire behind it."""
+        self.stops_all = False
+        """The last stop is for the whole line. One for some drives holds up none that is."""
         self._partial_until = float("-inf")
         """Until then the drives have part of a line that would do harm if it ended there."""
         self.overtaken = False
@@ -255,6 +257,9 @@ class Line:
         Pieces of the last stop that are not written yet go first, so that each drive has its turn. `since`: another
         thread has begun the stop, and written to it up to then, as for `went_on`.
         """
+        if only is None and not self.stops_all:
+            self._repeats = []  # those of some drives: they are in this stop, in its own order
+        self.stops_all = only is None or (self.stops_all and self.only_stop and self.stopping)
         self.overtaken, self.only_stop = False, True
         self._stops += 1
         flight = self._state if isinstance(self._state, Flight) else None
@@ -342,7 +347,7 @@ class Line:
             piece = self._repeats.pop(0)
             self._offered = piece, self._stops
             self._state = Recovering(now)
-            self.wrote(piece.data, now)
+            self.wrote(piece.data, now, whole=not self.stops_all)
             self._events.append(Write(piece.data, None))
             return False
         if self.inbox.awaits_tail(now):

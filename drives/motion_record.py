@@ -15,6 +15,8 @@ from multidrop.dialects.motions import Effect, Ending, Evidence, Move, MoveKind,
 KEPT = 8
 """The most motions of one axis that are kept, each of another sequence."""
 NOT_OURS = "not by this script"
+MAYBE_RESTARTED = "it gave no reply on the way and is at 0, so it may have been restarted"
+NO_AXES = frozenset[str]()
 Sequence = object
 """A sequence, compared by identity."""
 
@@ -30,9 +32,13 @@ class Course:
     """`DriveState.errors.count` as it began."""
     program: bool = False
     """A program was started since, or seen to run, or a line let the drive move by itself."""
+    commands: int = 0
+    """The number of commands that this host had sent to the drive before its line."""
     stopped: bool = False
     """Its own sequence has stopped it."""
     stopped_by_other: bool = False
+    missed: bool = False
+    """The drive gave no reply to something since."""
     restarted: bool = False
     """The drive was restarted since, which ends every motion."""
     replaced: Move | None = None
@@ -44,8 +50,10 @@ class Course:
     def open(self) -> bool:
         return self.ending is None
 
-    def evidence(self, errors: tuple[int, ...]) -> Evidence:
-        return Evidence(self.move, self.before, errors, self.stopped or self.stopped_by_other, self.program)
+    def evidence(self, errors: tuple[int, ...], commands: int) -> Evidence:
+        """What is known. `errors`: read since; `commands`: sent to the drive so far, that of its line included."""
+        stopped, alone = self.stopped or self.stopped_by_other, commands <= self.commands + 1
+        return Evidence(self.move, self.before, errors, stopped, self.program, alone)
 
     @property
     def cut_off(self) -> Ending | None:
@@ -60,6 +68,8 @@ class Course:
 
     def _decided(self, found: Ending) -> Ending:
         short = found.outcome is Outcome.STOPPED
+        if self.missed and found.position == 0 and found.outcome is Outcome.REACHED and not self.move.target:
+            return replace(found, outcome=Outcome.UNKNOWN, reason=MAYBE_RESTARTED, failed=True)
         if not short and found.outcome is not Outcome.REACHED:
             return replace(found, failed=True)
         if self.stopped:
@@ -123,6 +133,9 @@ class MotionRecord:
         """Record what else a line does, which was not refused."""
         if effect.ends:
             self.stopped(by, effect.ends)
+        if effect.resumes:
+            for course in self._all():
+                course.stopped = course.stopped_by_other = False
         if effect.halts:
             self._note_stop(by, [each for each in self._all() if each.move.kind is MoveKind.PROGRAM])
         self.runs(effect.frees)
@@ -131,13 +144,19 @@ class MotionRecord:
 
     def stopped(self, by: Sequence | None, axes: frozenset[str] | None = None) -> None:
         """Record a stop of axes (None: all). `by` None: of the whole session, which no sequence outlives unasked."""
-        self._note_stop(by, self._all() if axes is None else self._open(axes))
+        together = frozenset(axis for each in self._open(axes or NO_AXES) for axis in each.move.group)
+        self._note_stop(by, self._all() if axes is None else self._open(axes | together))
 
     def _note_stop(self, by: Sequence | None, courses: Iterable[Course]) -> None:
         for course in courses:
             if course.open:
                 course.stopped = course.stopped or by is None or course.by is by
                 course.stopped_by_other = course.stopped_by_other or not (by is None or course.by is by)
+
+    def missed(self) -> None:
+        """Record that the drive gave no reply."""
+        for course in self._all():
+            course.missed = course.missed or course.open
 
     def restarted(self) -> None:
         """Record a sign of a restart."""

@@ -6,6 +6,7 @@ How it shares the wire with other pollers and with what people ask for: `drives.
 from __future__ import annotations
 
 import asyncio
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Hashable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -57,7 +58,7 @@ class Due:
     """NAKs in a row: noise damages a request now and then, and a value that is gone is refused each time."""
 
 
-class Poller(Generic[Thing]):
+class Poller(ABC, Generic[Thing]):
     """Reads things of one link, each as often as the most eager subscription asks."""
 
     shortest: float
@@ -157,15 +158,16 @@ class Poller(Generic[Thing]):
             self._waits_since = None
         return max(left, 0.0)
 
+    @abstractmethod
     def _drive(self, thing: Thing) -> Drive:
-        raise NotImplementedError
+        """Return the drive that a thing is read of."""
 
     def _readable(self, drive: Drive) -> bool:
         return not (drive.state.programming or drive.transferring)
 
+    @abstractmethod
     def _begin(self, thing: Thing, due: Due, drive: Drive) -> None:
         """Begin to read a thing, which is due."""
-        raise NotImplementedError
 
     def _converse(
         self,

@@ -6,7 +6,8 @@ pieces while the loop does not: before it has taken the stop over, and where it 
 own times.
 
 A key that comes meanwhile (one that is held down repeats 30 times a second) drops nothing and begins nothing again: it
-moves the stop on by a piece once the gap is over, and every piece has its turn again.
+moves the stop on by a piece once the gap is over, and every piece has its turn again. A stop of some drives, which an
+automation sends at its end, holds up no key: that begins the stop, as after any other line.
 
 `StopAhead.take` is what the loop does then. What a thread has begun changes under the lock of its transport alone.
 """
@@ -48,6 +49,8 @@ class Begun:
     """A stop before it did so, of which the loop knows nothing yet."""
     first: StopPiece | None = None
     """The piece to write before all others."""
+    stops_all: bool = True
+    """It is for the whole line."""
 
     def due(self, byte_time: float) -> float:
         """When the next piece may be written."""
@@ -91,18 +94,25 @@ class StopAhead:
         """Write the stop, or move on the one that is on its way. Does nothing where the transport cannot do that."""
         forms, transport = self._forms(), self._link.transport
         self._last = forms
-        on_its_way = self._begun is not None or self._link.line.only_stop  # else the lock need not be asked for
-        if not (on_its_way and transport.follow(partial(self._again, forms), key=True)):
+        if not (self._on_its_way() and transport.follow(partial(self._again, forms), key=True)):
             transport.preempt(forms.framed, partial(self._begin, forms))
         self._pace()
+
+    def _on_its_way(self) -> bool:
+        """Whether a stop of the whole line is on its way."""
+        begun, line = self._begun, self._link.line
+        return begun.stops_all if begun is not None else line.only_stop and line.stops_all
 
     def _begin(self, forms: StopForms, dropped: int) -> bytes:
         """The first bytes of a stop. `dropped`: how many unsent ones made room for it."""
         link, last = self._link, self._begun
         now, line = link.now(), link.line
-        data, invalidates = forms.written(bool(dropped or line.half_sent(now)))
+        of_some = not (line.stops_all if last is None else last.stops_all)
+        leaving = last is not None and of_some and now < last.left
+        data, invalidates = forms.written(bool(dropped or leaving or line.half_sent(now)))
         before = last is not None and (last.invalidates or last.before)
-        pieces = merged(last.pieces if last is not None else line.owed_pieces(), forms.repeats)
+        owed = last.pieces if last is not None else line.owed_pieces()
+        pieces = merged([] if of_some else owed, forms.repeats)
         written = last.written if last is not None else []
         self._begun = begun = Begun(forms, data, now, pieces, written, invalidates, before)
         line.overtaken = True
@@ -113,10 +123,10 @@ class StopAhead:
 
         `waiting`: the number of bytes that the transport has not passed on.
         """
+        if not self._on_its_way():
+            return None
         line, begun = self._link.line, self._begun
         if begun is None:
-            if not line.only_stop:
-                return None
             begun = Begun(forms, forms.immediate, line.transmitted, line.owed_pieces())
         now = self._link.now()
         free = not waiting and now >= begun.clear(line.byte_time)
@@ -138,7 +148,7 @@ class StopAhead:
         line = self._link.line
         if self._last is None or not line.only_stop or not (pieces := line.owed_pieces()):
             return None
-        return Begun(self._last, self._last.immediate, line.transmitted, pieces)
+        return Begun(self._last, self._last.immediate, line.transmitted, pieces, stops_all=line.stops_all)
 
     def _go_on(self) -> None:
         """Write the next piece if the loop does not."""

@@ -66,5 +66,6 @@ async def read_activity(drive: Drive, axes: frozenset[str] | None) -> tuple[Acti
     speeds = zip(found, drive.seen.velocities, strict=True) if drive.seen is not None and not why else ()
     # The only axis of a drive has no name, whatever number its lines give it.
     speed = max((abs(each) for axis, each in speeds if axes is None or not axis.axis or axis.axis in axes), default=0)
-    places = "" if why else ", ".join(str(each.position) for each in found)
+    counts = [each for each in found if axes is None or not each.axis or each.axis in axes]
+    places = "" if why else ", ".join(str(each.position) for each in counts)
     return Activity(speed, bool(runs) and not why, places), why

@@ -139,7 +139,7 @@ class Stopping:
     def _note_written(self, begun: Begun) -> None:
         line = self._link.line
         for when, data in begun.written:
-            line.wrote(data, when, whole=begun.invalidates and data == begun.data)
+            line.wrote(data, when, whole=not begun.stops_all or (begun.invalidates and data == begun.data))
             self._link.debris.stop_written(data, line.transmitted)
 
     def _went_on(self) -> None:
@@ -174,14 +174,16 @@ class Stopping:
         forms, link, now = single_forms(halt.started), self._link, self._link.now()
         if forms is None or link.away or link.transport.pending:
             return None
-        begun = Begun(forms, forms.immediate, now, [*forms.repeats])
+        begun = Begun(forms, forms.immediate, now, [*forms.repeats], stops_all=False)
         return begun if link.transport.write(begun.wrote(begun.data, now, link.line.byte_time)) else None
 
     def _write_now(self, halt: Halt) -> Begun:
-        """Drop what is unsent and write a stop, whatever fails. One that is still leaving is not dropped."""
+        """Drop what is unsent and write a stop. One that is still leaving is dropped by one of all drives alone."""
         link, forms, now = self._link, stop_forms(self._roster, None if halt.whole else halt.drives), self._link.now()
-        under_way = Begun(forms, forms.immediate, link.line.transmitted, [*forms.pieces])
-        leaving = link.line.only_stop and (link.transport.pending or now < under_way.clear(link.line.byte_time))
+        line = link.line
+        under_way = Begun(forms, forms.immediate, line.transmitted, [*forms.pieces], stops_all=halt.whole)
+        leaving = line.only_stop and (link.transport.pending or now < under_way.clear(line.byte_time))
+        leaving = leaving and (line.stops_all or not halt.whole)  # a stop of some drives holds up none of all
         halt.single = bool(halt.started) and not leaving
         if halt.single and (single := self._write_single(halt, forms)) is not None:
             return single
@@ -193,11 +195,11 @@ class Stopping:
                 return replace(under_way, pieces=[*forms.repeats], first=StopPiece(forms.immediate, forms.gap))
             begun, dropped = replace(under_way, pieces=[*forms.repeats]), 0
         else:
-            begun, dropped = Begun(forms, b"", now, [*forms.repeats]), 1
+            begun, dropped = replace(under_way, data=b"", left=now, pieces=[*forms.repeats], written=[]), 1
             with isolated(f"taking back what {link.name} has not sent", halt.trouble):
                 dropped = link.transport.discard(whole=forms.framed)
-            begun.data, begun.invalidates = forms.written(bool(dropped or link.line.half_sent(now)))
-        link.transport.write(begun.wrote(begun.data, now, link.line.byte_time))
+            begun.data, begun.invalidates = forms.written(bool(dropped or line.half_sent(now)))
+        link.transport.write(begun.wrote(begun.data, now, line.byte_time))
         return begun
 
     # What follows
@@ -293,7 +295,7 @@ class Stopping:
                 return  # a later stop of the whole link confirms it, by what is read after that
             for drive, each in found.items():  # whether this reading or a poll after it has confirmed that
                 if each.places and each.none and halt.fate(drive) is Fate.STANDING:
-                    link.notify(f"{drive.shown}: stopped, velocity 0 at {each.places}")
+                    link.notify(f"{drive.shown}{halt.part_of(drive)}: stopped, velocity 0 at {each.places}")
             active = {drive: each for drive, each in found.items() if not each.none and not halt.started_since(drive)}
             slow_down = all(each.lessens(before.get(drive), halt.single) for drive, each in active.items())
             before = found

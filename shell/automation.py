@@ -348,7 +348,8 @@ def outcome(workspace: Workspace, halts: list[Halt]) -> list[str]:
     lines = []
     if sent:
         tally = stop_report.of_halts(sent, workspace.wall(sent[0].at), len(workspace.buses) > 1)
-        names = ", ".join(_names(workspace, halt.drives) or halt.link.name for halt in sent)
+        named = [", ".join(workspace.display_name(each) + halt.part_of(each) for each in halt.drives) for halt in sent]
+        names = ", ".join(name or halt.link.name for name, halt in zip(named, sent, strict=True))
         every = UNKNOWN if any(halt.reaches_unknown for halt in sent) else ""
         lines.append(f"{'stopped' if tally.stand else 'stop sent to'} {names}{every}: {stop_report.words(tally)}")
     if others := _names(workspace, [drive for halt in sent for drive in halt.others]):

@@ -115,6 +115,19 @@ class Switch(NamedTuple):
         return "off" if self.is_on(session) else "on"
 
 
+class Predicting(NamedTuple):
+    """A feature that predicts where drives go (`Workspace.predicted`): the difference to that can be plotted."""
+
+    missing: str
+    """What is said of a drive whose positions it does not predict now."""
+    begin: str
+    """What to type, so that it does."""
+
+    def claims(self) -> tuple[str, ...]:
+        """What only one feature can add."""
+        return ("predicted positions",)
+
+
 def switches() -> Iterator[Switch]:
     """All switches of features."""
     return registry.added(Switch)
@@ -125,6 +138,7 @@ def begin(session: Session) -> list[str]:
 
     Return a warning for each that cannot be loaded or cannot begin; the others and the session go on.
     """
+    from multidrop.base.isolation import at_once
     from multidrop.shell.operations.table import load_others
 
     warnings = load_others()
@@ -132,6 +146,7 @@ def begin(session: Session) -> list[str]:
         for each in registry.records((feature,), AtSession):
             why: list[str] = []
             with registry.Attempt(why):
+                at_once(each.begin)
                 each.begin(session)
             warnings += [f"the feature {feature.name} cannot begin: {text}" for text in why]
     return warnings

@@ -172,7 +172,7 @@ class _Line:
             place = None if move.relative is None else motions.place(signs, move.axis)
             if place is not None and move.relative is not None:
                 move = replace(move, target=place + move.relative)
-            courses.append(Course(move, self.by, signs, state.errors.count, motions.runs(signs)))
+            courses.append(Course(move, self.by, signs, state.errors.count, motions.runs(signs), drive.commands))
         drive.motions.begin(courses)
         if courses:
             state.errors.motion(True, any(each.move.kind is MoveKind.PROGRAM for each in courses))
@@ -196,6 +196,7 @@ class _Line:
 
     def _report(self, drive: Drive, failed: Ending, fate: str) -> None:
         name = self._workspace.display_name(drive)
+        _note_restart(self._workspace, drive, failed)
         if is_automation():
             error = failure(name, failed)
             error.args = (f"{error}{fate}",)
@@ -225,7 +226,7 @@ def _unread(course: Course, error: Exception) -> Ending:
 
 
 def _evidence(drive: Drive, course: Course) -> Evidence:
-    return course.evidence(drive.state.errors.since(course.errors))
+    return course.evidence(drive.state.errors.since(course.errors), drive.commands)
 
 
 def _judged(drive: Drive, course: Course, found: Ending) -> Ending:
@@ -233,6 +234,13 @@ def _judged(drive: Drive, course: Course, found: Ending) -> Ending:
     if not drive.motions.any_open:
         drive.state.errors.motion(False)
     return ending
+
+
+def _note_restart(workspace: Workspace, drive: Drive, ending: Ending) -> None:
+    """Have a restart reported that the end of a motion has shown: positions and settings are other ones now."""
+    if ending.restart and (bus := workspace.buses.get(drive.link.name)) is not None:
+        drive.motions.restarted()
+        bus.roster.restarts.replied_again(drive, ending.restart)
 
 
 # Waits
@@ -291,6 +299,7 @@ class Watch:
             if found is None:
                 return None
             endings.append(_judged(drive, course, found))
+            _note_restart(self._workspace, drive, found)
         return endings
 
     async def _judge_other(self, drive: Drive) -> list[Ending] | None:

@@ -187,6 +187,8 @@ class RawLine(ByteView):
         if not self.bus.link.write_raw(data):
             raise Stopped(f"{self.bus.name}: a stop went first; '{text_of(data)}' was not sent")
         self.waiting = text_of(data)
+        for drive in self.bus.all_drives:
+            drive.motions.runs()  # nothing was read of the text, which may end any motion
         self.half.written(data, self.bus.now())
 
     def encoded(self, text: str) -> bytes:

@@ -67,6 +67,8 @@ class RunningPlot:
     """The line that then shows it there."""
     rate: str
     """The rate of its samples that was asked for, in words."""
+    shown: str
+    """A line for a screen that plots, too: what takes the samples, and where."""
     end: Callable[[], Awaitable[str]]
     """Ends it, and returns one line about the result. Raises Diagnostic where it could not be written."""
 

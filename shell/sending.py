@@ -10,7 +10,7 @@ import contextlib
 from collections.abc import AsyncIterator
 from dataclasses import dataclass
 
-from multidrop.base.errors import Differs, Inexpressible, Refused, TransportLost
+from multidrop.base.errors import Differs, Inexpressible, NoAnswer, Refused, TransportLost
 from multidrop.dialects import Started
 from multidrop.drives.drive import Drive
 from multidrop.drives.port_journal import GLOBAL
@@ -61,7 +61,7 @@ async def sending(
             if each_as_it_was and _started_nothing(each, was, failure, parts):
                 automations.restores(automation, each, was.sent)
             sure = each in automation.started or was.active or stored
-            if not sure and _has_error(each, was, failure, at):
+            if not sure and _has_error(each, was, text, failure, at):
                 await _after_error(automations, automation, each)
         raise
 
@@ -91,10 +91,15 @@ def _started_nothing(drive: Drive, before: _Before, failure: BaseException, part
     return isinstance(failure, (Refused, Inexpressible, Differs))
 
 
-def _has_error(drive: Drive, before: _Before, failure: BaseException, at: float) -> bool:
-    """Whether a drive has shown an error that may have started its routine for errors."""
+def _has_error(drive: Drive, before: _Before, text: str, failure: BaseException, at: float) -> bool:
+    """Whether a drive has an error, or may have one, that may have started its routine for errors.
+
+    A reply that is damaged or lost may be the refusal of a line for which the tables do not vouch.
+    """
     if not _has_routine(drive) or drive.requests == before.requests:
         return False
+    if isinstance(failure, NoAnswer) and text and not drive.family.vouched(text, drive.product):
+        return True
     return isinstance(failure, Refused) or drive.state.errors.at > at
 
 

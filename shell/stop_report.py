@@ -107,7 +107,7 @@ def _found(halt: Halt, drives: Sequence[Drive], several: bool) -> Iterator[Found
     if not drives:
         yield Found(Fate.NOT_KNOWN if halt.data else Fate.NOT_REACHED, bus, bus, why)
     for drive in drives:
-        name = drive.label or drive.address
+        name = (drive.label or drive.address) + halt.part_of(drive)
         yield Found(halt.fate(drive), f"{bus}:{name}" if several and name else name or bus, bus, why)
 
 

@@ -115,6 +115,7 @@ class MultidropApp(Dressed):
         self.main.times = look.times
         self.keyboard = Keyboard(self, self._tell)
         self.outbox = Outbox(session, self._warn, self.run_worker)
+        self.outbox.follows = self._enter_waits
         self.selection = Selection(
             session, self.model, self.main, self.purpose.label, self.keyboard.turn_deaf, self.show_line
         )
@@ -206,12 +207,13 @@ class MultidropApp(Dressed):
 
     def _receive(self, event: SessionEvent) -> None:
         self._inbox.append(event)
+        stopped, self._stops = self.session.stops != self._stops, self.session.stops
+        if stopped:  # first: a defect in what is shown must not leave it for a later event, with what was typed since
+            self._drop_typed()
         if not self.model.quiet(event):
             self.frames.wake(panels=not (isinstance(event, OnBus) and isinstance(event.event, Unsolicited)))
-        if self.session.stops != self._stops:
-            self._stops = self.session.stops
+        if stopped:
             self.model.stopped(self.session.now())
-            self._drop_typed()
         elif isinstance(event, StateChanged) and self.selection.changed:
             self.selection.expect(self.outbox.using(self.selection.shown))
             self.call_later(self.selection.catch_up)
@@ -236,6 +238,11 @@ class MultidropApp(Dressed):
     def dropped(self, text: str) -> None:
         """Report a text that was typed before the stop and not parsed; a NUL in it is a key that is not text."""
         self.unsent.dropped(text)
+
+    def _enter_waits(self) -> bool:
+        """Whether another Enter has come already, behind the key that is worked off."""
+        unparsed = getattr(self._driver, "keys", None)
+        return self.keyboard.enter_waits or (unparsed is not None and bool(unparsed.enter_waits))
 
     def _cancel(self) -> None:
         """Empty the lines that are being edited, and cancel dialogs. Keys that were typed after the stop come later."""

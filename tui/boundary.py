@@ -72,15 +72,15 @@ class Attempt:
 
 
 class Boundary:
-    """Catches and reports the defects of one app. `say` shows a line to the person."""
+    """Catches and reports the defects of one app. `say` shows a line to the person; `goes_on`: what still works."""
 
-    def __init__(self, folder: Path, say: Callable[[str], None] = lambda text: None) -> None:
+    def __init__(self, folder: Path, say: Callable[[str], None] = lambda text: None, goes_on: str = GOES_ON) -> None:
         self.path = folder / FILE
         self.failing: dict[str, str] = {}
         """What each failing place shows."""
         self.counts: dict[tuple[str, str], int] = {}
         """How often each defect came, by its place and its origin."""
-        self._say = say
+        self._say, self._goes_on = say, goes_on
 
     def at(self, place: str) -> Attempt:
         """Guard one attempt to do a part; `place` names it for a person."""
@@ -104,7 +104,12 @@ class Boundary:
         if not known and len(self.counts) <= MOST:
             written = self._write(place, failure)
             details = f"details: {self.path}" if written else f"{self.path} could not be written"
-            self._say(f"{defect} in {place}: {type(failure).__name__}; {GOES_ON}; {details}")
+            try:
+                self._say(f"{defect} in {place}: {type(failure).__name__}; {self._goes_on}; {details}")
+            except Exception as another:  # the part that shows a line is defective, too: the file has both
+                if RAISES:
+                    raise
+                self._write("what is said of a defect", another)
         return text
 
     def end(self) -> None:

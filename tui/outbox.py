@@ -1,10 +1,10 @@
 """Typed lines on their way to the session: in order, each sent when the line before it is answered, as in a paste.
 
 Lines wait in lanes. A line joins the lane of the line before it if no answer can have been read in between. That
-holds in two cases. Less than half a second lies between their Enters (a burst: a paste without brackets, a script at
-the terminal). Or the line is text for a bus on which a typed line is not answered yet. Any other line runs at once,
-whatever else runs. So a person who asks for a position during `/wait` gets an answer, and lines of one burst never
-overtake each other.
+holds in three cases. Less than half a second lies between their Enters, or the second Enter had come before the first
+was taken (a burst: a paste without brackets, a script at the terminal). Or the line is text for a bus on which a typed
+line is not answered yet. Any other line runs at once, whatever else runs. So a person who asks for a position during
+`/wait` gets an answer, and lines of one burst never overtake each other.
 
 A line that fails holds the rest of its lane and of its burst: these lines are shown and not sent. A stop drops all
 lines that wait. A line is for the drive that was selected at its Enter.
@@ -50,6 +50,10 @@ class Outbox:
         self._lanes: list[Lane] = []
         self._latest: Lane | None = None
         self._last = 0.0
+        self.follows: Callable[[], bool] = lambda: False
+        """Whether another Enter has come already."""
+        self._followed = False
+        """The next Enter had come before the last line was typed."""
         self._unsent: list[Line] = []
         """The lines that were last reported as not sent."""
         self._paused = self._closed = False
@@ -70,9 +74,9 @@ class Outbox:
         if line.leaves(self._session) and not self._closed:
             self._session.start(text, since=line.since)
             return
-        burst = self._latest if now - self._last < BURST else None
+        burst = self._latest if now - self._last < BURST or self._followed else None
         self._latest = burst or self._talking(line.bus) or self._lane()
-        self._last = now
+        self._last, self._followed = now, self.follows()
         self._add(self._latest, [line])
 
     def at_once(self, texts: Sequence[str]) -> None:

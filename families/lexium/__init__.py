@@ -21,7 +21,7 @@ FAMILY = Feature(
                 "MCode",
                 (".mxt", ".txt"),
                 f"{HERE}.manual.program_checker",
-                f"{HERE}.manual.editing",
+                f"{HERE}.manual.editing:EDITING",
                 ("mcode", "mxt"),
                 {"lexium": f"{HERE}.manual.conversion"},
                 f"{HERE}.manual.supported:unsupported",

@@ -21,7 +21,7 @@ FAMILY = Feature(
                 "A-SCRIPT",
                 (".prg", ".asc"),
                 f"{HERE}.manual.program_file",
-                f"{HERE}.manual.editing",
+                f"{HERE}.manual.editing:EDITING",
                 ("ascript", "a-script", "pmx"),
             ),
         ),

@@ -20,7 +20,7 @@ FAMILY = Feature(
                 "TMCL",
                 (".tmc", ".tmcl"),
                 f"{HERE}.manual.program_file",
-                f"{HERE}.manual.editing",
+                f"{HERE}.manual.editing:EDITING",
                 ("tmcl",),
             ),
         ),

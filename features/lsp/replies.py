@@ -11,8 +11,9 @@ from typing import NamedTuple, TypeVar
 
 from lsprotocol import types
 
+from multidrop.dialects.editing import Block, Offer, Span
 from multidrop.dialects.families import program_languages
-from multidrop.dialects.program_files import Block, Offer, Problem, Span
+from multidrop.dialects.program_files import Problem
 from multidrop.shell.programs.program_text import Coloured, Edit, Fold, ProgramGrammar, ProgramText
 from multidrop.shell.threads import in_thread
 

@@ -285,7 +285,8 @@ async def begin(
         detach()
         return await plot.close()
 
-    running = RunningPlot(plot.target.text, plot.target.desk, f"rerun {plot.target.text}", shown(period), end)
+    where = plot.target.text
+    running = RunningPlot(where, plot.target.desk, f"rerun {where}", shown(period), plot.target.about, end)
     workspace.plots.append(running)
     if target.serves and exposed(target.host):
         workspace.notify(f"other computers can read the plot at {target.text}; they need no password", warning=True)

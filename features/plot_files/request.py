@@ -45,6 +45,12 @@ class PlotTarget:
         return self.url or f"rerun+http://{bracketed(self.host)}:{self.port}/proxy"
 
     @property
+    def about(self) -> str:
+        """The line below the curves of a screen: what takes the samples, and where."""
+        table = self.file is not None and self.file.suffix in TABLES
+        return f"{'table' if table else 'rerun'}: plotting to {self.text}"
+
+    @property
     def desk(self) -> str:
         """The line that a person types at another desk to see a plot that only this machine can reach; else empty."""
         if not self.serves or not ip_address(self.host).is_loopback:

@@ -8,6 +8,7 @@ from __future__ import annotations
 import asyncio
 import sys
 from collections import Counter
+from collections.abc import Mapping
 from datetime import datetime, timedelta
 from importlib.resources import files
 from typing import ClassVar
@@ -27,6 +28,7 @@ from multidrop.shell.events import FAILURES
 from multidrop.shell.exit_codes import exit_code
 from multidrop.shell.prompt.keyboard import on_signals
 from multidrop.shell.streams.stdout import report, write
+from multidrop.tui.boundary import Boundary
 from multidrop.tui.text import age, fit
 from multidrop.tui.widgets.bars import Banner
 from multidrop.tui.widgets.lines import Lines, Roles, in_view, spread
@@ -67,6 +69,9 @@ class PlantApp(Dressed):
         self._rows: list[Row] = []
         self._chosen: Place | None = None
         self._words = self._told = ""
+        self._is_composed = False
+        self.boundary = Boundary(settings.state, self.tell, "everything else goes on")
+        self.boundary.own(self, lambda: self._is_composed)
         self.dress(settings.look)
 
     def compose(self) -> ComposeResult:
@@ -85,9 +90,13 @@ class PlantApp(Dressed):
         await self.broker.end()
 
     def on_mount(self) -> None:
+        self._is_composed, self._end_boundary = True, self.boundary.look_at(asyncio.get_running_loop())
         self.set_interval(DRAIN, self.broker.drain)
         self.set_interval(PAINT, self.paint)
         self.call_after_refresh(self.paint)
+
+    def on_unmount(self) -> None:
+        self._end_boundary()
 
     def tell(self, text: str) -> None:
         self._told = text
@@ -165,6 +174,14 @@ class PlantApp(Dressed):
         parts = {part.id: part for part in self.query(Lines)}
         if not parts.keys() >= set(PARTS):
             return  # a timer of an app whose screen is being taken down
+        with self.boundary.at("the page of the plant") as attempt:
+            self._paint(parts)
+        if attempt.trouble:  # what is shown may no longer be true
+            for part in parts.values():
+                part.put([])
+            parts["heading"].put([((f" {attempt.trouble}", "error"),)])
+
+    def _paint(self, parts: Mapping[str | None, Lines]) -> None:
         plant, everything = self.broker.plant, self.broker.rows()
         wanted = self._words.casefold().split()
         self._rows = [row for row in everything if all(word in _text(row) for word in wanted)]

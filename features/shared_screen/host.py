@@ -22,6 +22,7 @@ from pathlib import Path
 
 from multidrop.base.atomic import make_folder
 from multidrop.base.errors import Diagnostic
+from multidrop.base.isolation import isolated
 from multidrop.features.shared_screen import wire
 from multidrop.shell.threads import BoundedWriter, Loss
 
@@ -117,7 +118,8 @@ class Watcher:
 
     def _take_stops(self) -> None:
         while (data := self._socket.recv(4096)) and not data.strip(wire.STOP):
-            self._calls.stop_ahead()
+            with isolated("the stop of a watcher"):  # the loop stops all the same, and later ones are taken
+                self._calls.stop_ahead()
             self._stops += len(data)
             self._call(self._calls.stop, self.name)
             self._writer.put(wire.line([wire.Item(wire.Heard(self._stops))]), keep=True)

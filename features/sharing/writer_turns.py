@@ -326,9 +326,8 @@ class Exchange:
         known, left = self.clients[client], TURN
         while known.waiting and left and not known.setting:
             each, left = known.waiting.popleft(), left - 1
-            if isinstance(each, Request):
-                self._request(client, each)
-            elif not self._write(client, each, now):
+            done = self._request(client, each, now) if isinstance(each, Request) else self._write(client, each, now)
+            if not done:
                 known.waiting.appendleft(each)
                 break
         if not known.refused and (replies := known.taken()):
@@ -416,29 +415,38 @@ class Exchange:
 
     # Settings
 
-    def _request(self, client: int, request: Request) -> None:
+    def _request(self, client: int, request: Request, now: float) -> bool:
+        """Answer a request; return False where it must wait for the drives."""
         known = self.clients[client]
         if known.refused or known.answers(request):
-            return
+            return True
         if request.setting == Setting.PURGE:
             if client == self.writer and request.value != PURGE_RECEIVED:
                 self._actions.append(Purge())
             known.reply(request.setting, request.value)
         elif request.setting == Setting.BAUD:
-            self._change(client, "baud", request, request.value > 0)
+            return self._change(client, "baud", request, request.value > 0, now)
         elif request.setting == Setting.CONTROL:
             if what := group_of(request.value):
                 changes = what not in (FLOW, FLOW_IN) and request.value not in _ASKS
-                self._change(client, what, request, changes)
+                return self._change(client, what, request, changes, now)
         else:
             known.reply(request.setting, NEEDED[Setting(request.setting)])
+        return True
 
-    def _change(self, client: int, what: str, request: Request, changes: bool) -> None:
-        """Change a setting if this client may, or reply with what holds."""
+    def _change(self, client: int, what: str, request: Request, changes: bool, now: float) -> bool:
+        """Change a setting if this client may, or reply with what holds; False where that must wait for the drives.
+
+        At another baud rate the drives would not read what makes a begun line harmless, so that goes first.
+        """
         holds = self.values[what]
         if not changes or request.value == holds:
             self.clients[client].reply(request.setting, holds)
         elif client in (self.writer, self._setter) or (self.writer is None and self._setter is None):
+            if what == "baud" and (self._line.text or (self._line.begun and client != self._before)):
+                self._end_harmlessly(client, now)
+            if not self._settled(client, now):
+                return False
             self.clients[client].setting = True
             self._actions.append(Set(client, request.setting, request.value))
         else:
@@ -446,6 +454,7 @@ class Exchange:
             self.clients[client].reply(request.setting, holds)
         if what == "baud" and self.writer is None and self._setter is None:
             self._setter = client
+        return True
 
     def applied(self, client: int, setting: int, value: int, trouble: str = "") -> list[Action]:
         """Note a setting that was changed, or could not be (`trouble`), and reply with what holds."""

@@ -6,7 +6,7 @@ import argparse
 from typing import TYPE_CHECKING
 
 from multidrop.base.feature import Feature
-from multidrop.shell.hooks import AtSession, Options, Switch
+from multidrop.shell.hooks import AtSession, Options, Predicting, Switch
 from multidrop.shell.operations.operation import Operation
 
 if TYPE_CHECKING:
@@ -77,6 +77,7 @@ its twin moves on. `/twin` alone lists the twins.
             group="Settings and values",
         ),
         AtSession(_begin),
+        Predicting("no twin runs that it could differ from", "/twin on begins one"),
         Switch(
             "twin",
             "/twin",

@@ -15,7 +15,7 @@ from multidrop.shell import hooks
 from multidrop.shell.hooks import Around, Prepare
 
 if TYPE_CHECKING:
-    from multidrop.dialects.family import Language
+    from multidrop.dialects.language import Language
     from multidrop.shell.session import Session
 
 

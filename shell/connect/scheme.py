@@ -1,12 +1,13 @@
 """A kind of URL: how it is written, parsed, named, opened and opened again. Imports nothing that takes time.
 
-`Scheme` has a default for everything but the form, so that `tcp://` is a few lines. The core's are in
+`Scheme` has a default for everything but the form and the opening, so that `tcp://` is a few lines. The core's are in
 `shell.connect.schemes`; a feature adds an instance of its own class to its record.
 """
 
 from __future__ import annotations
 
 import re
+from abc import ABC, abstractmethod
 from collections.abc import Awaitable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, NamedTuple, Protocol
@@ -80,7 +81,7 @@ class Open(Protocol):
     ) -> Awaitable[Transport]: ...
 
 
-class Scheme:
+class Scheme(ABC):
     """A kind of URL. Its attributes say how it is written and what is at its other end, its methods what it does.
 
     As it is, it leads to a line of drives at a host, `NAME://HOST[:PORT]`.
@@ -173,12 +174,12 @@ class Scheme:
 
     # Ports
 
+    @abstractmethod
     async def open(self, connection: Connection, baud: int, within: float | None = None) -> Transport:
         """Open the byte pipe. Raises Unreachable.
 
         `baud`: for a port that has one. `within`: the time for a host, s; None: as long as it takes.
         """
-        raise NotImplementedError
 
     def again(self, connection: Connection, open_: Open, took: float) -> Reopen | None:
         """The way to open a port again after a loss; None: it cannot be found again. `took`: the first opening, s."""

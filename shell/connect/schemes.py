@@ -188,6 +188,12 @@ class Sim(Scheme):
             text = text.replace(written, os.path.abspath(connection.target), 1)
         return text if connection.bus else f"{text.partition('?')[0]}#{bus}"
 
+    async def open(self, connection: Connection, baud: int, within: float | None = None) -> Transport:
+        """Raise Unreachable: a cell has buses, which are opened without a port."""
+        from multidrop.transports import Unreachable
+
+        raise Unreachable(f"{self.shown(connection)}: a simulated cell has no port")
+
 
 def _rooted(connection: Connection, folder: str) -> Connection:
     path = connection.target
@@ -208,7 +214,7 @@ SAVED = "the name of a saved connection"
 
 def schemes() -> dict[str, Scheme]:
     """All schemes by name, those of features among them."""
-    added = {each.name: each for each in registry.added(Scheme) if each.name not in CORE}
+    added = {each.name: each for each in registry.added(Scheme) if each.name not in CORE}  # type: ignore[type-abstract]
     names = [*CORE]
     registry.place({name: each.after for name, each in added.items()}, names)
     known = {**added, **CORE}
@@ -222,7 +228,8 @@ def named(name: str) -> Scheme | None:
     """
     if name in CORE:
         return CORE[name]
-    return next((each for each in registry.answering(Scheme, f"{name}:") if each.name == name), None)
+    answering = registry.answering(Scheme, f"{name}:")  # type: ignore[type-abstract]
+    return next((each for each in answering if each.name == name), None)
 
 
 def no_line(name: str) -> NoLine | None:

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from multidrop.base import registry
 from multidrop.base.errors import Diagnostic
 from multidrop.drives.conversations import refuse_stranger
 from multidrop.drives.drive import Drive
+from multidrop.shell.hooks import Predicting
 from multidrop.shell.line_syntax import EVERYONE, split_target
 from multidrop.shell.roles import DIFFERENCE, Series
 from multidrop.shell.session import Session
@@ -74,9 +76,10 @@ def _value(workspace: Session, bus: str, address: str, word: str, text: str) -> 
     if not word:
         raise Diagnostic(f"no value in {text!r}", hint=FORMS)
     if word.lower() == DIFFERENCE:
-        if workspace.buses[bus] not in workspace.predicted:
-            raise Diagnostic(f"{drive.shown}: no twin runs that it could differ from", hint="/twin on begins one")
-        return Series(bus, address, DIFFERENCE)
+        if workspace.buses[bus] in workspace.predicted:
+            return Series(bus, address, DIFFERENCE)
+        for each in registry.added(Predicting):
+            raise Diagnostic(f"{drive.shown}: {each.missing}", hint=each.begin)
     return Series(bus, address, drive.family.values.check(word))
 
 

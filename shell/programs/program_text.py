@@ -13,8 +13,9 @@ from typing import NamedTuple
 from multidrop.base.errors import Diagnostic
 from multidrop.base.files import split_lines
 from multidrop.base.text import counted
+from multidrop.dialects.editing import Block, Offer, Span, UserName
 from multidrop.dialects.families import program_language_of, program_languages
-from multidrop.dialects.program_files import Block, Entry, Offer, Part, Problem, Span, UserName, errors
+from multidrop.dialects.program_files import Entry, Part, Problem, errors
 
 BYTE_ORDER_MARK = "\ufeff"
 

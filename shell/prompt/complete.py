@@ -26,7 +26,7 @@ from multidrop.simulator.declared import simulated
 from multidrop.simulator.families import PROGRAMS
 
 if TYPE_CHECKING:
-    from multidrop.dialects.family import Language
+    from multidrop.dialects.language import Language
 
 MOST = 200
 """The largest number of completions."""

@@ -20,6 +20,7 @@ from codecs import getincrementaldecoder
 from collections.abc import Callable, Iterator
 from functools import partial
 
+from multidrop.base.isolation import isolated
 from multidrop.shell.signals import SIGNALS, early_ends
 from multidrop.shell.signals import in_loop as on_signal
 
@@ -124,7 +125,8 @@ class Keyboard:
     def _came(self, data: bytes) -> None:
         """Take bytes of a console, in its reading thread."""
         if STOP_KEY in data:
-            self.stop_ahead()
+            with isolated("the stop key"):  # the loop stops all the same
+                self.stop_ahead()
         with contextlib.suppress(RuntimeError):  # the loop has ended
             self._loop.call_soon_threadsafe(self._read, data)
 
@@ -136,7 +138,8 @@ class Keyboard:
             except OSError:
                 data = b""  # EIO: the terminal is gone
             if STOP_KEY in data:
-                self.stop_ahead()
+                with isolated("the stop key"):  # the loop stops all the same, and later keys are read
+                    self.stop_ahead()
             with contextlib.suppress(RuntimeError):  # the loop has ended
                 self._loop.call_soon_threadsafe(self._read, data)
             if not data:

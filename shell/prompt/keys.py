@@ -67,6 +67,11 @@ class KeyboardInput(Input):
     def closed(self) -> bool:
         return self.keyboard.closed
 
+    @property
+    def enters_follow(self) -> bool:
+        """Whether the end of another line was typed already."""
+        return any(end in self.keyboard.typed for end in "\r\n")
+
     def read_keys(self) -> list[KeyPress]:
         """The next keys, of one line at most; after an Enter only the terminal's cursor reports."""
         if self._resting:

@@ -227,6 +227,8 @@ class LineQueue:
         self._entered_lines = 0
         self._entered = 0.0
         """The time of the last Enter."""
+        self._follows = False
+        """The next Enter had been typed before the last one was taken."""
         self._held = ""
         """The reason why the rest of this burst is not sent; empty: it is sent."""
         self._queued = False
@@ -246,12 +248,16 @@ class LineQueue:
         self._meant = (0, NOWHERE)
         """After a `/use`: the number of lines entered by then, which are for the drive that it selected."""
 
-    def enter(self, text: str) -> None:
-        """Take the lines of one Enter. They count as typed now, whenever their turn comes."""
+    def enter(self, text: str, followed: bool = False) -> None:
+        """Take the lines of one Enter. They count as typed now, whenever their turn comes.
+
+        `followed`: another Enter was typed already. However long it takes this program to come to it, nobody has read a
+        reply in between.
+        """
         now = self._session.now()
-        if now - self._entered > BURST:
+        if now - self._entered > BURST and not self._follows:
             self._held, self._queued = "", False
-        self._entered = now
+        self._entered, self._follows = now, followed
         try:
             lines = lines_of(text)
         except Diagnostic as problem:

@@ -324,7 +324,8 @@ class Prompt:
             buffer.reset()
             return True
         self._pager.rest.clear()
-        self._lines.enter(buffer.text or self._session.enter_alone())
+        followed = self._input is not None and self._input.enters_follow
+        self._lines.enter(buffer.text or self._session.enter_alone(), followed)
         if self._input is not None:
             self._input.rest()
         return self._accept(buffer) if self._accept is not None else False

@@ -18,6 +18,8 @@ from multidrop.shell.workspace import Workspace
 
 OPENING = ("/open", "/close")
 SELECTING = (*OPENING, "/use")
+RAW = {"": True, "on": True, "open": True, "off": False}
+"""The words of `/raw` that begin or end raw mode."""
 
 
 class Values(dict[str, str]):
@@ -70,6 +72,8 @@ class _Planning:
         """No line so far selects another drive."""
         self._opens = False
         """A line so far opens or closes a bus."""
+        self._raw = False
+        """The lines so far leave raw mode on: it takes any text."""
 
     def macro(self, played: MacroScript) -> Iterator[tuple[ScriptLine, Drive]]:
         """The lines of a macro that can start a drive, each with that drive; then those of its end."""
@@ -112,7 +116,9 @@ class _Planning:
         """
         self._opens = self._opens or line.word in OPENING
         self._selected = self._selected and line.word not in SELECTING
-        if line.text.startswith("/"):
+        if line.word == "/raw" and (wanted := RAW.get(" ".join(line.text.split()[1:2]))) is not None:
+            self._raw = wanted
+        if line.text.startswith("/") or self._raw:
             return None
         parsed = parse(fill(line.text, values))
         if not isinstance(parsed, DriveLine) or not (parsed.bus or parsed.address or self._selected):

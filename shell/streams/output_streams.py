@@ -14,6 +14,7 @@ import os
 import select
 import stat
 import sys
+from abc import abstractmethod
 from collections.abc import Callable, Iterator, Sequence
 from enum import Enum
 from functools import partial
@@ -67,12 +68,12 @@ class Colour(Enum):
 class LineStream(io.TextIOBase):
     """A text stream in place of a standard stream that takes whole lines at once."""
 
+    @abstractmethod
     def lines(self, lines: Sequence[str], spare: bool) -> None:
         """Send lines. Without room a terminal loses all but warnings; a pipe loses spare (unsolicited) lines.
 
         A file loses none.
         """
-        raise NotImplementedError
 
     def coloured(self, colour: Colour) -> LineStream:
         """The same stream with its lines in a colour, where it shows colours."""

@@ -10,7 +10,7 @@ from typing import NamedTuple
 from multidrop.base.errors import Diagnostic, Stopped
 from multidrop.base.new_file import STANDARD_OUTPUT
 from multidrop.dialects.families import DEFAULT, FAMILIES, languages, program_languages
-from multidrop.dialects.family import Language
+from multidrop.dialects.language import Language, labelled
 from multidrop.dialects.motions import Outcome
 from multidrop.shell import configuration, stop_report, waits
 from multidrop.shell.events import By
@@ -248,7 +248,7 @@ async def help_(call: Call) -> None:
         from multidrop.shell import setting_units
 
         taken = setting_units.example(call.session.units, selected, word.upper())
-        lines = [*lines, f"  {'units':<10} {taken}"] if taken else lines
+        lines = [*lines, *labelled([("units", taken)])]
     if call.session.front.page is not None:
         call.session.front.page(lines)
         return

@@ -35,7 +35,9 @@ GROUPED = (
     ("mcode", "MR 51'200"), ("mcode", "MR 51`200"), ("mcode", "MR 51\\200"), ("mcode", "MR -51'200"),
     ("mcode", "MR 51'200 ' far"), ("mcode", "MR 51'200'000"), ("mcode", "MR 51'200\\ far"), ("mcode", "R1=R2+51'200"),
     ("mcode", "MR51'200"), ("mcode", "MR 51'200.5"), ("mcode", "\tMR 51`200\t"),
-    ("pmx", "X51;200"), ("pmx", "V1=51;200;300"), ("tmcl", "MVP ABS, 0, 51;200"), ("tmcl", "Far = 51;200"),
+    ("mcode", "MA 51'200,1"), ("mcode", "R1=51'200*R2"), ("mcode", "MA 51'200 , 1"), ("mcode", "MR 51'200mm"),
+    ("pmx", "X51;200"), ("pmx", "X51;200Y5"), ("pmx", "V1=51;200;300"), ("pmx", "V1=51;200+V2"),
+    ("tmcl", "MVP ABS, 0, 51;200"), ("tmcl", "Far = 51;200"),
 )  # fmt: skip
 
 
@@ -48,7 +50,7 @@ def test_a_number_in_groups_of_digits_is_an_error_with_the_number_to_write(langu
 
 BEHIND = (
     ("mcode", "MR 51' far"), ("mcode", "MR 51'20"), ("mcode", "MR 51'2000"), ("mcode", "MR 51`"),
-    ("mcode", "BR G1'back"),
+    ("mcode", "BR G1'back"), ("mcode", "MR 51'200 steps"), ("mcode", "MR 1'51'200 and"),
     ("pmx", "X51;far"), ("pmx", "X51;20"), ("tmcl", "ROR 0, 51//200"), ("tmcl", "ROR 0, 51;x"),
 )  # fmt: skip
 

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import asyncio
+from functools import partial
 from typing import Any
 
 import pytest
 
 from multidrop.base.errors import Diagnostic
 from multidrop.base.feature import Feature
-from multidrop.base.foreign import Guard, guarded
+from multidrop.base.foreign import Guard, callback, guarded
 from multidrop.base.isolation import LOG, isolated
+from multidrop.drives.events import Publisher
 
 
 class Unreadable(Exception):
@@ -38,6 +40,29 @@ def test_whatever_is_raised_is_one_line(failure: BaseException, words: str) -> N
 def test_what_ends_the_caller_passes(end: type[BaseException]) -> None:
     with pytest.raises(end):
         raising(end())()
+
+
+async def test_an_interrupt_of_its_own_is_a_failure_where_an_event_loop_takes_the_signals() -> None:
+    with pytest.raises(Diagnostic, match="^the feature gauge failed at test_foreign.py:[0-9]+: KeyboardInterrupt"):
+        raising(KeyboardInterrupt())()
+
+
+async def subscriber(event: object) -> None:
+    """Take an event."""
+
+
+class Taker:
+    async def __call__(self, event: object) -> None:
+        """Take an event."""
+
+
+@pytest.mark.parametrize("function", [subscriber, partial(subscriber), Taker(), Guard("gauge").function(subscriber)])
+def test_an_async_subscriber_is_refused_in_one_line(function: Any) -> None:
+    wants = " is async, and nothing awaits it; give a plain function, which may start a task$"
+    with pytest.raises(Diagnostic, match=wants):
+        Publisher("a watcher").subscribe(function)
+    with pytest.raises(Diagnostic, match=wants):
+        callback(function)
 
 
 async def test_work_that_a_stop_cancels_is_cancelled() -> None:

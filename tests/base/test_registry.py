@@ -18,6 +18,15 @@ from multidrop.base.errors import Diagnostic
 from multidrop.base.feature import Feature
 
 GOOD = 'from multidrop.base.feature import Feature\nFEATURE = Feature("{name}", "does something")\n'
+NO_OPENING = """
+from multidrop.base.feature import Feature
+from multidrop.shell.connect.scheme import Scheme
+
+class Can(Scheme):
+    name, prefix, example, meaning = "can", "can://", "can://HOST", "a gateway"
+
+FEATURE = Feature("bad", "a kind of URL", adds=(Can(),))
+"""
 
 
 @pytest.fixture(autouse=True)
@@ -76,6 +85,7 @@ def test_without_the_configuration_a_persons_own_files_are_not_loaded(own: Path)
         (GOOD.replace('something"', 'something", adds=Feature("a", "b")'), "TypeError: adds is a tuple of records"),
         (GOOD.replace('something"', 'something", extras=["fit"]'), "TypeError: extras is a mapping of names to names"),
         (GOOD.replace("{name}", "other"), "its record has the name other"),
+        (NO_OPENING, "TypeError: Can't instantiate abstract class Can with"),
     ],
 )
 def test_one_that_cannot_be_loaded_is_one_warning_and_the_others_are_there(own: Path, text: str, why: str) -> None:

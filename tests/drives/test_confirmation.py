@@ -53,6 +53,7 @@ class Drive:
         self.seen: Seen | None = None
         self.running: Running | None = None
         self.codec = SimpleNamespace(spares=False)
+        self.family = SimpleNamespace(units=SimpleNamespace(axes=lambda: ("x", "y")))
 
     def reading(self) -> tuple[Activity, str]:
         found = self.readings.pop(0) if len(self.readings) > 1 else self.readings[0]
@@ -259,7 +260,7 @@ async def test_a_stop_of_one_axis_asks_for_that_axis_and_counts_its_rests():
     a = spared(link, Activity(300), Activity(0, True, "7"))
     made, halt = await of_one_axis(a, link)
     assert a.asked == frozenset("x") and list(halt.rests.values()) == [2]  # type: ignore[attr-defined]
-    assert len(a.times) == 3 and made.again == [] and link.told == [("a: stopped, velocity 0 at 7", False)]
+    assert len(a.times) == 3 and made.again == [] and link.told == [("a X: stopped, velocity 0 at 7", False)]
 
 
 async def test_a_stop_of_one_axis_that_cannot_be_read_is_written_again_as_the_usual_one():
@@ -308,7 +309,7 @@ UNREAD = "velocity 0 was read, and whether a program runs was not: no reply"
         ((X,), False, None, Activity(0, False, "7"), "", 1),
         ((X,), True, None, Activity(0, True, "7"), "", 1),
         ((X, Y), True, None, Activity(300, False, "7, 8"), "", 0),
-        ((X, Y), True, frozenset("x"), Activity(0, False, "7, 8"), "", 0),
+        ((X, Y), True, frozenset("x"), Activity(0, False, "7"), "", 0),
         ((YRUNS, X), False, None, Activity(0, True, "8, 7"), "", 0),
         ((X,), NoAnswer("no reply"), None, Activity(), UNREAD, 1),
         ((X,), TimeoutError("no reply"), None, Activity(), UNREAD, 1),

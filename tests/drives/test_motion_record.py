@@ -90,8 +90,47 @@ def test_only_a_restart_cuts_a_motion_off():
     ("what", "stopped"), [(NOBODY, False), (MINE, True), (THEIRS, True), ({"program": True}, False)]
 )
 def test_the_evidence_of_a_motion_has_what_was_known_before_it_and_since(what, stopped):
-    each = course(**what)
-    assert each.evidence((83,)) == Evidence(each.move, {"st": 0}, (83,), stopped, "program" in what)
+    each = course(**what, commands=4)
+    for commands, alone in ((5, True), (6, False)):  # its own line is the fifth
+        known = Evidence(each.move, {"st": 0}, (83,), stopped, "program" in what, alone)
+        assert each.evidence((83,), commands) == known
+
+
+@pytest.mark.parametrize(
+    ("target", "position", "missed", "outcome"),
+    [
+        (None, 0, True, Outcome.UNKNOWN),
+        (0, 0, True, Outcome.UNKNOWN),
+        (0, 0, False, Outcome.REACHED),
+        (None, 5, True, Outcome.REACHED),
+        (5, 0, True, Outcome.REACHED),
+    ],
+)
+def test_an_end_at_0_after_a_missing_reply_may_be_a_restart(target, position, missed, outcome):
+    each = course(target=target)
+    record = recorded(each)
+    if missed:
+        record.missed()
+    found = each.judged(Ending(Outcome.REACHED, "x", position))
+    assert (found.outcome, found.failed) == (outcome, outcome is Outcome.UNKNOWN)
+
+
+def test_a_missing_reply_after_a_motion_says_nothing_of_it():
+    each = course()
+    record = recorded(each)
+    each.judged(ended(Outcome.REACHED))
+    record.missed()
+    assert not each.missed
+
+
+def test_a_stop_of_one_axis_of_a_common_move_is_one_of_each():
+    both = frozenset("xy")
+    common = [Course(Move(MoveKind.POSITION, axis, group=both), ME, {}, 0) for axis in "xy"]
+    record = recorded(*common)
+    record.stopped(ME, frozenset("x"))
+    assert all(each.stopped for each in common)
+    record.effect(Effect(resumes=True), ME)
+    assert not any(each.stopped for each in common)
 
 
 def test_a_motion_of_the_same_sequence_replaces_its_last_one_on_that_axis_alone():

@@ -23,3 +23,13 @@ def test_a_defect_in_the_work_of_one_owner_keeps_no_other_one_from_its_time(monk
     assert done.wait(PATIENCE)
     pacer.after("later", 0.0, later.set)
     assert later.wait(PATIENCE) and [type(each) for each in raised] == [ZeroDivisionError]
+
+
+def test_what_an_owner_asks_for_is_in_place_of_what_it_has_asked_for_before() -> None:
+    """A key in the pause before the repetition of a stop: the next piece is due at once, not after the pause."""
+    pacer, done = Pacer(), threading.Event()
+    never = list[str]()
+    pacer.after("a line", 60.0, lambda: never.append("late"))
+    pacer.after("another", 60.0, lambda: never.append("late"))
+    pacer.after("a line", 0.0, done.set)
+    assert done.wait(PATIENCE) and never == []

@@ -23,6 +23,7 @@ class Desk:
         transport = SimpleNamespace(preempt=self._preempt, follow=self._follow, preemptible=preemptible)
         self.line: Any = SimpleNamespace(
             only_stop=False,
+            stops_all=True,
             byte_time=0.0,
             transmitted=5.0,
             owed_pieces=lambda: [*self.owed],
@@ -66,6 +67,30 @@ def test_a_key_goes_on_with_a_stop_of_the_loop_or_begins_a_new_one_once_that_is_
     desk.follows = False
     desk.ahead.press()
     assert [each[0] for each in desk.calls] == ["follow", "preempt", "after"]
+
+
+def test_a_key_begins_a_stop_behind_one_of_some_drives_and_in_its_own_order(desk: Desk) -> None:
+    desk.line.only_stop, desk.line.stops_all, desk.owed = True, False, [StopPiece(b"y", 0.2), *FORMS.repeats]
+    desk.ahead.press()
+    assert desk.calls == [("preempt", True, b"STOP"), ("after", pytest.approx(0.3))]
+    assert desk.ahead._begun is not None and desk.ahead._begun.pieces == [*FORMS.repeats]
+
+
+@pytest.mark.parametrize(("left", "first"), [(4.9, b"STOP"), (5.1, b"ST~STOP")])
+def test_so_it_does_where_a_thread_has_gone_on_with_that_one(desk: Desk, left: float, first: bytes) -> None:
+    """What is still leaving of it may be cut off."""
+    desk.line.only_stop, desk.line.stops_all, desk.owed = True, False, [StopPiece(b"y", 0.2), StopPiece(b"z", 0.2)]
+    desk.line.transmitted = 4.8
+    desk.ahead.watch(FORMS)
+    assert desk.ahead._take_back(0) == b"y" and desk.ahead._begun is not None
+    desk.ahead._begun.left = left
+    desk.calls.clear()
+    desk.ahead.press()
+    assert desk.calls[0] == ("preempt", True, first)
+    assert desk.ahead._begun.pieces == [*FORMS.repeats] and [each for _, each in desk.ahead._begun.written] == [
+        b"y",
+        first,
+    ]
 
 
 def test_a_piece_that_is_due_and_does_not_leave_is_tried_again_soon(desk: Desk) -> None:

@@ -88,6 +88,22 @@ async def test_a_stop_on_a_lost_line_writes_nothing_and_is_the_first_to_be_writt
     assert again.fate(desk.bus.drives["a"]) is Fate.STANDING
 
 
+async def test_a_key_that_found_the_line_lost_is_written_first_although_the_loop_has_not_come_to_it_yet(
+    desk: SimulatedBus,
+) -> None:
+    await desk.send("a", "SL 50000")
+    await lose(desk)
+    desk.bus.stop_ahead()  # in the thread of the keys; the loop opens the port again before it hears of that
+    again = back(desk)
+    assert again is not None and again.whole and stops(desk) == [again.data] and desk.sent[0] == again.data
+    desk.bus.stop()
+    await found_again(desk)
+    await desk.bus.stopped()
+    assert not desk.moving("a")
+    await lose(desk)
+    assert back(desk) is None, "the loop has followed the key: nothing is owed"
+
+
 async def test_a_stop_of_one_drive_that_a_loss_kept_back_is_that_of_this_drive(desk: SimulatedBus) -> None:
     for name in ("a", "b"):
         await desk.send(name, "SL 50000")

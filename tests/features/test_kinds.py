@@ -31,7 +31,7 @@ def test_every_function_of_every_kind_is_in_the_table() -> None:
 
 @pytest.mark.virtual
 @pytest.mark.parametrize(
-    "failure", [KeyError("key"), SystemExit(3), Diagnostic("cannot be done"), OSError(5, "broken")]
+    "failure", [KeyError("key"), SystemExit(3), KeyboardInterrupt(), Diagnostic("cannot be done"), OSError(5, "broken")]
 )
 async def test_what_a_function_raises_is_one_line_that_names_the_feature(
     failure: BaseException, tmp_path: Path, monkeypatch: pytest.MonkeyPatch

@@ -146,6 +146,7 @@ def read(*given):
     assert done.stderr == f"warning: the feature gate ({path}) cannot be loaded: {why}\n" and done.returncode == 0
 
 
+ENDS = "async def gate(call):\n    raise KeyboardInterrupt"
 VERB = """
 from multidrop.base.feature import Feature
 from multidrop.shell.operations.operation import Operation
@@ -166,6 +167,13 @@ def test_a_verb_that_is_not_async_is_one_line(tmp_path: Path, multidrop: Command
     write(tmp_path, "gate", VERB)
     done = multidrop("send", "sim:#press", "/gate")
     assert (done.returncode, done.stderr) == (2, "imported\n/gate has no async function\n")
+
+
+def test_a_verb_that_interrupts_itself_is_one_line(tmp_path: Path, multidrop: Command) -> None:
+    text = VERB.replace('print("imported")', "").replace("def gate(call):\n    pass", ENDS)
+    write(tmp_path, "gate", text)
+    done = multidrop("send", "sim:#press", "/gate")
+    assert (done.returncode, done.stderr) == (2, "the feature gate failed at gate.py:8: KeyboardInterrupt\n")
 
 
 def test_what_a_feature_prints_as_it_is_imported_is_no_reply(tmp_path: Path, multidrop: Command) -> None:

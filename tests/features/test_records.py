@@ -11,7 +11,7 @@ from multidrop.base import registry
 from multidrop.base.registry import IN_WHEEL
 from multidrop.dialects.families import Dialect
 from multidrop.shell.connect.scheme import NoLine, Scheme
-from multidrop.shell.hooks import AtSession, Options, Switch
+from multidrop.shell.hooks import AtSession, Options, Predicting, Switch
 from multidrop.shell.operations.operation import Forms, Operation
 from multidrop.shell.operations.table import VERBS
 from multidrop.shell.plot_targets import PlotTargets
@@ -22,6 +22,7 @@ from tests.support.paths import ROOT, THERE
 
 KINDS: tuple[type, ...] = (
     Switch,
+    Predicting,
     Operation,
     AtSession,
     Options,

@@ -177,6 +177,24 @@ async def test_a_feature_that_cannot_begin_is_a_warning_and_the_session_works(
 
 
 @pytest.mark.virtual
+@pytest.mark.parametrize("place", ["begin", *HOOKS])
+async def test_an_async_hook_is_a_warning_and_the_session_works(
+    place: str, tmp_path: Path, add: Callable[..., None]
+) -> None:
+    async def hook(_: Any) -> None:
+        """Take what it is called with."""
+
+    add(AtSession(hook if place == "begin" else lambda session: at_session(place)(session, hook)))  # type: ignore[arg-type]
+    cell = CellSession(tmp_path, bus("press", party("a")))
+    await asyncio.sleep(0)
+    why = "hook is async, and nothing awaits it; give a plain function, which may start a task"
+    assert cell.warned() == [f"the feature x cannot begin: {why}"]
+    async with cell:
+        await cell.session.run("@a PR P")
+        assert cell.printed() == ["0"]
+
+
+@pytest.mark.virtual
 async def test_a_verb_that_never_returns_ends_with_the_stop(tmp_path: Path, add: Callable[..., None]) -> None:
     async def forever(_: Any) -> None:
         await asyncio.Event().wait()

@@ -220,6 +220,13 @@ async def test_a_stop_ends_calls_and_refuses_commands_until_resume(url: str) -> 
         await a.move(1)
 
 
+async def test_the_report_of_a_stop_names_the_bus_where_two_are_open(tmp_path: Path) -> None:
+    (tmp_path / "two.toml").write_text(bus("press", party("a"), baud=0) + bus("eth", ETHERNET, baud=0))
+    for buses, name in ((("press", "eth"), "press:a"), (("press",), "a")):
+        async with connect_async(*(f"sim:{tmp_path / 'two.toml'}#{each}" for each in buses)) as session:
+            assert str(await session.drive(name).stop()) == f"velocity 0 was read from {name}"
+
+
 async def test_a_stop_without_await_is_repeated_and_confirmed_before_the_end(url: str, caplog: Any) -> None:
     async with connect_async(f"{url}#eth") as session:
         await session.drive().move(FAR)

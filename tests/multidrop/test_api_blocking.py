@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import inspect
 import os
 import signal
 import threading
@@ -12,7 +13,7 @@ from typing import Any
 
 import pytest
 
-from multidrop import Diagnostic, Refused, Session, Stopped, connect
+from multidrop import Diagnostic, Refused, Session, Stopped, connect, connect_async
 from multidrop.api import endings, threads
 from tests.support import api_program
 from tests.support.cell_session import bus, moves, party
@@ -261,3 +262,9 @@ def test_a_session_agrees_to_nothing_unless_it_is_told(url: str, tmp_path: Path)
                 continue
             with pytest.raises(Diagnostic, match="nothing was sent"):
                 opened.drive("a").parameters.restore(str(tmp_path / "kept.toml"))
+
+
+@pytest.mark.parametrize("opens", [connect, Session, connect_async])
+def test_nothing_is_agreed_to_and_no_connection_comes_back_unless_that_is_asked_for(opens: Any) -> None:
+    given = inspect.signature(opens).parameters
+    assert [given[name].default for name in ("yes", "beyond", "reconnect")] == [False, False, False]

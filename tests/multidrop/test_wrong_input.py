@@ -21,7 +21,7 @@ from multidrop.base.files import toml_of
 from multidrop.base.text import whole
 from multidrop.dialects import End
 from multidrop.dialects.families import languages
-from multidrop.dialects.family import Language
+from multidrop.dialects.language import Language
 from multidrop.families.lexium.host.classify import INTEGER
 from multidrop.families.lexium.host.mcode.codec import MCode
 from multidrop.families.lexium.host.mcode.state import MCodeState

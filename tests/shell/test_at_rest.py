@@ -175,3 +175,11 @@ async def test_a_module_that_reads_velocity_0_in_motion_is_at_rest_in_one_place_
         assert await module.send("GAP 1, 0") == ("200000",)
         (found,) = await standings(shop.session, [module])
         assert found.text == "1 is at rest at 200000"
+
+
+@pytest.mark.parametrize(("false", "at_rest"), [((), False), ((1,), False), ((1, 2), True)])
+async def test_a_drive_is_read_twice_after_an_error(false, at_rest, tmp_path, monkeypatch):
+    """A routine for errors may start it between the two."""
+    async with CellSession(tmp_path, bus("press", party("a"))) as shop:
+        Moving(monkeypatch, "mcode", *false)
+        assert await at_rest_after_error(shop.session.drive()) is at_rest

@@ -78,7 +78,7 @@ async def test_whatever_ends_it_early_stops_what_it_started_and_nothing_else(run
         assert shop.moving() == {"gantry:d", "stages:01"}
         assert not shop.session.latched
         assert [text for text in shop.warned() if text.startswith("stopped ")] == [
-            "stopped press:a, gantry:c, eth, stages:00: velocity 0 was read from all 4",
+            "stopped press:a, gantry:c, eth, stages:00 X: velocity 0 was read from all 4",
         ]
         await shop.session.run("@gantry:c SL 100", By.SCRIPT)
 

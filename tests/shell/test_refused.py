@@ -304,7 +304,7 @@ async def test_an_axis_of_a_controller_is_stopped_and_its_programs_go_on(tmp_pat
         await asyncio.sleep(1)
         assert b"ABORTX\r" in shop.written("stages") and b"ABORT\r" not in shop.written("stages")
         assert b"SR0" not in shop.written("stages")
-        assert shop.warned()[-1] == "stopped 00: velocity 0 was read from 00"
+        assert shop.warned()[-1] == "stopped 00 X: velocity 0 was read from 00 X"
         await typed(shop.session, "@stages:00 PSX", "@stages:00 PSY")
         assert shop.printed()[-2] == "0" and shop.printed()[-1] != "0"
 

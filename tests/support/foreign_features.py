@@ -27,10 +27,10 @@ from multidrop.dialects.families import Dialect
 from multidrop.dialects.usb import UsbModule
 from multidrop.shell import configuration, hooks, plot_targets, relaying
 from multidrop.shell.configuration import Settings
-from multidrop.shell.connect.scheme import NoLine, Scheme
+from multidrop.shell.connect.scheme import Connection, NoLine, Scheme
 from multidrop.shell.connect.schemes import local_ports
 from multidrop.shell.connect.urls import parse
-from multidrop.shell.hooks import AtSession, Options, Switch
+from multidrop.shell.hooks import AtSession, Options, Predicting, Switch
 from multidrop.shell.operations.operation import Examples, Forms, Operation
 from multidrop.shell.operations.table import COMMANDS, VERBS
 from multidrop.shell.plot_targets import PlotTargets
@@ -42,7 +42,7 @@ from multidrop.simulator.declared import Demo, Simulated
 from multidrop.simulator.floor import Floor
 from multidrop.simulator.serving.endpoints import serve_bus
 from multidrop.simulator.serving.running import RunningFloor
-from multidrop.transports import Unreachable
+from multidrop.transports import Transport, Unreachable
 from multidrop.tui.app import look_troubles
 from tests.support.cell_session import bus, party
 from tests.support.paths import ROOT
@@ -58,6 +58,9 @@ class Slow(Scheme):
     """A scheme with a byte pipe that is never opened here."""
 
     name, prefix, example, meaning, port = "slow", "slow://", "slow://HOST:1", "a slow gateway", 1
+
+    async def open(self, connection: Connection, baud: int, within: float | None = None) -> Transport:
+        raise Unreachable(f"{connection.host}: never open")
 
 
 async def _work(*_: Any) -> None:
@@ -96,6 +99,7 @@ PLAIN: Mapping[type, Any] = MappingProxyType(
             max,
         ),
         Scheme: Slow(),
+        Predicting: Predicting("nothing slow runs", "/slow on begins it"),
         Switch: Switch("slow", "/slow", "be slow", "be slow, or not", lambda session: False),
         Section: Section("slow", ("key",), "[slow]", lambda table, where: table, lambda found: found),
     }

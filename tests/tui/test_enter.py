@@ -52,3 +52,16 @@ async def test_a_key_finds_the_binding_that_is_active(keys: list[str]) -> None:
         for key in {key for _, bindings in app.screen._binding_chain for key in bindings.key_to_bindings}:
             found, expected = app.keyboard._binding(key), active.get(key)
             assert found == (expected and (expected.binding, expected.node, expected.enabled)), key
+
+
+async def test_lines_of_one_read_are_one_burst_however_slow_this_program_is(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("multidrop.tui.outbox.BURST", 0.0)  # the time between them is always too long
+    async with on_screen() as (pilot, app, session):
+        session.refuses["BAD"] = "a: 20 unknown"
+        for key in (*"BAD", "enter", *"/stats", "enter"):
+            app.post_message(events.Key(key, "\r" if key == "enter" else key))
+        await pilot.pause()
+        await pilot.pause()
+        assert [line for line, _ in session.lines] == ["BAD"]
+        await pilot.press(*"PR", "enter")
+        assert [line for line, _ in session.lines] == ["BAD", "PR"]

@@ -193,3 +193,16 @@ async def test_thousands_of_keys_leave_the_loop_free_for_others() -> None:
     before = len(session.keys)
     assert len(await session.done()) == before, "a stop drops what is not parsed"
     assert session.dropped == ("MR 51200\r" * 600)[before - 5400 :]
+
+
+async def test_an_enter_waits_until_it_is_a_key() -> None:
+    session = SessionView()
+    session.stream.take(b"MR 5\rMR 6")
+    assert session.stream.enter_waits
+    await session.done()
+    assert not session.stream.enter_waits
+    session.stream.take(b"\x1b[200~MR 7\r\x1b[201~")
+    assert not session.stream.enter_waits, "in a paste it is text"
+    session.stream.take(b"\x1b[A\r")
+    assert session.stream.enter_waits
+    await session.done()

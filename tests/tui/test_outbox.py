@@ -60,6 +60,20 @@ async def test_lines_of_a_burst_are_sent_each_when_the_one_before_was_answered()
     assert box.outbox.idle
 
 
+async def test_lines_that_had_come_before_a_failure_are_held_back_however_slow_this_program_is() -> None:
+    box, waiting = Box(), ["BAD", "MR 1"]
+    box.session.refuses["BAD"] = "a: 20 unknown"
+    box.outbox.follows = lambda: bool(waiting)
+    await box.type("BAD", apart=LATER)
+    waiting.clear()
+    await box.type("MR 1", apart=LATER)
+    assert box.sent == ["press:a BAD"]
+    await asyncio.sleep(LATER)
+    assert box.told == ["'BAD' failed; not sent: MR 1; /unsent offers it again"]
+    await box.type("MR 2")
+    assert box.sent[1:] == ["press:a MR 2"]
+
+
 async def test_what_a_person_types_while_a_wait_goes_on_is_answered_at_once() -> None:
     box = Box(**{"/wait": 60.0})
     await box.type("/wait stopped 60", "PR P", apart=LATER)

@@ -11,6 +11,7 @@ from multidrop.tui.panels.view import Glance
 from multidrop.tui.polling import CONDITIONS, CONDITIONS_OF_OTHERS
 from multidrop.tui.readout import Readout
 from multidrop.tui.screens.all_drives import AllDrives, Place, drive_row
+from multidrop.tui.screens.page import ListPage, Page
 from multidrop.tui.widgets.lines import width_of
 from tests.support.fake_session import (
     FakeBus,
@@ -35,6 +36,17 @@ SPLIT = ("ctrl+p", *"split the", "enter")
 def rows(app: MultidropApp) -> list[str]:
     assert isinstance(app.screen, AllDrives)
     return [row for row in app.screen.lines("drives").plain.split("\n") if row.strip()]
+
+
+@pytest.mark.parametrize(
+    ("base", "missing"), [(Page, "abstract method '?show"), (ListPage, "'?action_step'?, '?choose'?, '?show")]
+)
+def test_a_page_that_does_not_paint_itself_is_none(base: type[Page], missing: str) -> None:
+    class Half(base):  # type: ignore[misc, valid-type]
+        pass
+
+    with pytest.raises(TypeError, match=missing):
+        Half(None)
 
 
 async def test_all_drives_are_a_page_with_the_worst_first() -> None:

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from multidrop.base.errors import Diagnostic, TransportLost
 from multidrop.drives.events import Lost, Sample, Valued
 from multidrop.shell.events import By, OnBus
-from multidrop.shell.roles import Series
+from multidrop.shell.roles import RunningPlot, Series
 from multidrop.tui.curves.raster import ASCII
 from multidrop.tui.curves.samples import Quantity
 from multidrop.tui.curves.trigger import State
@@ -399,6 +399,17 @@ async def test_what_cannot_be_saved_has_one_line(
         await settle(pilot)
         assert why in app.screen.lines("below").plain
         assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.tui
+async def test_a_plot_that_runs_elsewhere_is_named_in_its_own_words() -> None:
+    async def end() -> str:
+        return ""
+
+    async with on_screen() as (pilot, app, session):
+        session.plots.append(RunningPlot("there", "", "", "", "the recorder writes there", end))
+        await press(pilot, "ctrl+g")
+        assert app.screen.lines("below").plain.rstrip() == " the recorder writes there"  # type: ignore[attr-defined]
 
 
 @pytest.mark.tui

@@ -7,6 +7,7 @@ that the transcript shows what was sent.
 from __future__ import annotations
 
 import asyncio
+from abc import ABCMeta, abstractmethod
 from collections.abc import Awaitable, Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import ClassVar, NamedTuple
@@ -101,7 +102,11 @@ class Begun(NamedTuple):
         return (self.stops, self.place) != (session.stops, session.place)
 
 
-class Page(Framed):
+class AbstractScreen(type(Framed), ABCMeta):  # type: ignore[misc]
+    """The metaclass of screens with abstract methods; the name of the one that Textual has is private."""
+
+
+class Page(Framed, metaclass=AbstractScreen):  # type: ignore[metaclass]
     """The base of all pages. `content` makes the widgets, `show` paints them when something has happened."""
 
     AUTO_FOCUS: ClassVar[str | None] = ""
@@ -140,8 +145,9 @@ class Page(Framed):
         """Paint what a worker has brought: nothing else may have happened."""
         self.host.frames.wake()
 
+    @abstractmethod
     def show(self, view: View) -> None:
-        raise NotImplementedError
+        """Paint it."""
 
     def part(self, name: str) -> Lines:
         """Make a part that is rows; `lines` finds it by its name."""
@@ -298,13 +304,13 @@ class ListPage(AskingPage):
         below = len(items) - shown[-1][0] - 1 if shown else 0
         return f"▼ {below} below   " if below else "", "strong"
 
+    @abstractmethod
     def choose(self, at: int) -> None:
         """Choose a row by its place."""
-        raise NotImplementedError
 
+    @abstractmethod
     def action_step(self, by: int) -> None:
         """Choose another row."""
-        raise NotImplementedError
 
     def on_mouse_scroll_down(self) -> None:
         self.action_step(1)

@@ -35,7 +35,7 @@ from multidrop.tui.text import age, fit
 from multidrop.tui.widgets.lines import Row, Span, spread
 
 if TYPE_CHECKING:
-    from multidrop.dialects.family import Language
+    from multidrop.dialects.language import Language
 
 _NUMBER = re.compile(r"[+-]?\d{1,20}")
 _FRACTION = re.compile(r"[+-]?(?:\d{1,20}\.\d*|\.\d+)(?:[eE][+-]?\d{1,3})?")

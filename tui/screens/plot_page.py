@@ -191,7 +191,7 @@ class PlotPage(AskingPage):
         self.lines("below").put_all([*cursor_rows(view, size.width, most), *said] or [self._below(view)])
 
     def _below(self, view: View) -> Row:
-        """The last failure, or how to see what a viewer shows."""
+        """The last failure, or how to see what a viewer shows, or what else takes the samples."""
         if self.host.model.trouble:
             return ((f" ✗ {self.host.model.trouble}", "error"),)
         served = [each for each in view.session.plots if each.desk]
@@ -202,8 +202,8 @@ class PlotPage(AskingPage):
                 ("   c copies it; then: ", "dim"),
                 (served[0].viewer, "strong"),
             )
-        others = [each.where for each in view.session.plots]
-        return ((f" rerun: plotting to {others[0]}", "dim"),) if others else ()
+        others = [each.shown for each in view.session.plots]
+        return ((f" {others[0]}", "dim"),) if others else ()
 
     def _type(self, line: str) -> None:
         """Send a line as if a person had typed it; its failure is shown below the charts."""

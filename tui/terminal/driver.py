@@ -33,6 +33,7 @@ from textual._compositor import ChopsUpdate, LayoutUpdate
 from textual.geometry import Offset, Size
 from textual.message import Message
 
+from multidrop.base.isolation import isolated
 from multidrop.shell.streams.output_streams import descriptor_writer
 from multidrop.shell.threads import Loss
 from multidrop.tui.frame_scheduler import Pace
@@ -236,7 +237,8 @@ class Terminal(PlatformDriver):
             """Take what the console's reading thread has read; the loop does the rest."""
             app = cast(Owner, self._app)
             if STOP in data:
-                app.stop_ahead()
+                with isolated("the stop key"):  # the loop stops all the same
+                    app.stop_ahead()
             with suppress(RuntimeError):  # the loop has ended
                 self._loop.call_soon_threadsafe(*((self._take, data) if data else (app.interrupted,)))
 
@@ -300,7 +302,8 @@ class Terminal(PlatformDriver):
                         continue
                     data = self._read()
                     if STOP in data:
-                        app.stop_ahead()
+                        with isolated("the stop key"):  # the loop stops all the same, and later keys are read
+                            app.stop_ahead()
                     self._loop.call_soon_threadsafe(*((self._take, data) if data else (app.interrupted,)))
                     if not data:
                         return

@@ -60,6 +60,10 @@ class Keyboard:
     def idle(self) -> bool:
         return not self._waiting and not self._turning
 
+    @property
+    def enter_waits(self) -> bool:
+        return any(isinstance(event, events.Key) and event.key == "enter" for event in self._waiting)
+
     def take(self, event: Message) -> bool:
         """Take a key, a paste or a mouse button; return False for any other message."""
         if not isinstance(event, Typed) or event.is_forwarded:

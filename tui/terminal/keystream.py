@@ -215,6 +215,12 @@ class KeyStream:
     def idle(self) -> bool:
         return not self._scheduled
 
+    @property
+    def enter_waits(self) -> bool:
+        """Whether Enter is in the text that is not parsed yet."""
+        texts = (piece.text for piece in self._pieces if piece.kind is Kind.TEXT)
+        return any("\r" in text for text in (self._piece[self._given :], *texts))
+
     def drop(self) -> None:
         """Drop what is not parsed yet, because a stop came from elsewhere.
 

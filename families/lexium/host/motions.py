@@ -15,7 +15,18 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from multidrop.dialects.codec import Procedure
-from multidrop.dialects.motions import NOTHING, Effect, Ending, Evidence, Motions, Move, MoveKind, Outcome, Signs
+from multidrop.dialects.motions import (
+    NOTHING,
+    Effect,
+    Ending,
+    Evidence,
+    Motions,
+    Move,
+    MoveKind,
+    Outcome,
+    Signs,
+    restarted,
+)
 from multidrop.dialects.state import DriveState, who
 from multidrop.dialects.values import Value
 from multidrop.families.lexium.host import classify
@@ -30,7 +41,9 @@ from multidrop.families.lexium.manual.table import lookup
 
 AXIS = ""
 ONLY = frozenset({AXIS})
-SIGNS = ("EF", "MV", "BY", "ST", "P", "AF", "TE")
+LOST = "VM"
+"""A setting that a power-up sets to what was saved last, often another value."""
+SIGNS = ("EF", "MV", "BY", "ST", "P", "AF", "TE", LOST)
 """What is read before a motion."""
 END = ("EF", "BY", "MP", "ST", "EE", "P", "DB", "AF", "AS")
 """What is read at its end."""
@@ -108,8 +121,8 @@ def _of_instruction(row: Mnemonic, statement: Statement, value: int | None) -> E
             return Effect(begins=(Move(MoveKind.POSITION, AXIS, absolute, relative),))
         case Motion.SLEW if value == 0:
             return Effect(ends=ONLY)
-        case Motion.SLEW:
-            return Effect(begins=(Move(MoveKind.VELOCITY, AXIS, endless=True),))
+        case Motion.SLEW:  # a velocity that is not a number may be 0
+            return Effect(begins=(Move(MoveKind.VELOCITY, AXIS, endless=value is not None),))
         case Motion.HOMING if statement.arguments:
             return Effect(begins=(Move(MoveKind.HOMING, AXIS),))
         case Motion.PROGRAM:
@@ -120,8 +133,8 @@ def _of_instruction(row: Mnemonic, statement: Statement, value: int | None) -> E
             return Effect(halts=True)
         case Motion.RELEASE:
             return Effect(clears=True)
-        case Motion.RESUME:  # it goes on to a target of its own
-            return Effect(unknown=ONLY)
+        case Motion.RESUME:  # what PS has paused goes on, perhaps to another target
+            return Effect(unknown=ONLY, resumes=True)
     return None
 
 
@@ -191,6 +204,10 @@ class LexiumMotions(Motions, ABC):
         found = yield from self.read(END)
         before, move, position = evidence.before, evidence.move, found.get("P")
         ending = Ending(Outcome.REACHED, AXIS, position)
+        if position == 0 and evidence.alone and not evidence.program and LOST in before:
+            speed = (yield from self.read((LOST,))).get(LOST, before[LOST])
+            if speed != before[LOST]:
+                return restarted(ending, f"{LOST} {before[LOST]} before, {speed} now")
         if move is None:
             seen = _seen(found, before, ending)
             return None if seen is ending and (yield from self._makes_up(found)) else seen

@@ -8,10 +8,10 @@ from typing import NamedTuple
 
 from multidrop.base.errors import Diagnostic
 from multidrop.base.files import split_lines
-from multidrop.dialects.program_files import Block, Offer, Span, UserName, Word, replaced
-from multidrop.families.lexium.manual import help
+from multidrop.dialects.editing import Block, EditingLanguage, Offer, Span, Use, UserName, Word, collected, last_line
 from multidrop.families.lexium.manual.grammar import NAME_FORM, Token, divided, is_name, statement_tokens, tokens
-from multidrop.families.lexium.manual.groups import EVERY_PLACE, TURNING
+from multidrop.families.lexium.manual.groups import EVERY_PLACE
+from multidrop.families.lexium.manual.help import LANGUAGE, rows_offered
 from multidrop.families.lexium.manual.mnemonic import EVERY, Mnemonic
 from multidrop.families.lexium.manual.program_file import LONGEST, ProgramLine, bare, remark_at, scan
 from multidrop.families.lexium.manual.program_flow import AT_POWER_UP
@@ -42,10 +42,112 @@ def expected(before: str) -> str:
     return PRINTED if head == "PR" else VALUE
 
 
-# The labels and variables of an MCode program file: where each is, and the check of another name for one.
-#
-# A rename keeps the program: every line has the tokens that it had, but for that name. A drive may divide a line
-# differently once a name exists or is gone: `H5` is `H 5` unless H5 is a variable. So the check compares all lines.
+_ACCESS = {"RW", "RO", "RC"}
+"""Of words that PR prints."""
+
+
+class MCodeEditing(EditingLanguage):
+    """The language of MCode files: their labels and variables.
+
+    A rename keeps the program: every line has the tokens that it had, but for that name. A drive may divide a line
+    differently once a name exists or is gone: `H5` is `H 5` unless H5 is a variable. So the check compares all lines.
+    """
+
+    def remark_at(self, line: str) -> int:
+        return remark_at(line)
+
+    def names(self, text: str) -> list[UserName]:
+        sources = split_lines(text)
+        lines = [_read(source) for source in sources]
+        words = _declared_names(lines)
+        labels = {line.declares for line in lines if line.text[:2].upper() == "LB"}
+
+        def uses() -> Iterator[Use]:
+            for at, line in enumerate(lines):
+                for number, token in _uses(line, words):
+                    word, start = token.text.upper(), line.column + token.start
+                    kind = "label" if word in labels else "variable"
+                    declares = number <= 2 and word == line.declares  # LB G1, LB=G1
+                    yield Use(word, kind, Span(at, start, start + len(token.text)), declares)
+
+        return collected(uses(), lambda at: self.remark(sources[at]))
+
+    def fixed(self, name: UserName) -> str:
+        if name.word == AT_POWER_UP:
+            return f"{AT_POWER_UP} is the label of the program that runs at power-up: by another name it would not run"
+        return ""
+
+    def spelled(self, name: UserName, new: str, product: str) -> tuple[str, str]:
+        """Return the new name in capitals, and as it is given."""
+        word = new.upper()
+        if not is_name(new):
+            raise Diagnostic(f"{new!r} is not a name", "", NAME_FORM)
+        if word != name.word and lookup(word) is not None:
+            raise Diagnostic(_taken(word, product), "", self.other)
+        return word, new
+
+    def used_in(self, text: str, name: UserName, word: str) -> int | None:
+        """Return the line in which another name than this one is a word already, whether it declares one or not."""
+        sources = enumerate(split_lines(text))
+        return next((at for at, source in sources if any(_uses(_read(source), (word,)))), None)
+
+    def changed(self, text: str, renamed: Sequence[str], name: UserName, word: str) -> str:
+        """Return the first line that the drive would divide differently. Raises Diagnostic for one that is too long."""
+        lines = [_read(source) for source in split_lines(text)]
+        words = _declared_names(lines)
+        others = words - {name.word} | {word}
+        for number, (line, other) in enumerate(zip(lines, map(_read, renamed), strict=True), 1):
+            if len(other.text) > LONGEST >= len(line.text):
+                what = f"line {number} would have {len(other.text)} characters; a drive takes {LONGEST}"
+                raise Diagnostic(what, "", "choose a shorter name, or split the line")
+            if _tokens(line, words, {name.word: word}) != _tokens(other, others, {}):
+                return f"line {number}"
+        return ""
+
+    def words(self, line: str, names: Container[str]) -> list[Word]:
+        found = statement_tokens(line[: remark_at(line)], names)
+        return [Word(each.start, each.stop, each.text.upper()) for each in found if each.kind in ("word", "op")]
+
+    def describe(self, word: str, product: str) -> list[str]:
+        try:
+            return LANGUAGE.describe(word, product)
+        except Diagnostic:
+            return []
+
+    def last_word(self, before: str) -> str:
+        """Return the word at the end of a begun line that may be completed; none in a text."""
+        return LANGUAGE.typing(before)
+
+    def offered(self, begun: str, word: str, names: Iterable[UserName], product: str) -> Iterator[Offer]:
+        """Yield labels after a jump, what has a value after PR and in expressions, all else at the head of a line."""
+        place = expected(begun)
+        if begun.count('"') % 2 or place == NEW:
+            return
+        yield from (each.offer for each in names if (each.kind == "label") in LABELS_AT[place])
+        for row in rows_offered(product) if place != LABEL else ():
+            if _fits(row, place):
+                yield Offer(row.name, row.meaning, "starts" if row.name in TURNING else "word")
+
+    def outline(self, text: str) -> list[Block]:
+        """Return programs with their labels and variables, and the variables declared outside of programs."""
+        sources = split_lines(text)
+        found: list[Block] = []
+        opened: list[ProgramLine] = []
+        for line in scan(text)[0]:
+            if line.section != "program":
+                found += _declared([line], sources, line.number - 1)
+                continue
+            if line.mark and opened:  # the PG before is never ended
+                found.append(_program(opened, sources))
+                opened = []
+            opened.append(line)
+            if line.mark == "" and len(opened) > 1:
+                found.append(_program(opened, sources))
+                opened = []
+        return [*found, _program(opened, sources)] if opened else found
+
+
+EDITING = MCodeEditing()
 
 
 class _Line(NamedTuple):
@@ -65,35 +167,8 @@ def _read(source: str) -> _Line:
     return _Line(text, column, ProgramLine(0, text, "").declares, tokens(text))
 
 
-def names(text: str) -> list[UserName]:
-    sources = split_lines(text)
-    lines = [_read(source) for source in sources]
-    words = _declared_names(lines)
-    labels = {line.declares for line in lines if line.text[:2].upper() == "LB"}
-    places: dict[str, list[Span]] = {}
-    declared: dict[str, list[Span]] = {}
-    for at, line in enumerate(lines):
-        for number, token in _uses(line, words):
-            word, start = token.text.upper(), line.column + token.start
-            place = Span(at, start, start + len(token.text))
-            places.setdefault(word, []).append(place)
-            if number <= 2 and word == line.declares:  # LB G1, LB=G1
-                declared.setdefault(word, []).append(place)
-
-    def named(word: str) -> UserName:
-        kind, there = "label" if word in labels else "variable", declared.get(word, [])
-        return UserName(word, kind, tuple(there), tuple(places[word]), remark(sources[there[0].line]) if there else "")
-
-    return [named(word) for word in places]
-
-
 def _declared_names(lines: Iterable[_Line]) -> frozenset[str]:
     return frozenset(line.declares for line in lines if line.declares)
-
-
-def remark(line: str) -> str:
-    """Return the text of the remark of a line; empty if it has none."""
-    return line[remark_at(line) + 1 :].strip()
 
 
 def _uses(line: _Line, words: Container[str]) -> Iterator[tuple[int, Token]]:
@@ -103,40 +178,6 @@ def _uses(line: _Line, words: Container[str]) -> Iterator[tuple[int, Token]]:
     for number, token in enumerate(found):
         if token.kind == "word" and token.text.upper() in words and not (names_device and number):
             yield number, token
-
-
-def fixed(name: UserName) -> str:
-    if name.word == AT_POWER_UP:
-        return f"{AT_POWER_UP} is the label of the program that runs at power-up: by another name it would not run"
-    return ""
-
-
-def renamed(text: str, name: UserName, new: str, product: str) -> str:
-    """Return the new name as given. Raises Diagnostic for one that is not a name, is in use, or changes the program."""
-    if reason := fixed(name):
-        raise Diagnostic(reason)
-    word = new.upper()
-    if not is_name(new):
-        raise Diagnostic(f"{new!r} is not a name", "", NAME_FORM)
-    if word == name.word:
-        return new
-    if lookup(word) is not None:
-        raise Diagnostic(_taken(word, product), "", "choose another name")
-    sources = split_lines(text)
-    for number, source in enumerate(sources, 1):
-        if any(_uses(_read(source), (word,))):
-            raise Diagnostic(f"{word} is in use already, in line {number}", "", "choose another name")
-    # Raise Diagnostic for a line that a rename makes too long, or that the drive would divide differently.
-    lines = [_read(source) for source in sources]
-    words = _declared_names(lines)
-    others = words - {name.word} | {word}
-    for number, (line, other) in enumerate(zip(lines, map(_read, replaced(sources, name.places, new)), strict=True), 1):
-        if len(other.text) > LONGEST >= len(line.text):
-            what = f"line {number} would have {len(other.text)} characters; a drive takes {LONGEST}"
-            raise Diagnostic(what, "", "choose a shorter name, or split the line")
-        if _tokens(line, words, {name.word: word}) != _tokens(other, others, {}):
-            raise Diagnostic(f"line {number} would mean something else with {word}", "", "choose another name")
-    return new
 
 
 def _taken(word: str, product: str) -> str:
@@ -155,70 +196,12 @@ def _tokens(line: _Line, words: frozenset[str], new: Mapping[str, str]) -> list[
     return found
 
 
-_ACCESS = {"RW", "RO", "RC"}
-"""Of words that PR prints."""
-
-
-def words(line: str, names: Container[str]) -> list[Word]:
-    found = statement_tokens(line[: remark_at(line)], names)
-    return [Word(each.start, each.stop, each.text.upper()) for each in found if each.kind in ("word", "op")]
-
-
-def describe(word: str, product: str) -> list[str]:
-    try:
-        return help.describe(word, product)
-    except Diagnostic:
-        return []
-
-
-def typing(before: str) -> str:
-    """Return the word at the end of a begun line that may be completed; none in a text or a remark."""
-    return help.typing(before) if remark_at(before) == len(before) else ""
-
-
-def offers(before: str, names: Iterable[UserName], product: str) -> list[Offer]:
-    """Return labels after a jump, what has a value after PR and in expressions, and all else at the head of a line."""
-    if remark_at(before) < len(before) or before.count('"') % 2:
-        return []
-    word = typing(before)
-    place = expected(before[: len(before) - len(word)])
-    if place == NEW:
-        return []
-    folded = word.upper()
-    own = [
-        Offer(each.word, each.about, each.kind)
-        for each in names
-        if each.word.startswith(folded) and (each.kind == "label") in LABELS_AT[place]
-    ]
-    rows = [] if place == LABEL else [row for row in help.offered(word, product) if _fits(row, place)]
-    return [*own, *(Offer(row.name, row.meaning, "starts" if row.name in TURNING else "word") for row in rows)]
-
-
 def _fits(row: Mnemonic, place: str) -> bool:
     if place == STATEMENT:
         return row.kind != "math" and (row.kind == "instruction" or row.access in ("RW", "WO"))
     if place == PRINTED:
         return row.access in _ACCESS
     return row.kind == "math" or (row.access in _ACCESS and row.kind != "keyword")
-
-
-def outline(text: str) -> list[Block]:
-    """Return programs with their labels and variables, and the variables declared outside of programs."""
-    sources = split_lines(text)
-    found: list[Block] = []
-    opened: list[ProgramLine] = []
-    for line in scan(text)[0]:
-        if line.section != "program":
-            found += _declared([line], sources, line.number - 1)
-            continue
-        if line.mark and opened:  # the PG before is never ended
-            found.append(_program(opened, sources))
-            opened = []
-        opened.append(line)
-        if line.mark == "" and len(opened) > 1:
-            found.append(_program(opened, sources))
-            opened = []
-    return [*found, _program(opened, sources)] if opened else found
 
 
 def _program(lines: Sequence[ProgramLine], sources: Sequence[str]) -> Block:
@@ -228,7 +211,7 @@ def _program(lines: Sequence[ProgramLine], sources: Sequence[str]) -> Block:
     return Block(
         "program",
         first.text.upper(),
-        remark(sources[first.number - 1]),
+        EDITING.remark(sources[first.number - 1]),
         Span(first.number - 1, first.column - 1, first.column - 1 + len(first.text)),
         last,
         parts,
@@ -247,10 +230,9 @@ def _declared(lines: Sequence[ProgramLine], sources: Sequence[str], end: int) ->
             continue
         start = line.column - 1 + name.start
         place = Span(line.number - 1, start, start + len(name.text))
-        about = remark(sources[line.number - 1])
+        about = EDITING.remark(sources[line.number - 1])
         if _is_label(line):
-            last = next((at - 1 for at in labels if at > line.number - 1), end)
-            yield Block("label", line.declares, about, place, max(last, place.line))
+            yield Block("label", line.declares, about, place, last_line(place.line, labels, end))
         else:
             value = line.text[name.stop :].strip()
             yield Block("variable", line.declares, "  ".join(filter(None, (value, about))), place, place.line)

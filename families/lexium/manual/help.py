@@ -1,16 +1,14 @@
-"""Help on a mnemonic: description, completion, and a hint while a line is typed.
-
-Each function takes the product; without one it describes a Lexium, and also finds words of other products.
-"""
+"""Help on a mnemonic: description, completion, a hint while a line is typed, and the remedy for a refused line."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from functools import cache
 
 from multidrop.base.errors import Diagnostic
 from multidrop.base.files import rows
+from multidrop.dialects.language import Language, labelled, perhaps, remedied
 from multidrop.families.lexium.manual import errors
 from multidrop.families.lexium.manual.errors import ErrorNumber
 from multidrop.families.lexium.manual.grammar import LineError, Number, Statement, parse, parsed, tokens
@@ -50,23 +48,69 @@ def _topic(word: str) -> str:
     return next((each for each in (name, name.removesuffix("s")) if each in topics()), "")
 
 
-def names() -> list[str]:
-    return sorted({*MNEMONICS, *MDRIVE, *(each.upper() for each in topics())})
+class MCodeLanguage(Language):
+    """Help on the words of MCode. Without a product it describes a Lexium, and also finds words of other products."""
+
+    def names(self) -> list[str]:
+        return sorted({*MNEMONICS, *MDRIVE, *(each.upper() for each in topics())})
+
+    def knows(self, word: str) -> bool:
+        return lookup(word) is not None or bool(_topic(word))
+
+    def describe(self, word: str, product: str = "") -> list[str]:
+        """Describe a mnemonic or operator, line by line. Raises Diagnostic with similar words."""
+        row = words(product).get(word.strip().upper()) or lookup(word)
+        if row is None and (topic := _topic(word)):
+            return [f"{topic} (topic)", *(f"  {each['text']}" for each in topics()[topic])]
+        if row is None:
+            raise Diagnostic(f"no mnemonic {word.strip()!r}", "", perhaps(_near(word.strip(), product)))
+        return page(row, facts(row, product))
+
+    def describe_error(self, code: int, product: str = "") -> list[str]:
+        """Return meaning and remedy of an error number, line by line; for each family where no product is named.
+
+        Raises Diagnostic for a number without a meaning.
+        """
+        found: dict[tuple[str, str], list[str]] = {}
+        for family in [product] if product else errors.TEXTS:
+            found.setdefault((errors.text(code, family), errors.hint(code, family)), []).append(family)
+        lines = []
+        for (text, advice), families in found.items():
+            where = f" ({', '.join(families)})" if len(found) > 1 else ""
+            lines += remedied(f"error {code}{where}: {text}", advice) if text != errors.UNKNOWN else []
+        if not lines:
+            what = f"no error {code} on {product}" if product else f"no error {code}"
+            raise Diagnostic(what, "", f"they are 0 to {max(map(max, errors.TEXTS.values()))}, with gaps")
+        return lines
+
+    def offered(self, product: str, typed: str) -> Iterable[tuple[str, str]]:
+        """Return mnemonics; no operators, no reserved words."""
+        return ((row.name, row.meaning) for row in rows_offered(product))
+
+    def typing(self, text: str) -> str:
+        """Return the word at the end of a line that may be completed; none within quotation marks."""
+        found = _LAST.search(text)
+        return found.group() if found and text.count('"') % 2 == 0 else ""
+
+    def hint(self, text: str, product: str = "") -> str:
+        """Return syntax and meaning of the word being typed; empty where it is unknown."""
+        plain = _QUOTED.sub(" ", text).strip()
+        first = _WORD.match(plain)
+        if first is None:
+            return ""
+        statement = parsed(text)
+        condition = condition_of(statement) if statement is not None else None
+        if condition is not None and is_mixed(condition):
+            return f"read as {condition_reading(condition)}"
+        row = _row_of(first.group(), product)
+        if row is not None and row.name == "PR":
+            printed = [found for word in _WORD.findall(plain[first.end() :]) if (found := _row_of(word, product))]
+            row = printed[-1] if printed else row
+            return f"{'PR ' + row.name if printed else row.syntax}   {_told(row)}"
+        return f"{row.syntax}   {_told(row)}" if row and row.syntax else ""
 
 
-def knows(word: str) -> bool:
-    return lookup(word) is not None or bool(_topic(word))
-
-
-def describe(word: str, product: str = "") -> list[str]:
-    """Describe a mnemonic or operator, line by line. Raises Diagnostic with similar words."""
-    row = words(product).get(word.strip().upper()) or lookup(word)
-    if row is None and (topic := _topic(word)):
-        return [f"{topic} (topic)", *(f"  {each['text']}" for each in topics()[topic])]
-    if row is None:
-        near = _near(word.strip(), product)
-        raise Diagnostic(f"no mnemonic {word.strip()!r}", "", f"perhaps {', '.join(near)}" if near else "")
-    return page(row, facts(row, product))
+LANGUAGE = MCodeLanguage()
 
 
 def facts(row: Mnemonic, product: str = "") -> dict[str, str]:
@@ -102,62 +146,13 @@ def page(row: Mnemonic, said: Mapping[str, str]) -> list[str]:
     older = row.reserved_on <= MDRIVE_PLUS
     *facts, manual = said.items()
     more = [] if older else [(each["label"], each["text"]) for each in details().get(row.name, ())]
-    lines = [f"  {label:<10} {fact}" for label, fact in (*facts, *more, manual) if fact]
+    lines = labelled((*facts, *more, manual))
     return [f"{row.name}: {row.title} ({row.kind})", f"  {row.meaning}", *lines]
 
 
-def describe_error(code: int, product: str = "") -> list[str]:
-    """Give meaning and remedy of an error number, line by line; for each family where no product is named.
-
-    Raises Diagnostic for a number without a meaning.
-    """
-    found: dict[tuple[str, str], list[str]] = {}
-    for family in [product] if product else errors.TEXTS:
-        found.setdefault((errors.text(code, family), errors.hint(code, family)), []).append(family)
-    lines = []
-    for (text, advice), families in found.items():
-        where = f" ({', '.join(families)})" if len(found) > 1 else ""
-        if text != errors.UNKNOWN:
-            lines.append(f"error {code}{where}: {text}")
-            lines += [f"  do         {advice}"] if advice else []
-    if not lines:
-        what = f"no error {code} on {product}" if product else f"no error {code}"
-        raise Diagnostic(what, "", f"they are 0 to {max(map(max, errors.TEXTS.values()))}, with gaps")
-    return lines
-
-
-def complete(prefix: str, product: str = "") -> list[tuple[str, str]]:
-    """Mnemonics that begin with the prefix, each with its meaning; no operators, no reserved words."""
-    return [(row.name, row.meaning) for row in offered(prefix, product)]
-
-
-def offered(prefix: str, product: str = "") -> list[Mnemonic]:
-    head, rows = prefix.strip().upper(), words(product)
-    return [row for row in rows.values() if row.name.startswith(head) and _offered(row, product)]
-
-
-def typing(text: str) -> str:
-    """The word at the end of a line that may be completed; none within quotation marks."""
-    found = _LAST.search(text)
-    return found.group() if found and text.count('"') % 2 == 0 else ""
-
-
-def hint(text: str, product: str = "") -> str:
-    """Syntax and meaning of the word being typed; empty where it is unknown."""
-    plain = _QUOTED.sub(" ", text).strip()
-    first = _WORD.match(plain)
-    if first is None:
-        return ""
-    statement = parsed(text)
-    condition = condition_of(statement) if statement is not None else None
-    if condition is not None and is_mixed(condition):
-        return f"read as {condition_reading(condition)}"
-    row = _row_of(first.group(), product)
-    if row is not None and row.name == "PR":
-        printed = [found for word in _WORD.findall(plain[first.end() :]) if (found := _row_of(word, product))]
-        row = printed[-1] if printed else row
-        return f"{'PR ' + row.name if printed else row.syntax}   {_told(row)}"
-    return f"{row.syntax}   {_told(row)}" if row and row.syntax else ""
+def rows_offered(product: str = "") -> list[Mnemonic]:
+    """Return the mnemonics of a product that completion offers."""
+    return [row for row in words(product).values() if _offered(row, product)]
 
 
 def _told(row: Mnemonic) -> str:

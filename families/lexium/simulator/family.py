@@ -46,33 +46,6 @@ KEY_OF = {"DN": "name", "PY": "party"}
 """Mnemonics that have a key of their own in the table."""
 
 
-def read_drive(table: Table, folder: Folder) -> DriveSpec:
-    common = common_keys(table, folder)
-    personality = common["personality"]
-    name = table.text("name", "!")
-    if not (len(name) == 1 and name.isascii() and (name.isalnum() or name == "!")):
-        raise table.wrong("name", f"cannot be {quoted(name)}", "valid: one of a-z, A-Z, 0-9 or !")
-    model, known = MODELS[personality], words(personality)
-    counters = ["position", *(name for name in ("C1", "C2") if name in known and personality in known[name].products)]
-    world = table.table("world", "[bus.drive.world]")
-    world.only(*WORLD_KEYS)
-    settings, scales = read_settings(table.table("set", "set"), partial(_check, personality)), read_units(table)
-
-    def valid(name: str) -> bool:
-        return is_name(name) and lookup(name, personality) is None and len(name) <= model.longest_name
-
-    return DriveSpec(
-        **common,
-        name=name,
-        party=table.boolean("party", False),
-        variables=read_variables(table, valid, "as in Q1"),
-        identity=read_identity(table, ("part", "version", "serial"), dict.fromkeys(counters, 1)),
-        set=settings,
-        world=read_world(world, model.points.inputs, model.points.analog, _axis_scale(personality, settings, scales)),
-        units=scales,
-    )
-
-
 def _axis_scale(personality: str, settings: Mapping[str, Value], scales: Mapping[str, Scale]) -> AxisScale:
     """A count is a motor step, or an encoder count where the drive moves in these (manual 3.4.2)."""
     memory = Memory(personality)
@@ -106,64 +79,6 @@ _LISTED = re.compile(rf"({'|'.join(LISTS)})(\d+)")
 _NAMED = re.compile(r"\s*(?:LB|VA)[\s=]+([A-Z][A-Z0-9]{0,2})", re.I)
 Row = tuple[int, str]
 """A program line and its address."""
-
-
-def describe(snapshot: Snapshot) -> DriveText:
-    personality = nearest(snapshot.product)
-    readings = [each for each in snapshot.readings.readings if each.name not in KEY_OF]
-    users = [each for each in readings if each.section == VARIABLES and lookup(each.name, personality) is None]
-    variables = {each.name: each.value for each in users if isinstance(each.value, int)}
-    model = MODELS[personality]
-    lines, drift = _placed(_remarked(snapshot) or snapshot.program, personality, variables)
-    remarks = [*snapshot.remarks, *drift]
-    remarks += [
-        f"not in set: {each.name} = {each.value} (the simulator does not take it)"
-        for each in readings
-        if not (_acceptable(each, personality) or _unset(each, personality))
-    ]
-    if personality != snapshot.product:
-        remarks.insert(
-            0, f"the unit is an {snapshot.product}; the simulator knows none, and {personality} is the nearest"
-        )
-    texts = (("part", snapshot.part), ("version", snapshot.version), ("serial", snapshot.serial))
-    identity = [Entry(key, plain(text)) for key, text in texts if text]
-    identity += [Entry(key, count) for key, (count,) in snapshot.counters.items()]
-    world: dict[str, object] = {}
-    if snapshot.inputs:
-        world["inputs"] = [[0.0, n, level] for n, level in snapshot.inputs]
-    if snapshot.analog:
-        world["analog"] = [[0.0, snapshot.analog[0]]]
-    return DriveText(
-        personality=personality,
-        name=snapshot.name,
-        party=snapshot.party,
-        remarks=remarks,
-        unread=snapshot.readings.unread,
-        program=lines,
-        settings=[*_settings([each for each in readings if each.name not in variables], personality)],
-        variables=[Entry(name, held) for name, held in variables.items()],
-        identity=identity,
-        worlds={"": world} if world else {},
-        ethernet=model.ethernet,
-        baud=snapshot.baud,
-    )
-
-
-def wanted(spec: DriveSpec) -> dict[str, Value]:
-    """The settings of a drive in a cell file, as its family names them. No line gives a drive the name !; FD does."""
-    found: dict[str, Value] = {**spec.variables}
-    if not MODELS[spec.personality].ethernet:
-        found |= {"PY": int(spec.party)} if spec.name == UNNAMED else {"DN": spec.name, "PY": int(spec.party)}
-    for name, held in spec.set.items():
-        if name in LISTS:
-            for row in held if isinstance(held, tuple) else (str(held),):
-                number, *fields = row.split(",")
-                found[f"{name}{number.strip()}"] = tuple(map(_scalar, fields))
-        elif isinstance(held, str) and "," in held:
-            found[name] = tuple(map(_scalar, held.split(",")))
-        elif not isinstance(held, tuple):
-            found[name] = _scalar(held) if isinstance(held, str) else held
-    return found
 
 
 def nearest(product: str) -> str:
@@ -218,19 +133,6 @@ def _scalar(text: str) -> Scalar:
     return int(text) if re.fullmatch(r"-?\d+", text) else text
 
 
-def program(spec: DriveSpec) -> StoredProgram:
-    """The program of a drive in a cell file."""
-    held = MCodeDevice(replace(spec, set={}, party=False), World(WorldSpec())).program
-    rows = [(at, held.lines[at].text) for at in held.order]
-    lines, _ = _placed(rows, spec.personality, spec.variables)
-    names = _names(rows, spec.variables)
-    return StoredProgram(
-        lines=tuple(canonical(text, names) for _, text in rows),
-        file=(*(f"VA {name}={value}" for name, value in spec.variables.items()), *lines),
-        labels=tuple(held.labels),
-    )
-
-
 def _placed(rows: Sequence[Row], personality: str, variables: Iterable[str]) -> tuple[list[str], list[str]]:
     """Program lines with PG wherever the simulated drive would store the next one elsewhere; remarks on addresses."""
     names = _names(rows, variables)
@@ -269,26 +171,6 @@ def _names(rows: Iterable[Row], variables: Iterable[str]) -> frozenset[str]:
 DEFAULT = 96
 """BD from the factory."""
 ETHERNET = frozenset(name for name, model in MODELS.items() if model.ethernet)
-
-
-def build(spec: DriveSpec, place: Place) -> Unit:
-    """Build a drive that is powered up. Raises Diagnostic for settings that it refuses, and for a program."""
-    world = World(spec.world)
-    device = MCodeDevice(_at_baud(spec, place.baud), world)
-    device.prints()  # no client can be connected at its sign-on
-    model, ethernet = MODELS[spec.personality], spec.personality in ETHERNET
-    kind, connection = (LockedPort, LockedModbus) if spec.cse else (MCodePort, ModbusPort)
-    port = kind(device, serial=not ethernet, baud=0 if model.waits_to_print else place.baud)
-    return Unit(
-        device=device,
-        port=port,
-        worlds={"": world},
-        shadow=_shadow(device, port),
-        inputs=model.points.inputs,
-        counts=model.points.analog,
-        single_supply=model.single_supply,
-        connect=(lambda: connection(device)) if ethernet else None,
-    )
 
 
 class LockedPort(MCodePort):
@@ -340,20 +222,123 @@ class SimulatedLexium(SimulatedFamily):
 
     @classmethod
     def read_drive(cls, table: Table, folder: Folder) -> DriveSpec:
-        return read_drive(table, folder)
+        common = common_keys(table, folder)
+        personality = common["personality"]
+        name = table.text("name", "!")
+        if not (len(name) == 1 and name.isascii() and (name.isalnum() or name == "!")):
+            raise table.wrong("name", f"cannot be {quoted(name)}", "valid: one of a-z, A-Z, 0-9 or !")
+        model, known = MODELS[personality], words(personality)
+        counters = [
+            "position",
+            *(name for name in ("C1", "C2") if name in known and personality in known[name].products),
+        ]
+        world = table.table("world", "[bus.drive.world]")
+        world.only(*WORLD_KEYS)
+        settings, scales = read_settings(table.table("set", "set"), partial(_check, personality)), read_units(table)
+
+        def valid(name: str) -> bool:
+            return is_name(name) and lookup(name, personality) is None and len(name) <= model.longest_name
+
+        return DriveSpec(
+            **common,
+            name=name,
+            party=table.boolean("party", False),
+            variables=read_variables(table, valid, "as in Q1"),
+            identity=read_identity(table, ("part", "version", "serial"), dict.fromkeys(counters, 1)),
+            set=settings,
+            world=read_world(
+                world, model.points.inputs, model.points.analog, _axis_scale(personality, settings, scales)
+            ),
+            units=scales,
+        )
 
     @classmethod
     def build(cls, spec: DriveSpec, place: Place) -> Unit:
-        return build(spec, place)
+        """Build a drive that is powered up. Raises Diagnostic for settings that it refuses, and for a program."""
+        world = World(spec.world)
+        device = MCodeDevice(_at_baud(spec, place.baud), world)
+        device.prints()  # no client can be connected at its sign-on
+        model, ethernet = MODELS[spec.personality], spec.personality in ETHERNET
+        kind, connection = (LockedPort, LockedModbus) if spec.cse else (MCodePort, ModbusPort)
+        port = kind(device, serial=not ethernet, baud=0 if model.waits_to_print else place.baud)
+        return Unit(
+            device=device,
+            port=port,
+            worlds={"": world},
+            shadow=_shadow(device, port),
+            inputs=model.points.inputs,
+            counts=model.points.analog,
+            single_supply=model.single_supply,
+            connect=(lambda: connection(device)) if ethernet else None,
+        )
 
     @classmethod
     def describe(cls, snapshot: Snapshot) -> DriveText:
-        return describe(snapshot)
+        personality = nearest(snapshot.product)
+        readings = [each for each in snapshot.readings.readings if each.name not in KEY_OF]
+        users = [each for each in readings if each.section == VARIABLES and lookup(each.name, personality) is None]
+        variables = {each.name: each.value for each in users if isinstance(each.value, int)}
+        model = MODELS[personality]
+        lines, drift = _placed(_remarked(snapshot) or snapshot.program, personality, variables)
+        remarks = [*snapshot.remarks, *drift]
+        remarks += [
+            f"not in set: {each.name} = {each.value} (the simulator does not take it)"
+            for each in readings
+            if not (_acceptable(each, personality) or _unset(each, personality))
+        ]
+        if personality != snapshot.product:
+            remarks.insert(
+                0, f"the unit is an {snapshot.product}; the simulator knows none, and {personality} is the nearest"
+            )
+        texts = (("part", snapshot.part), ("version", snapshot.version), ("serial", snapshot.serial))
+        identity = [Entry(key, plain(text)) for key, text in texts if text]
+        identity += [Entry(key, count) for key, (count,) in snapshot.counters.items()]
+        world: dict[str, object] = {}
+        if snapshot.inputs:
+            world["inputs"] = [[0.0, n, level] for n, level in snapshot.inputs]
+        if snapshot.analog:
+            world["analog"] = [[0.0, snapshot.analog[0]]]
+        return DriveText(
+            personality=personality,
+            name=snapshot.name,
+            party=snapshot.party,
+            remarks=remarks,
+            unread=snapshot.readings.unread,
+            program=lines,
+            settings=[*_settings([each for each in readings if each.name not in variables], personality)],
+            variables=[Entry(name, held) for name, held in variables.items()],
+            identity=identity,
+            worlds={"": world} if world else {},
+            ethernet=model.ethernet,
+            baud=snapshot.baud,
+        )
 
     @classmethod
-    def wanted(cls, spec: DriveSpec) -> Mapping[str, Value]:
-        return wanted(spec)
+    def wanted(cls, spec: DriveSpec) -> dict[str, Value]:
+        """Return the settings of a drive in a cell file. No line gives a drive the name !; FD does."""
+        found: dict[str, Value] = {**spec.variables}
+        if not MODELS[spec.personality].ethernet:
+            found |= {"PY": int(spec.party)} if spec.name == UNNAMED else {"DN": spec.name, "PY": int(spec.party)}
+        for name, held in spec.set.items():
+            if name in LISTS:
+                for row in held if isinstance(held, tuple) else (str(held),):
+                    number, *fields = row.split(",")
+                    found[f"{name}{number.strip()}"] = tuple(map(_scalar, fields))
+            elif isinstance(held, str) and "," in held:
+                found[name] = tuple(map(_scalar, held.split(",")))
+            elif not isinstance(held, tuple):
+                found[name] = _scalar(held) if isinstance(held, str) else held
+        return found
 
     @classmethod
     def program(cls, spec: DriveSpec) -> StoredProgram:
-        return program(spec)
+        """The program of a drive in a cell file."""
+        held = MCodeDevice(replace(spec, set={}, party=False), World(WorldSpec())).program
+        rows = [(at, held.lines[at].text) for at in held.order]
+        lines, _ = _placed(rows, spec.personality, spec.variables)
+        names = _names(rows, spec.variables)
+        return StoredProgram(
+            lines=tuple(canonical(text, names) for _, text in rows),
+            file=(*(f"VA {name}={value}" for name, value in spec.variables.items()), *lines),
+            labels=tuple(held.labels),
+        )

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from typing import ClassVar
 
 from multidrop.base.errors import Inexpressible, NoAnswer
 from multidrop.dialects.certifying import Certifying
@@ -20,7 +19,6 @@ from multidrop.dialects.family import (
     Family,
     Guard,
     Hints,
-    Language,
     Programs,
     to_all,
 )
@@ -56,7 +54,7 @@ class PmxFamily(PmxOperations, Family):
 
     name = Pmx.family
     codec = Pmx()
-    language: ClassVar[Language] = help
+    language = help.LANGUAGE
     stop_bytes = STOP_BYTES
 
     @classmethod

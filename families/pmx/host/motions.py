@@ -14,7 +14,18 @@ from dataclasses import replace
 
 from multidrop.dialects.codec import Procedure
 from multidrop.dialects.family import ADDRESSES
-from multidrop.dialects.motions import NOTHING, Effect, Ending, Evidence, Motions, Move, MoveKind, Outcome, Signs
+from multidrop.dialects.motions import (
+    NOTHING,
+    Effect,
+    Ending,
+    Evidence,
+    Motions,
+    Move,
+    MoveKind,
+    Outcome,
+    Signs,
+    restarted,
+)
 from multidrop.dialects.state import who
 from multidrop.families.pmx.host.codec import PmxState
 from multidrop.families.pmx.host.operations import PROGRAMS, number
@@ -42,6 +53,8 @@ LOOP_BUSY = frozenset(table.LOOP) - table.LOOP_ERRORS - {0, LOOP_OFF}
 """The values of SLS with which the axis is not at rest, though it may make no pulses in this moment."""
 SWITCHES = {1 << 4: "plus", 1 << 5: "minus"}
 LATCHED = {table.LIMIT_PLUS: "plus", table.LIMIT_MINUS: "minus"}
+LOST = "HSPD"
+"""A setting that a power-up sets to its factory value: STORE keeps none of speed and acceleration (7.20)."""
 RUNNING, FAILED_PROGRAM = 1, 4
 """The values of SASTAT of a program that runs, and of one that an error has ended."""
 
@@ -49,8 +62,11 @@ RUNNING, FAILED_PROGRAM = 1, 4
 def _effect(line: str) -> Effect:
     if (found := PLACE.fullmatch(line)) is not None:
         targets = zip("xyxy", found.groups(), strict=True)
-        moves = [Move(MoveKind.POSITION, axis, relative=int(value)) for axis, value in targets if value is not None]
-        return Effect(begins=tuple(moves))
+        moves = {axis: int(value) for axis, value in targets if value is not None}
+        group = frozenset(moves if len(moves) > 1 else ())  # an interpolated move: a stop of one axis stops both (7.7)
+        return Effect(
+            begins=tuple(Move(MoveKind.POSITION, axis, relative=by, group=group) for axis, by in moves.items())
+        )
     if (found := FLYING.fullmatch(line)) is not None:
         return Effect(begins=(Move(MoveKind.POSITION, found[1].lower(), target=int(found[2])),))
     if (found := JOG.fullmatch(line)) is not None:
@@ -130,7 +146,9 @@ class PmxMotions(Motions):
     def signs(self) -> Procedure[Signs]:
         """Read what shows a failure, and where distances count from: MM=0 makes every target a position."""
         state = self.state
-        found = {"MM": (yield from number(state, "MM")), "EO": (yield from number(state, "EO"))}
+        found: dict[str, int] = {}
+        for word in ("MM", "EO", LOST):
+            found[word] = yield from number(state, word)
         for axis in table.AXES:
             words = ("MST", "SLS", "P") if found["MM"] == DISTANCES else ("MST", "SLS")
             for word in words:
@@ -169,6 +187,10 @@ class PmxMotions(Motions):
         if loop in LOOP_BUSY or status & table.MOVING:
             return None
         ending = Ending(Outcome.REACHED, axis, (yield from number(state, f"P{name}")))
+        if evidence.alone and ending.position == 0 and not evidence.program and LOST in before:
+            speed = yield from number(state, LOST)
+            if speed != before[LOST]:
+                return restarted(ending, f"{LOST} {before[LOST]} before, {speed} now")
         new = status & ~before.get(f"MST{name}", -1)
         for bit, way in LATCHED.items():
             if new & bit:

@@ -11,7 +11,7 @@ from dataclasses import replace
 
 from multidrop.base.errors import Diagnostic
 from multidrop.base.files import split_lines
-from multidrop.dialects.program_files import Block, Offer, Span, UserName, Word, replaced
+from multidrop.dialects.editing import Block, EditingLanguage, Offer, Span, Use, UserName, Word, collected
 from multidrop.families.pmx.manual import script_parser
 from multidrop.families.pmx.manual.script_parser import Statement, Value, parse
 
@@ -19,30 +19,98 @@ _NUMBERED = re.compile(r"\s*(PRG|SUB|GOSUB)\s*(\d{1,4})\s*", re.ASCII)
 _SETS = re.compile(r"\s*(V\d+)\s*=", re.ASCII)
 _NUMBER = re.compile(r"(?:SUB)?\s*(\d{1,4})\s*", re.ASCII)
 _NAME_KINDS = {"PRG": ("PRG", "program"), "SUB": ("SUB", "subroutine"), "GOSUB": ("SUB", "subroutine")}
+_CALL = re.compile(r"\s*GOSUB\s*(\d*)\Z", re.ASCII)
+_NEW = re.compile(r"\s*(PRG|SUB)\s*\d*\Z", re.ASCII)
+_ENDS = {"END": "PRG", "ENDSUB": "SUB", "ENDIF": "IF", "ENDWHILE": "WHILE"}
+_KINDS = {"PRG": "program", "SUB": "subroutine", "IF": "block", "WHILE": "block"}
 
 
-def names(text: str) -> list[UserName]:
-    """Return the names of a file. A variable has no declaration: the first line that sets it counts as one."""
-    lines = split_lines(text)
-    kinds: dict[str, str] = {}
-    places: dict[str, list[Span]] = {}
-    declared: dict[str, Span] = {}
-    for number, line in enumerate(lines):
-        code = line.partition(";")[0]
-        for word, kind, start, stop in _found(code):
-            place = Span(number, start, stop)
-            kinds[word] = kind
-            places.setdefault(word, []).append(place)
-            sets = _SETS.match(code)
-            if (sets is not None and sets.start(1) == start) if kind == "variable" else "GOSUB" not in code:
-                declared.setdefault(word, place)
+class PmxEditing(EditingLanguage):
+    """The language of A-SCRIPT files."""
 
-    def named(word: str) -> UserName:
-        first = (declared[word],) if word in declared else ()
-        remark = lines[first[0].line].partition(";")[2].strip() if first else ""
-        return UserName(word, kinds[word], first, tuple(places[word]), remark)
+    other = "choose another number"
+    last = re.compile(r"[A-Za-z]\w*[+-]?\Z", re.ASCII)
 
-    return [named(word) for word in places]
+    def remark_at(self, line: str) -> int:
+        return len(line.partition(";")[0])
+
+    def names(self, text: str) -> list[UserName]:
+        """Return the names of a file. A variable has no declaration: the first line that sets it counts as one."""
+        lines = split_lines(text)
+
+        def uses() -> Iterator[Use]:
+            for number, line in enumerate(lines):
+                code = line.partition(";")[0]
+                sets = _SETS.match(code)
+                for word, kind, start, stop in _found(code):
+                    first = sets is not None and sets.start(1) == start
+                    yield Use(
+                        word, kind, Span(number, start, stop), first if kind == "variable" else "GOSUB" not in code
+                    )
+
+        found = collected(uses(), lambda at: self.remark(lines[at]))
+        return [each._replace(declared=each.declared[:1]) for each in found]
+
+    def fixed(self, name: UserName) -> str:
+        if name.kind == "program":
+            return f"the host starts {name.word} by its number (SR{name.word[4:]}=1)"
+        if name.word == f"SUB {script_parser.HANDLER}":
+            return f"{name.word} is the subroutine that runs after an error, by its number"
+        return ""
+
+    def spelled(self, name: UserName, new: str, product: str) -> tuple[str, str]:
+        """Return the variable, or the subroutine and its number."""
+        word = _variable(name, new) if name.kind == "variable" else _subroutine(new)
+        return word, word.removeprefix("SUB ")
+
+    def changed(self, text: str, renamed: Sequence[str], name: UserName, word: str) -> str:
+        wanted = [_renamed(each, name.word, word) for each in parse(text)[0]]
+        pairs = zip(wanted, parse("\n".join(renamed))[0], strict=True)
+        return next((f"line {other.line}" for one, other in pairs if one != other), "")
+
+    def words(self, line: str, names: Container[str]) -> list[Word]:
+        """Return the words of a line; each axis of a move is one."""
+        found = []
+        for word in script_parser.words(line):
+            if script_parser.MOVE_WORD.fullmatch(word.text):
+                found += [
+                    Word(word.start + at, word.start + at + 1, axis)
+                    for at, axis in enumerate(word.text)
+                    if axis in script_parser.AXES
+                ]
+            else:
+                found.append(word)
+        return found
+
+    def describe(self, word: str, product: str) -> list[str]:
+        return script_parser.describe(word)
+
+    def last_word(self, before: str) -> str:
+        """Return the word at the end of a begun line that may be completed: the number after GOSUB, too."""
+        found = _CALL.match(before)
+        return found[1] if found else super().last_word(before)
+
+    def offered(self, begun: str, word: str, names: Iterable[UserName], product: str) -> Iterator[Offer]:
+        """Yield subroutines after GOSUB, what can be read in values, and all else at the head of a line."""
+        before = begun + word
+        if _NEW.match(before):
+            return
+        if _CALL.match(before):
+            known = (each for each in names if each.kind == "subroutine" and each.declared)
+            yield from (each.offer._replace(text=each.word.removeprefix("SUB ")) for each in known)
+            return
+        first = not begun.strip()
+        yield from (each.offer for each in names if each.kind == "variable")
+        for text, register in script_parser.offered():
+            if _fits(register, first):
+                kind = "starts" if script_parser.kind_of(text, first) == "starts" else "word"
+                yield Offer(text, script_parser.meaning(text), kind)
+
+    def outline(self, text: str) -> list[Block]:
+        return _Outline(text).blocks
+
+
+EDITING = PmxEditing()
 
 
 def _found(code: str) -> Iterator[tuple[str, str, int, int]]:
@@ -58,30 +126,6 @@ def _found(code: str) -> Iterator[tuple[str, str, int, int]]:
     yield from (
         (text, "variable", start, start + len(text)) for text, start in found if text in script_parser.VARIABLE_NAMES
     )
-
-
-def fixed(name: UserName) -> str:
-    if name.kind == "program":
-        return f"the host starts {name.word} by its number (SR{name.word[4:]}=1)"
-    if name.word == f"SUB {script_parser.HANDLER}":
-        return f"{name.word} is the subroutine that runs after an error, by its number"
-    return ""
-
-
-def renamed(text: str, name: UserName, new: str, product: str) -> str:
-    """Return the variable, or the number of the subroutine. Raises Diagnostic where that is none, or is in use."""
-    if reason := fixed(name):
-        raise Diagnostic(reason)
-    word = _variable(name, new) if name.kind == "variable" else _subroutine(new)
-    taken = next((each for each in names(text) if each.word == word and each.word != name.word), None)
-    if taken is not None:
-        raise Diagnostic(f"{word} is in use already, in line {taken.places[0].line + 1}", "", "choose another number")
-    after = replaced(split_lines(text), name.places, word.removeprefix("SUB "))
-    wanted = [_renamed(each, name.word, word) for each in parse(text)[0]]
-    for one, other in zip(wanted, parse("\n".join(after))[0], strict=True):
-        if one != other:  # more than that word would change
-            raise Diagnostic(f"line {other.line} would mean something else with {word}", "", "choose another number")
-    return word.removeprefix("SUB ")
 
 
 def _renamed(statement: Statement, old: str, new: str) -> Statement:
@@ -117,69 +161,11 @@ def _subroutine(new: str) -> str:
     return f"SUB {int(found[1])}"
 
 
-_LAST = re.compile(r"[A-Za-z]\w*[+-]?\Z", re.ASCII)
-_CALL = re.compile(r"\s*GOSUB\s*(\d*)\Z", re.ASCII)
-_NEW = re.compile(r"\s*(PRG|SUB)\s*\d*\Z", re.ASCII)
-_ENDS = {"END": "PRG", "ENDSUB": "SUB", "ENDIF": "IF", "ENDWHILE": "WHILE"}
-_KINDS = {"PRG": "program", "SUB": "subroutine", "IF": "block", "WHILE": "block"}
-
-
-def words(line: str, names: Container[str]) -> list[Word]:
-    """Return the words of a line; each axis of a move is one."""
-    found = []
-    for word in script_parser.words(line):
-        if script_parser.MOVE_WORD.fullmatch(word.text):
-            found += [
-                Word(word.start + at, word.start + at + 1, axis)
-                for at, axis in enumerate(word.text)
-                if axis in script_parser.AXES
-            ]
-        else:
-            found.append(word)
-    return found
-
-
-def describe(word: str, product: str) -> list[str]:
-    return script_parser.describe(word)
-
-
-def typing(before: str) -> str:
-    """Return the word at the end of a begun line that may be completed: the number after GOSUB, too."""
-    if ";" in before:
-        return ""
-    if found := _CALL.match(before):
-        return found[1]
-    last = _LAST.search(before)
-    return last[0] if last else ""
-
-
-def offers(before: str, names: Iterable[UserName], product: str) -> list[Offer]:
-    """Return subroutines after GOSUB, what can be read in values, and all else at the head of a line."""
-    if ";" in before or _NEW.match(before):
-        return []
-    word = typing(before).upper()
-    if _CALL.match(before):
-        numbers = [(each.word.removeprefix("SUB "), each) for each in names if each.kind == "subroutine"]
-        return [Offer(text, each.about, each.kind) for text, each in numbers if text.startswith(word) and each.declared]
-    first = not before[: len(before) - len(word)].strip()
-    own = [Offer(each.word, each.about, each.kind) for each in names if each.kind == "variable"]
-    known = [
-        Offer(text, script_parser.meaning(text), "starts" if script_parser.kind_of(text, first) == "starts" else "word")
-        for text, register in script_parser.offered()
-        if _fits(register, first)
-    ]
-    return [each for each in (*own, *known) if each.text.startswith(word)]
-
-
 def _fits(register: script_parser.Register | None, first: bool) -> bool:
     """Whether a word may begin a line (`first`), or be a value; None: a word of programs alone."""
     if register is None:
         return first
     return register.command or register.settable if first else register.readable
-
-
-def outline(text: str) -> list[Block]:
-    return _Outline(text).blocks
 
 
 class _Outline:

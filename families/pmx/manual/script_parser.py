@@ -14,7 +14,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from multidrop.base.files import rows, split_lines
-from multidrop.dialects.program_files import BLANKS, Entry, Part, Problem, Word
+from multidrop.dialects.editing import Word
+from multidrop.dialects.language import labelled
+from multidrop.dialects.program_files import BLANKS, Entry, Part, Problem
 from multidrop.families.pmx.manual.table import ELSEWHERE, Command, grouped, lookup
 
 # The words (manual 10.1; the joystick's are in 7.15): access, ASCII command, help, their places in a line.
@@ -95,7 +97,7 @@ def describe(word: str) -> list[str]:
     """Describe a word, line by line; empty for an unknown one."""
     if word in KEYWORDS:
         syntax, what = KEYWORDS[word]
-        return [f"{word}: {what}", f"  {'syntax':<10} {syntax}"]
+        return [f"{word}: {what}", *labelled([("syntax", syntax)])]
     found, row = WORDS.get(word), _command_of(word)
     if found is None or row is None:
         return []
@@ -107,7 +109,7 @@ def describe(word: str) -> list[str]:
         ("note", row.note),
         ("manual", f"PMX-2ED-SA {row.section}"),
     )
-    return [f"{word}: {row.meaning}", *(f"  {label:<11} {fact}" for label, fact in facts if fact)]
+    return [f"{word}: {row.meaning}", *labelled(facts, 11)]
 
 
 def find(word: str) -> str:

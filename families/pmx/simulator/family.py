@@ -48,30 +48,6 @@ NAMES = tuple(f"V{n}" for n in range(VARIABLES))
 """The variables of its programs."""
 
 
-def read_drive(table: Table, folder: Folder) -> DriveSpec:
-    common = common_keys(table, folder)
-    name = table.text("name", "00")
-    if not (len(name) == 2 and name.isascii() and name.isdigit()):
-        raise table.wrong("name", f"cannot be {quoted(name)}", "valid: two digits, 00 to 99")
-    if table.boolean("party", False):
-        raise table.wrong("party", "is for MCode drives", "leave it out: a PMX always has an address")
-    world = table.table("world", "[bus.drive.world]")
-    settings = read_settings(table.table("set", "set"), _check_setting)
-    scales = read_units(table, NAMES_OF_AXES)
-    geared = {axis: _axis_scale(settings, axis.upper(), scales.get(axis)) for axis in NAMES_OF_AXES}
-    x, y = read_worlds(world, NAMES_OF_AXES, (*WORLD_KEYS, *ENCODER_KEYS), INPUTS, COUNTS, geared)
-    return DriveSpec(
-        **common,
-        name=name,
-        set=settings,
-        variables=read_variables(table, lambda name: name in NAMES, f"valid: {NAMES[0]} to {NAMES[-1]}"),
-        identity=read_identity(table, ("part", "version"), {"position": len(AXES), "encoder": len(AXES)}),
-        world=x,
-        further=(y,),
-        units=scales,
-    )
-
-
 def _axis_scale(settings: Mapping[str, Setting], axis: str, scale: Scale | None) -> AxisScale:
     """A count is a pulse, or with StepNLoop an encoder count of SLR pulses (7.17)."""
     ratio = settings.get(f"SLR{axis}", 1) if settings.get(f"SL{axis}") in (1, "1") else 1
@@ -83,43 +59,6 @@ def _axis_scale(settings: Mapping[str, Setting], axis: str, scale: Scale | None)
 def _check_setting(table: Table, word: str, value: Setting) -> None:
     if not (word.isascii() and word.isalnum()):
         raise table.wrong(quoted(word), "is not a PMX command")
-
-
-def describe(snapshot: Snapshot) -> DriveText:
-    readings = [each for each in snapshot.readings.readings if each.name != "DN"]
-    return DriveText(
-        personality="PMX",
-        name=snapshot.name,
-        remarks=snapshot.remarks,
-        unread=snapshot.readings.unread,
-        program=_program(snapshot),
-        settings=[Entry(each.name, each.value, remark(each)) for each in readings if each.section != USERS],
-        variables=[Entry(each.name, each.value) for each in readings if each.section == USERS and each.value],
-        identity=[
-            *(
-                Entry(key, plain(text))
-                for key, text in (("part", snapshot.part), ("version", snapshot.version))
-                if text
-            ),
-            *(Entry(key, list(counts)) for key, counts in snapshot.counters.items()),
-        ],
-        worlds=_worlds(snapshot),
-        baud=snapshot.baud,
-    )
-
-
-def wanted(spec: DriveSpec) -> dict[str, Value]:
-    """The settings of a controller in a cell file; a variable that is left out is 0."""
-    settings = {name: held for name, held in spec.set.items() if not isinstance(held, tuple)}
-    return {"DN": f"{MODEL}{spec.name}", **settings, **{name: spec.variables.get(name, 0) for name in NAMES}}
-
-
-def program(spec: DriveSpec) -> StoredProgram:
-    if not spec.program:
-        return StoredProgram()
-    return StoredProgram(
-        tuple(program_file.memory(spec.program, spec.program_name)), tuple(split_lines(spec.program.strip()))
-    )
 
 
 def _program(snapshot: Snapshot) -> list[str]:
@@ -141,20 +80,6 @@ def _worlds(snapshot: Snapshot) -> dict[str, dict[str, object]]:
     for axis, counts in zip(worlds, snapshot.analog, strict=False):
         worlds[axis]["analog"] = [[0.0, counts]]
     return {axis: keys for axis, keys in worlds.items() if keys}
-
-
-def build(spec: DriveSpec, place: Place) -> Unit:
-    """Build a controller that is powered up. Raises Diagnostic for settings that it refuses, and for a program."""
-    device = PmxDevice(spec, place.baud)
-    return Unit(
-        device=device,
-        port=PmxPort(device, alone=place.alone, any_baud=place.baud not in BAUDS.values()),
-        worlds=dict(zip(NAMES_OF_AXES, device.worlds, strict=True)),
-        shadow=_shadow(device),
-        inputs=INPUTS,
-        counts=COUNTS,
-        on_usb=UsbSide(lambda: f"2ED{device.controller.settings.number}", lambda text, now: device.execute(text, now)),
-    )
 
 
 def _shadow(device: PmxDevice) -> Shadow:
@@ -200,20 +125,77 @@ class SimulatedPmx(SimulatedFamily):
 
     @classmethod
     def read_drive(cls, table: Table, folder: Folder) -> DriveSpec:
-        return read_drive(table, folder)
+        common = common_keys(table, folder)
+        name = table.text("name", "00")
+        if not (len(name) == 2 and name.isascii() and name.isdigit()):
+            raise table.wrong("name", f"cannot be {quoted(name)}", "valid: two digits, 00 to 99")
+        if table.boolean("party", False):
+            raise table.wrong("party", "is for MCode drives", "leave it out: a PMX always has an address")
+        world = table.table("world", "[bus.drive.world]")
+        settings = read_settings(table.table("set", "set"), _check_setting)
+        scales = read_units(table, NAMES_OF_AXES)
+        geared = {axis: _axis_scale(settings, axis.upper(), scales.get(axis)) for axis in NAMES_OF_AXES}
+        x, y = read_worlds(world, NAMES_OF_AXES, (*WORLD_KEYS, *ENCODER_KEYS), INPUTS, COUNTS, geared)
+        return DriveSpec(
+            **common,
+            name=name,
+            set=settings,
+            variables=read_variables(table, lambda name: name in NAMES, f"valid: {NAMES[0]} to {NAMES[-1]}"),
+            identity=read_identity(table, ("part", "version"), {"position": len(AXES), "encoder": len(AXES)}),
+            world=x,
+            further=(y,),
+            units=scales,
+        )
 
     @classmethod
     def build(cls, spec: DriveSpec, place: Place) -> Unit:
-        return build(spec, place)
+        """Build a controller that is powered up. Raises Diagnostic for settings that it refuses, and for a program."""
+        device = PmxDevice(spec, place.baud)
+        return Unit(
+            device=device,
+            port=PmxPort(device, alone=place.alone, any_baud=place.baud not in BAUDS.values()),
+            worlds=dict(zip(NAMES_OF_AXES, device.worlds, strict=True)),
+            shadow=_shadow(device),
+            inputs=INPUTS,
+            counts=COUNTS,
+            on_usb=UsbSide(
+                lambda: f"2ED{device.controller.settings.number}", lambda text, now: device.execute(text, now)
+            ),
+        )
 
     @classmethod
     def describe(cls, snapshot: Snapshot) -> DriveText:
-        return describe(snapshot)
+        readings = [each for each in snapshot.readings.readings if each.name != "DN"]
+        return DriveText(
+            personality="PMX",
+            name=snapshot.name,
+            remarks=snapshot.remarks,
+            unread=snapshot.readings.unread,
+            program=_program(snapshot),
+            settings=[Entry(each.name, each.value, remark(each)) for each in readings if each.section != USERS],
+            variables=[Entry(each.name, each.value) for each in readings if each.section == USERS and each.value],
+            identity=[
+                *(
+                    Entry(key, plain(text))
+                    for key, text in (("part", snapshot.part), ("version", snapshot.version))
+                    if text
+                ),
+                *(Entry(key, list(counts)) for key, counts in snapshot.counters.items()),
+            ],
+            worlds=_worlds(snapshot),
+            baud=snapshot.baud,
+        )
 
     @classmethod
-    def wanted(cls, spec: DriveSpec) -> Mapping[str, Value]:
-        return wanted(spec)
+    def wanted(cls, spec: DriveSpec) -> dict[str, Value]:
+        """The settings of a controller in a cell file; a variable that is left out is 0."""
+        settings = {name: held for name, held in spec.set.items() if not isinstance(held, tuple)}
+        return {"DN": f"{MODEL}{spec.name}", **settings, **{name: spec.variables.get(name, 0) for name in NAMES}}
 
     @classmethod
     def program(cls, spec: DriveSpec) -> StoredProgram:
-        return program(spec)
+        if not spec.program:
+            return StoredProgram()
+        return StoredProgram(
+            tuple(program_file.memory(spec.program, spec.program_name)), tuple(split_lines(spec.program.strip()))
+        )

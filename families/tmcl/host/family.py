@@ -8,7 +8,6 @@ the module is reached. A stop is never guarded. Values have numbers; a word is t
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import ClassVar
 
 from multidrop.base.errors import Inexpressible, NoAnswer
 from multidrop.base.files import rows
@@ -21,7 +20,6 @@ from multidrop.dialects.family import (
     Family,
     Guard,
     Hints,
-    Language,
     Programs,
     to_all,
 )
@@ -66,7 +64,7 @@ class TmclFamily(TmclOperations, Family):
 
     name = Tmcl.family
     codec = Tmcl()
-    language: ClassVar[Language] = help
+    language = help.LANGUAGE
     rests_in_place = True
     repairs = True
     stop_bytes = STOP_BYTES

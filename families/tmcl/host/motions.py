@@ -4,7 +4,8 @@ Theory of operation. A module says of no motion that it failed. A move has reach
 parameter 0; short of it, a limit switch that counts (10 with 12, 11 with 13) explains it. Without a target a switch
 explains an end that nothing here caused. The flags of the driver (208) are compared with those from before. A reference
 search that ended well has set actual and target position (8 is 1); one that was stopped has not. Parameter 207 is
-cleared by reading, so it is read only for the reason of a motion that has failed. (TMCL firmware manuals, "Axis
+cleared by reading, so it is read only for the reason of a motion that has failed. A tick timer (132) that went back
+shows a restart, after which actual and target position are both 0. (TMCL firmware manuals, "Axis
 parameters", commands 1 to 6, 13, 128 to 130; docs/rulings/tmcl.md.)
 """
 
@@ -15,11 +16,22 @@ from dataclasses import replace
 
 from multidrop.base.errors import Refused
 from multidrop.dialects.codec import Procedure
-from multidrop.dialects.motions import NOTHING, Effect, Ending, Evidence, Motions, Move, MoveKind, Outcome, Signs
+from multidrop.dialects.motions import (
+    NOTHING,
+    Effect,
+    Ending,
+    Evidence,
+    Motions,
+    Move,
+    MoveKind,
+    Outcome,
+    Signs,
+    restarted,
+)
 from multidrop.families.tmcl.host.codec import MOST_MOTORS, TmclState
 from multidrop.families.tmcl.host.operations import TmclOperations, motors, read
 from multidrop.families.tmcl.manual import commands
-from multidrop.families.tmcl.manual.commands import Axis, Call, Command, Search
+from multidrop.families.tmcl.manual.commands import Axis, Call, Command, Global, Search
 
 ABSOLUTE, RELATIVE, TOGETHER = 0, 1, 2
 """The types of MVP; the third one, COORD, moves motors to coordinates that are stored in the module."""
@@ -27,6 +39,8 @@ SEVERAL = 0xC0
 """The motor of MVP COORD: one, or with a bit of SEVERAL the sum of bits."""
 PROGRAM = "program"
 """Whether its program runs, among the signs."""
+TICKS = "ticks"
+"""Its time since power-up, among the signs."""
 STARTS = (129, 130)
 """The commands that run or step the module's program."""
 DRIVER_FAULTS: Mapping[int, str] = {
@@ -48,6 +62,22 @@ def _begins(move: Move) -> Effect:
 
 def _axis(state: TmclState, motor: int) -> str:
     return str(motor) if state.motors > 1 else ""
+
+
+def _ticks(state: TmclState) -> Procedure[int | None]:
+    """Read the time since power-up, ms, of 32 bits; None for a module without it."""
+    try:
+        return (yield from read(state, Call(Command.GGP, Global.TICK_TIMER, 0)))
+    except Refused:
+        return None
+
+
+def _went_back(state: TmclState, evidence: Evidence) -> Procedure[bool]:
+    """Whether the time since power-up is shorter than before a motion, which no command of ours explains."""
+    if not evidence.alone or evidence.program or TICKS not in evidence.before:
+        return False
+    now = yield from _ticks(state)
+    return now is not None and (now - evidence.before[TICKS]) % (1 << 32) >= 1 << 31
 
 
 def _flags(state: TmclState, motor: int) -> Procedure[int]:
@@ -143,6 +173,8 @@ class TmclMotions(Motions):
         """Read the flags of each motor's driver, 0 for a module without them, and whether its program runs."""
         state = self.state
         found = {PROGRAM: int((yield from TmclOperations(state).busy()))}
+        if (ticks := (yield from _ticks(state))) is not None:
+            found[TICKS] = ticks
         for motor in range((yield from motors(state))):
             found[f"208_{motor}"] = yield from _flags(state, motor)
         return found
@@ -157,6 +189,8 @@ class TmclMotions(Motions):
         motor = int(axis or 0)
         position = yield from _value(state, Axis.ACTUAL_POSITION, motor)
         ending = Ending(Outcome.REACHED, axis, position)
+        if (yield from _went_back(state, evidence)):
+            return restarted(ending, "its tick timer began again")
         new = (yield from _flags(state, motor)) & ~evidence.before.get(f"208_{motor}", -1)
         for bit, reason in DRIVER_FAULTS.items():
             if new & bit:

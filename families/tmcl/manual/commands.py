@@ -347,6 +347,8 @@ class Global(IntEnum):
     PROGRAM_STATUS = 128
     DOWNLOAD_MODE = 129
     PROGRAM_COUNTER = 130
+    TICK_TIMER = 132
+    """Milliseconds since power-up, of 32 bits; a client can set it."""
     SUPPRESS_REPLY = 255
 
 

@@ -62,45 +62,6 @@ FULL_STEPS = 200
 """Of a motor of 1.8 degrees, where the cell file says nothing else."""
 
 
-def read_drive(table: Table, folder: Folder) -> DriveSpec:
-    common = common_keys(table, folder)
-    if wrong := errors(program_file.check(common["program"])):
-        raise table.wrong("program", f"has an error in line {wrong[0].line}: {wrong[0].what}", wrong[0].hint)
-    name = table.text("name", "1")
-    if not (
-        name.isascii() and name.isdigit() and str(int(name)) == name and int(name) in GLOBAL[Global.ADDRESS].limits
-    ):
-        raise table.wrong("name", f"cannot be {quoted(name)}", "valid: the address of a module, 1 to 255")
-    if table.boolean("party", False):
-        raise table.wrong("party", "is for MCode drives", "leave it out: a module always has an address")
-    common["personality"] = _canonical(common["personality"])
-    module = module_of(common["personality"])
-    settings = read_settings(table.table("set", "set"), partial(_check_setting, module), setting_name)
-    names = _names(module)
-    scales = read_units(table, names if module.motors > 1 else ("",))
-    geared = {
-        name: _axis_scale(module, settings, name, scales.get(name if module.motors > 1 else "")) for name in names
-    }
-    surroundings = table.table("world", "[bus.drive.world]")
-    world, *further = read_worlds(surroundings, names, WORLD_KEYS, inputs_of(module), COUNTS, geared)
-    identity = read_identity(table, ("version",), {"position": module.motors, "target": module.motors})
-    if identity.version and not VERSION_FORM.fullmatch(identity.version):
-        hint = "valid: module and firmware, as in 1241V115"
-        rows = table.table("identity", "[bus.drive.identity]")
-        raise rows.wrong("version", f"cannot be {quoted(identity.version)}", hint)
-    return DriveSpec(
-        **common,
-        name=name,
-        set=settings,
-        variables=read_variables(table, lambda name: name in VARIABLES, "valid: user variables by number, 0 to 255"),
-        identity=identity,
-        world=world,
-        further=tuple(further),
-        any_address=table.boolean("any_address", False),
-        units=scales,
-    )
-
-
 def _axis_scale(module: Module, settings: Mapping[str, Setting], name: str, scale: Scale | None) -> AxisScale:
     """A count is a microstep. A step of the world is 1/256 of a full step."""
     word = f"{int(Axis.MICROSTEPS)}"
@@ -154,45 +115,6 @@ def _parameter(module: Module, word: str) -> Parameter | None:
 ADDRESS = f"{GLOBAL_PREFIX}{int(Global.ADDRESS)}"
 """The parameter that has a key of its own."""
 BAUD = f"{GLOBAL_PREFIX}{int(Global.BAUD)}"
-
-
-def describe(snapshot: Snapshot) -> DriveText:
-    personality = _canonical(snapshot.product if snapshot.product.removeprefix(f"{PREFIX}-") in MODULES else PREFIX)
-    module = module_of(personality)
-    readings = [each for each in snapshot.readings.readings if each.name != ADDRESS]
-    held = [each for each in readings if _parameter(module, each.name) is not None]
-    counters = {key: counts[: module.motors] for key, counts in snapshot.counters.items()}
-    return DriveText(
-        personality=personality,
-        name=snapshot.name,
-        remarks=[
-            *snapshot.remarks,
-            *(f"not in set: {each.name} = {each.value}" for each in readings if each not in held),
-        ],
-        unread=snapshot.readings.unread,
-        program=_program(snapshot),
-        settings=[Entry(each.name, each.value, remark(each)) for each in held],
-        identity=[
-            *([Entry("version", snapshot.version)] if snapshot.version else []),
-            *(Entry(key, list(counts) if module.motors > 1 else counts[0]) for key, counts in counters.items()),
-        ],
-        baud=snapshot.baud,
-    )
-
-
-def wanted(spec: DriveSpec) -> dict[str, Value]:
-    """The settings of a module in a cell file, but not its baud rate, which would cut the line off at once."""
-    settings = {name: held for name, held in spec.set.items() if not isinstance(held, tuple) and name != BAUD}
-    return {ADDRESS: int(spec.name), **settings}
-
-
-def program(spec: DriveSpec) -> StoredProgram:
-    """The program of a module in a cell file: each line as the module lists it, and the lines of its file."""
-    if not spec.program:
-        return StoredProgram()
-    lines = program_file.compiled(program_file.read(spec.program, spec.program_name))
-    listed = tuple(f"{each.at}  {spelled(each.call)}" for each in lines)
-    return StoredProgram(listed, tuple(split_lines(spec.program.strip("\n"))))
 
 
 def _program(snapshot: Snapshot) -> list[str]:
@@ -286,21 +208,6 @@ class TmclPort(Port):
         self._out.append(Transmission(at + self._device[Global.PAUSE] / 1000, data))
 
 
-def build(spec: DriveSpec, place: Place) -> Unit:
-    worlds = worlds_of(spec)
-    device = TmclModule(spec, worlds, place.baud)
-    names = _names(device.table) if len(worlds) > 1 else ("",)
-    return Unit(
-        device=device,
-        port=TmclPort(device, any_baud=place.baud not in BAUDS.values()),
-        worlds=dict(zip(names, worlds, strict=True)),
-        inputs=inputs_of(device.table),
-        counts=COUNTS,
-        shadow=_shadow(device, names),
-        single_supply=True,
-    )
-
-
 def _shadow(device: TmclModule, names: Sequence[str]) -> Shadow:
     motors = dict(zip(names, device.motors, strict=True))
 
@@ -334,20 +241,95 @@ class SimulatedTmcl(SimulatedFamily):
 
     @classmethod
     def read_drive(cls, table: Table, folder: Folder) -> DriveSpec:
-        return read_drive(table, folder)
+        common = common_keys(table, folder)
+        if wrong := errors(program_file.check(common["program"])):
+            raise table.wrong("program", f"has an error in line {wrong[0].line}: {wrong[0].what}", wrong[0].hint)
+        name = table.text("name", "1")
+        if not (
+            name.isascii() and name.isdigit() and str(int(name)) == name and int(name) in GLOBAL[Global.ADDRESS].limits
+        ):
+            raise table.wrong("name", f"cannot be {quoted(name)}", "valid: the address of a module, 1 to 255")
+        if table.boolean("party", False):
+            raise table.wrong("party", "is for MCode drives", "leave it out: a module always has an address")
+        common["personality"] = _canonical(common["personality"])
+        module = module_of(common["personality"])
+        settings = read_settings(table.table("set", "set"), partial(_check_setting, module), setting_name)
+        names = _names(module)
+        scales = read_units(table, names if module.motors > 1 else ("",))
+        geared = {
+            name: _axis_scale(module, settings, name, scales.get(name if module.motors > 1 else "")) for name in names
+        }
+        surroundings = table.table("world", "[bus.drive.world]")
+        world, *further = read_worlds(surroundings, names, WORLD_KEYS, inputs_of(module), COUNTS, geared)
+        identity = read_identity(table, ("version",), {"position": module.motors, "target": module.motors})
+        if identity.version and not VERSION_FORM.fullmatch(identity.version):
+            hint = "valid: module and firmware, as in 1241V115"
+            rows = table.table("identity", "[bus.drive.identity]")
+            raise rows.wrong("version", f"cannot be {quoted(identity.version)}", hint)
+        return DriveSpec(
+            **common,
+            name=name,
+            set=settings,
+            variables=read_variables(
+                table, lambda name: name in VARIABLES, "valid: user variables by number, 0 to 255"
+            ),
+            identity=identity,
+            world=world,
+            further=tuple(further),
+            any_address=table.boolean("any_address", False),
+            units=scales,
+        )
 
     @classmethod
     def build(cls, spec: DriveSpec, place: Place) -> Unit:
-        return build(spec, place)
+        worlds = worlds_of(spec)
+        device = TmclModule(spec, worlds, place.baud)
+        names = _names(device.table) if len(worlds) > 1 else ("",)
+        return Unit(
+            device=device,
+            port=TmclPort(device, any_baud=place.baud not in BAUDS.values()),
+            worlds=dict(zip(names, worlds, strict=True)),
+            inputs=inputs_of(device.table),
+            counts=COUNTS,
+            shadow=_shadow(device, names),
+            single_supply=True,
+        )
 
     @classmethod
     def describe(cls, snapshot: Snapshot) -> DriveText:
-        return describe(snapshot)
+        personality = _canonical(snapshot.product if snapshot.product.removeprefix(f"{PREFIX}-") in MODULES else PREFIX)
+        module = module_of(personality)
+        readings = [each for each in snapshot.readings.readings if each.name != ADDRESS]
+        held = [each for each in readings if _parameter(module, each.name) is not None]
+        counters = {key: counts[: module.motors] for key, counts in snapshot.counters.items()}
+        return DriveText(
+            personality=personality,
+            name=snapshot.name,
+            remarks=[
+                *snapshot.remarks,
+                *(f"not in set: {each.name} = {each.value}" for each in readings if each not in held),
+            ],
+            unread=snapshot.readings.unread,
+            program=_program(snapshot),
+            settings=[Entry(each.name, each.value, remark(each)) for each in held],
+            identity=[
+                *([Entry("version", snapshot.version)] if snapshot.version else []),
+                *(Entry(key, list(counts) if module.motors > 1 else counts[0]) for key, counts in counters.items()),
+            ],
+            baud=snapshot.baud,
+        )
 
     @classmethod
-    def wanted(cls, spec: DriveSpec) -> Mapping[str, Value]:
-        return wanted(spec)
+    def wanted(cls, spec: DriveSpec) -> dict[str, Value]:
+        """The settings of a module in a cell file, but not its baud rate, which would cut the line off at once."""
+        settings = {name: held for name, held in spec.set.items() if not isinstance(held, tuple) and name != BAUD}
+        return {ADDRESS: int(spec.name), **settings}
 
     @classmethod
     def program(cls, spec: DriveSpec) -> StoredProgram:
-        return program(spec)
+        """The program of a module in a cell file: each line as the module lists it, and the lines of its file."""
+        if not spec.program:
+            return StoredProgram()
+        lines = program_file.compiled(program_file.read(spec.program, spec.program_name))
+        listed = tuple(f"{each.at}  {spelled(each.call)}" for each in lines)
+        return StoredProgram(listed, tuple(split_lines(spec.program.strip("\n"))))

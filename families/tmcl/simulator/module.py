@@ -86,7 +86,7 @@ class TmclModule:
         self._notify = 0
         self._notices: list[tuple[float, int]] = []
         self._now = 0.0
-        self._watched, self._heard = True, 0.0
+        self._watched, self._heard, self._ticks_at = True, 0.0, 0.0
         """The time of the last command of a host; infinite after the heartbeat has stopped the motors."""
         self._outputs = dict.fromkeys(self.table.outputs, 0)
         self._variables: dict[int, int] = {}
@@ -173,6 +173,7 @@ class TmclModule:
         self._outputs = dict.fromkeys(self._outputs, 0)
         self._variables = dict(self._kept_variables)
         self._coordinates.power_up()
+        self._global[Global.TICK_TIMER], self._ticks_at = 0, now
         if on and self._global[Global.AUTOSTART]:
             self.program.run(now)
 
@@ -233,7 +234,7 @@ class TmclModule:
                 self.power(True, now)
                 return None
             case Command.SGP | Command.GGP | Command.STGP | Command.RSGP:
-                return Answer(value=self._global_parameter(call))
+                return Answer(value=self._global_parameter(call, now))
             case Command.SIO | Command.GIO:
                 return Answer(value=self._port(call, now))
             case Word.SCO | Word.GCO | Word.CCO:
@@ -363,7 +364,7 @@ class TmclModule:
             motor.write(call.type, stored[call.type], now)
         return call.value
 
-    def _global_parameter(self, call: Call) -> int:
+    def _global_parameter(self, call: Call, now: float) -> int:
         if call.motor > max(self.table.banks):
             raise Refused(Status.INVALID_VALUE)
         row = self.table.banks.get(call.motor, {}).get(call.type)
@@ -374,6 +375,10 @@ class TmclModule:
             case Command.SGP:
                 _in_range(row, call.value)
                 held[call.type] = call.value
+                if (call.motor, call.type) == (0, Global.TICK_TIMER):
+                    self._ticks_at = now
+            case Command.GGP if (call.motor, call.type) == (0, Global.TICK_TIMER):
+                return _wrapped(held[call.type] + int((now - self._ticks_at) * 1000))
             case Command.GGP if call.motor == 0 and not row.writable:  # the program's state
                 states = {Global.PROGRAM_STATUS: self.program.running, Global.DOWNLOAD_MODE: self.program.storing}
                 return int(states.get(Global(call.type), self.program.counter))
@@ -453,3 +458,8 @@ def storable(number: int, row: Parameter) -> bool:
 def _in_range(row: Parameter, value: int) -> None:
     if value not in row.limits:
         raise Refused(Status.INVALID_VALUE)
+
+
+def _wrapped(value: int) -> int:
+    """A value as 32 bits hold it, with its sign."""
+    return (value + (1 << 31)) % (1 << 32) - (1 << 31)

@@ -216,11 +216,12 @@ class Workshop:
 
         device.execute = noted
 
-    def moves(self, drive: str) -> bool:
-        """Whether a drive moves."""
+    def moves(self, drive: str, axis: str = "") -> bool:
+        """Whether a drive moves, or one axis of it."""
         shadow = self.devices[drive].unit.shadow
         assert shadow is not None
-        return any(each.velocity for each in shadow.motion(self.floor.now()))
+        every = shadow.motion(self.floor.now())
+        return any(each.velocity for each in every if axis.lower() in ("", each.axis))
 
     def position(self, drive: str) -> int:
         """Where a drive is."""

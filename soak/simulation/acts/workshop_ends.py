@@ -110,6 +110,64 @@ async def spared(world: World, rng: Random) -> None:
         why = await _automation(shop)(lines)
         await asyncio.sleep(SETTLED)
         shop.fact("spared", shop.moves("b"), f"{lines} ended early ({why}), and b, started by hand, was stopped")
+        turn = world.seed // TURNS % (len(SPARED) + 1)
+        if turn < len(SPARED):
+            await SPARED[turn](shop)
+    if turn == len(SPARED):
+        await _axis(world, rng)
+
+
+async def _routine(shop: Workshop) -> None:
+    """Let a drive refuse a line that has a routine for errors, which moves it."""
+    for line in ("PG 1", "LB Z1", "SL 30000", "RT", "E", "PG", "OE Z1"):
+        await shop.type(f"@c {line}")
+    lines = [*["@c PR P"] * shop.rng.randrange(2), f"@c {shop.rng.choice(WRONG)}"]
+    why = await _automation(shop)(lines)
+    await asyncio.sleep(SETTLED)
+    words = f"{lines} ended early ({why}), and c has a routine for errors"
+    shop.fact("automation", not shop.moves("c"), f"{words}: it goes on")
+    shop.fact("spared", shop.moves("b"), f"{words}: b, started by hand, was stopped")
+
+
+async def _program(shop: Workshop) -> None:
+    """Let a drive refuse a line while a program of the same automation runs in it."""
+    for line in ("PG 1", "LB Z2", "H 60000", "E", "PG"):
+        await shop.type(f"@c {line}")
+    lines = ["@c EX Z2", "/sleep 0.4", f"@c {shop.rng.choice(WRONG)}"]
+    why = await _automation(shop)(lines)
+    await asyncio.sleep(SETTLED)
+    words = f"{lines} ended early ({why})"
+    shop.fact("automation", not shop.device("c").running, f"{words}: the program of c runs on")
+    shop.fact("spared", shop.moves("b"), f"{words}: b, started by hand, was stopped")
+
+
+async def _rest(shop: Workshop) -> None:
+    """Move a drive to its target, wait for that, and let another one refuse a line."""
+    await shop.type("@b SL 0")
+    await asyncio.sleep(SETTLED)
+    before, lines = len(shop.executed("c")), ["@c MR 500", "/wait stopped 20", f"@a {shop.rng.choice(WRONG)}"]
+    why = await _automation(shop)(lines)
+    await asyncio.sleep(SETTLED)
+    stops = [each for each in shop.executed("c")[before:] if each in ("E", "SL 0")]
+    shop.fact("spared", not stops, f"{lines} ended early ({why}), and c, which was read at rest, got {stops}")
+
+
+SPARED = (_routine, _program, _rest)
+TURNS = 10
+"""The seeds in which every job has its turn."""
+
+
+async def _axis(world: World, rng: Random) -> None:
+    """Let automation start one axis of a controller, and end early, beside another axis that a person has started."""
+    async with workshop(world, rng, "pmx", ("01", "02")) as shop:
+        by_hand, own = rng.sample("XY", 2)
+        await shop.type(f"@01 J{by_hand}+")
+        lines = [f"@01 J{own}-", "/sleep 0.5", rng.choice(("@01 JOYENA=1", "@02 JOYENA=1", "/assert 1 == 2"))]
+        why = await _automation(shop)(lines)
+        await asyncio.sleep(SETTLED)
+        words = f"{lines} ended early ({why})"
+        shop.fact("automation", not shop.moves("01", own), f"{words}: {own} goes on")
+        shop.fact("spared", shop.moves("01", by_hand), f"{words}: {by_hand}, started by hand, was stopped")
 
 
 class _Gate:

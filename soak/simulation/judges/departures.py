@@ -150,7 +150,14 @@ def _written(life: Lived, line: str, index: int) -> bytes:
 
 
 def under_way(life: Lived, line: str, stop: Stop) -> bool:
-    """Whether the stop of a key before it is on its way to the drives: then this one goes on with that."""
+    """Whether a person's stop before it is on its way to the drives: then this one goes on with that.
+
+    A stop of an automation, of some drives, is none.
+    """
+    before = any(
+        each is not stop and each.at <= stop.at and (line in each.lost or each.at >= stop.at - STILL)
+        for each in life.history.stops
+    )
     stops = [each for each in life.history.stops if stop.at - STILL <= each.at <= stop.at and line in each.own]
     earlier = stops[: stops.index(stop)]
     begins = earlier[-1].own[line][0] if earlier else 0
@@ -160,7 +167,7 @@ def under_way(life: Lived, line: str, stop: Stop) -> bool:
             break
         if name == line and (left := _written(life, line, index)):
             # Its forms were made when it came: what was half sent then may have left since.
-            known = any(_is_stop(each, line, left) for each in (stop, *earlier))
+            known = before and any(_is_stop(each, line, left) for each in (stop, *earlier))
             return known or _of_an_opening(life, line, stop, left)
     return bool(earlier)  # nothing of it has left yet
 

@@ -30,3 +30,16 @@ def test_no_refusal_of_a_viewer_quotes_its_password(before: str, after: str) -> 
         with pytest.raises(Diagnostic) as refused:
             parse_target(url, None)
         assert SECRET not in str(refused.value), url
+
+
+@pytest.mark.parametrize(
+    ("to", "serve", "about"),
+    [
+        ("run.rrd", None, "rerun: plotting to run.rrd"),
+        ("run.csv", None, "table: plotting to run.csv"),
+        ("rerun+http://desk:9876/proxy", None, "rerun: plotting to rerun+http://desk:9876/proxy"),
+        (None, "9877", "rerun: plotting to rerun+http://127.0.0.1:9877/proxy"),
+    ],
+)
+def test_a_target_says_what_takes_the_samples(to: str | None, serve: str | None, about: str) -> None:
+    assert parse_target(to, serve).about == about

@@ -7,14 +7,18 @@ import json
 import signal
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
+from pathlib import Path
+from typing import Any
 
 import pytest
 from textual.pilot import Pilot
 
+from multidrop.features.publishing import screen
 from multidrop.features.publishing.plant import Place
 from multidrop.features.publishing.screen import PlantApp, _run
 from multidrop.features.publishing.watch import Watch
 from multidrop.shell.configuration import Settings
+from multidrop.tui import boundary
 from multidrop.tui.widgets.lines import Lines
 
 pytestmark = pytest.mark.tui
@@ -45,8 +49,8 @@ class Page:
 
 
 @asynccontextmanager
-async def page(width: int = 80) -> AsyncIterator[Page]:
-    app = PlantApp("mqtt://broker/plant", Settings())
+async def page(width: int = 80, state: Path | None = None) -> AsyncIterator[Page]:
+    app = PlantApp("mqtt://broker/plant", Settings() if state is None else Settings(state=state))
     app.broker = Watch(app.target, Settings(), app.tell)
     async with app.run_test(size=(width, 24)) as pilot:
         shown = Page(app, pilot)
@@ -127,6 +131,40 @@ async def test_a_lost_broker_is_seen() -> None:
 async def test_ctrl_q_ends_it_and_ctrl_c_does_not() -> None:
     async with page() as plant:
         assert any("^Q quits" in row for row in await plant.press("ctrl+c"))
+        await plant.pilot.press("ctrl+q")
+    assert plant.app.return_value == 0
+
+
+def boom(*_: Any, **__: Any) -> Any:
+    raise ZeroDivisionError("planted")
+
+
+@pytest.mark.parametrize("what", ["rows", "summary", "key", "callback"])
+async def test_a_defect_is_shown_in_its_place_and_ends_nothing(
+    what: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(boundary, "RAISES", False)
+    async with page(state=tmp_path) as plant:
+        with monkeypatch.context() as planted:
+            if what == "summary":
+                planted.setattr(screen, "summary", boom)
+            elif what == "key":
+                planted.setattr(plant.app, "action_step", boom)
+            elif what == "callback":
+                plant.app.call_later(boom)
+            else:
+                planted.setattr(plant.app.broker, what, boom)
+            rows = await plant.press("down")
+            while not (tmp_path / boundary.FILE).exists():
+                await plant.pilot.pause(0.01)
+            assert plant.app.is_running
+            if what in ("rows", "summary"):
+                assert rows[0].startswith(" cannot be shown: ZeroDivisionError") and not any(
+                    "press:" in row for row in rows
+                )
+            else:
+                assert any("a defect of multidrop in" in row for row in await plant.press("x", "backspace"))
+        assert any("press:a" in row for row in await plant.press("up")), "once the cause is gone"
         await plant.pilot.press("ctrl+q")
     assert plant.app.return_value == 0
 

@@ -127,6 +127,22 @@ async def test_a_stop_is_written_by_the_watchers_thread_while_the_loop_is_blocke
     peer.close()
 
 
+async def test_the_loop_stops_where_the_thread_of_a_watcher_cannot_and_its_later_stops_are_taken(
+    shared: Shared,
+) -> None:
+    def defective() -> None:
+        raise ZeroDivisionError
+
+    object.__setattr__(shared.gate._calls, "stop_ahead", defective)
+    peer = plain(shared, greeting())
+    await until(lambda: shared.gate.watchers)
+    peer.sendall(b"\x18")
+    await until(lambda: len(shared.stops) == 1)
+    peer.sendall(b"\x18")
+    await until(lambda: len(shared.stops) == 2)
+    peer.close()
+
+
 HOSTILE = (
     b"GET / HTTP/1.1\r\n\r\n",
     b"\x18\x18\x18\n",

@@ -81,6 +81,40 @@ def test_a_baud_rate_is_set_and_then_confirmed() -> None:
     assert port.sent[ADA].endswith(message(Setting.BAUD + REPLY, 19200))
 
 
+@pytest.mark.parametrize(
+    ("family", "line"), [("", b"aFD"), ("mcode", b"aMR 5"), ("mcode", b"aFD\r"), ("pmx", b"@01STORE")]
+)
+def test_a_line_that_another_one_has_begun_is_made_harmless_at_the_baud_rate_of_its_beginning(
+    family: str, line: bytes
+) -> None:
+    """A client that looks for drives sets another rate first, and comes back to this one."""
+    port = agreed(Port(family), ADA, BOB)
+    port.settles = False
+    port.send(ADA, line)
+    port.do(port.exchange.leave(ADA))
+    port.send(BOB, message(Setting.BAUD, 19200), 1.0)
+    harmless = port.written.removeprefix(line)
+    assert b"~~~" in harmless and harmless.endswith((b"\r", b"\n", b"\x05")) and port.set == []
+    until = port.exchange.deadline
+    assert until is not None
+    assert until - 1.0 >= len(harmless) * 10 / 9600, "it has left, and the drives have replied"
+    port.do(port.exchange.advance(until))
+    assert port.set == [Set(BOB, Setting.BAUD, 19200)]
+    port.do(port.exchange.applied(BOB, Setting.BAUD, 19200))
+    port.send(BOB, b"\n", 2.0)
+    assert port.written == line + harmless + b"\n", "once"
+
+
+def test_so_is_ones_own_text_but_whole_lines_stop_nothing_at_another_baud_rate() -> None:
+    port = agreed(Port("mcode"), ADA)
+    port.send(ADA, b"aPR P\r" + message(Setting.BAUD, 19200))
+    assert port.written == b"aPR P\r" and port.set == [Set(ADA, Setting.BAUD, 19200)]
+    port = agreed(Port("mcode", party=True), ADA)
+    port.send(ADA, b"aFD" + message(Setting.BAUD, 19200))
+    assert port.written == b"aFD" + b"~" * 65 + b"\r\n" and port.set == [Set(ADA, Setting.BAUD, 19200)]
+    assert b"FD" not in port.written.removeprefix(b"aFD")
+
+
 def test_a_change_by_another_client_is_answered_with_what_holds() -> None:
     port = agreed(Port(), ADA, BOB)
     port.send(ADA, b"PR P\r")

@@ -73,6 +73,13 @@ async def test_its_transport_is_opened_and_opened_again(monkeypatch: pytest.Monk
     assert (await opened.reopen(opened.transport)).name == "can://h:29536"
 
 
+@pytest.mark.parametrize("url", ["sim:", "sim:#press"])
+async def test_a_cell_has_no_port(url: str) -> None:
+    connection = parse(url)
+    with pytest.raises(Unreachable, match=f"^{url}: a simulated cell has no port"):
+        await connection.scheme.open(connection, 9600)
+
+
 def test_a_scheme_that_is_there_is_taken(monkeypatch: pytest.MonkeyPatch) -> None:
     class Tcp(Can):
         name = "tcp"

@@ -8,10 +8,13 @@ from typing import Any
 
 import pytest
 
+from multidrop.base import registry
 from multidrop.base.errors import Diagnostic, Refused
+from multidrop.base.feature import Feature
 from multidrop.drives.events import Valued
 from multidrop.drives.telemetry import Value
 from multidrop.shell.events import OnBus
+from multidrop.shell.hooks import Predicting
 from multidrop.shell.plots.series import parse_series
 from multidrop.shell.roles import Series
 from tests.support.cell_session import ETHERNET, CellSession, bus, party, pmx
@@ -39,6 +42,22 @@ class Screen:
 
     async def show(self, name: str) -> None:
         self.shown.append(name)
+
+
+@pytest.mark.parametrize("there", [True, False])
+async def test_what_predicts_positions_says_how_it_begins(
+    there: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    async with two_lines(tmp_path) as cell:
+        if there:
+            adds = (Predicting("no oracle speaks", "/oracle on asks it"),)
+            monkeypatch.setattr(registry, "features", lambda: [Feature("oracle", "an oracle", adds)])
+        else:
+            delete_features(monkeypatch)
+        with pytest.raises(Diagnostic) as refused:
+            parse_series(cell.session, ["b.difference"])
+        said = "no oracle speaks; /oracle on asks it" if there else "it prints no value"
+        assert str(refused.value).partition(": ")[2].startswith(said), refused.value
 
 
 async def test_words_name_drives_and_values(tmp_path: Path) -> None:

@@ -13,8 +13,8 @@ from hypothesis import strategies as st
 
 from multidrop.base.errors import Diagnostic
 from multidrop.base.files import split_lines
+from multidrop.dialects.editing import Block, replaced
 from multidrop.dialects.families import program_languages
-from multidrop.dialects.program_files import Block, replaced
 from multidrop.families.lexium.manual.grammar import LineError, Statement, parse
 from multidrop.families.lexium.manual.program_file import scan
 from multidrop.families.lexium.manual.statements import canonical

@@ -62,6 +62,18 @@ async def test_the_stop_is_written_while_the_event_loop_is_held_up(typed):
     assert (typed.stops, typed.taken) == (["MR 5\r"], "")
 
 
+async def test_the_loop_stops_where_the_thread_of_the_keys_cannot_and_later_keys_are_read(typed):
+    def defective():
+        raise ZeroDivisionError
+
+    typed.keyboard.stop_ahead = defective
+    with typed.keyboard:
+        typed.type(b"\x18")
+        await typed.until(lambda: len(typed.stops) == 1)
+        typed.type(b"\x18")
+        await typed.until(lambda: len(typed.stops) == 2)
+
+
 async def test_what_came_before_the_last_stop_of_a_read_is_dropped_and_what_is_behind_it_kept(typed):
     typed.keyboard.listen(None)
     with typed.keyboard:

@@ -102,6 +102,19 @@ async def test_a_failed_line_holds_back_the_rest_of_its_burst_only(typist):
     assert typist.session.done == ["MR 5"]
 
 
+async def test_lines_that_had_come_before_a_failure_are_held_back_however_slow_this_program_is(typist):
+    typist.queue.enter("bad", followed=True)
+    await asyncio.sleep(BURST * 3)
+    typist.queue.enter("MR 1", followed=True)
+    await asyncio.sleep(BURST * 3)
+    typist.queue.enter("MR 2")
+    await asyncio.sleep(BURST * 3)
+    typist.queue.enter("MR 3")
+    await asyncio.sleep(2.0)
+    assert typist.session.notices == [f"not sent, as 'bad' failed: MR {n}" for n in (1, 2)]
+    assert typist.session.done == ["MR 3"]
+
+
 async def test_a_stop_drops_what_waits_and_takes_new_lines(typist):
     typist.queue.enter("MR 1\nMR 2")
     await asyncio.sleep(0.1)

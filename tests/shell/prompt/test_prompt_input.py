@@ -108,3 +108,11 @@ async def test_a_stop_without_a_paste_says_nothing_of_one():
     made.forget("MR 5")
     await asyncio.sleep(3 * STALLED)
     assert told == []
+
+
+def test_it_is_known_whether_another_line_has_been_typed():
+    typed = Typed()
+    made = KeyboardInput(typed)
+    for text, follows in (("", False), ("MR 5", False), ("MR 5\rPR", True), ("PR P\n", True)):
+        typed.typed = text
+        assert made.enters_follow is follows

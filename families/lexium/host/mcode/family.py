@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
-
 from multidrop.base.errors import Inexpressible
 from multidrop.dialects.certifying import Certifying
 from multidrop.dialects.codec import Codec, Procedure
 from multidrop.dialects.debugging import Debugging
-from multidrop.dialects.family import Guard, Hints, Language, Programs
+from multidrop.dialects.family import Guard, Hints, Programs
 from multidrop.dialects.motions import Motions
 from multidrop.dialects.scanning import Scan
 from multidrop.dialects.state import DriveState, Remembered
@@ -41,7 +39,7 @@ class MCodeFamily(MCodeOperations, LexiumFamily):
 
     name = MCode.family
     codec = MCode()
-    language: ClassVar[Language] = help
+    language = help.LANGUAGE
     repairs = True
     stop_bytes = STOP_BYTES
 

@@ -287,7 +287,7 @@ class MCodeReadout(Programs, ABC):
 
     def offered(self, held: Held, line: str) -> Sequence[tuple[str, str]]:
         """The names that may end a line: labels where a line takes one, variables elsewhere, both after PR."""
-        word = help.typing(line)
+        word = help.LANGUAGE.typing(line)
         head = line[: len(line) - len(word)]
         in_text = head.count('"') % 2 == 1
         begun = bool(word or (head.strip() and head.endswith((" ", ",", "="))))

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
-
 from multidrop.dialects.certifying import Certifying
 from multidrop.dialects.codec import Codec, Procedure
-from multidrop.dialects.family import Guard, Hints, Language, Registers
+from multidrop.dialects.family import Guard, Hints, Registers
 from multidrop.dialects.motions import Motions
 from multidrop.dialects.state import DriveState, who
 from multidrop.dialects.units import Units
@@ -30,7 +28,7 @@ class ModbusFamily(ModbusOperations, LexiumFamily):
 
     name = Modbus.family
     codec = Modbus()
-    language: ClassVar[Language] = help
+    language = help.LANGUAGE
     no_programs = f"programs are neither listed nor written over Modbus; {ALTERNATIVE} does both with the same drive"
 
     @classmethod

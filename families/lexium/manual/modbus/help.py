@@ -7,6 +7,7 @@ The map decides what a register takes; the drive itself may take less. A registe
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable
 from dataclasses import replace
 
 from multidrop.base.errors import Diagnostic
@@ -38,48 +39,49 @@ LABELS = (
     "manual",
 )
 
-typing = mcode.typing
-describe_error = mcode.describe_error
+
+class ModbusLanguage(mcode.MCodeLanguage):
+    """Help on the names that Modbus carries; the rest is MCode's."""
+
+    def names(self) -> list[str]:
+        found = {name for name, row in words("LMDCE").items() if _ethernet(row)}
+        return sorted(found | REGISTERS.keys())
+
+    def knows(self, word: str) -> bool:
+        """Return whether a word, or the address of a register, has help."""
+        name = word.strip().upper()
+        row = words("LMDCE").get(name)
+        return name in REGISTERS or _ADDRESS.fullmatch(name) is not None or (row is not None and _ethernet(row))
+
+    def describe(self, word: str, product: str = "") -> list[str]:
+        """Describe a word or a register, line by line. Raises Diagnostic for a reserved register or an unknown word."""
+        name, first = word.strip().upper(), []
+        if (address := _ADDRESS.fullmatch(name)) is not None:
+            register = _at(int(address[1], 16))
+            name, first = register.name, [_place_of(register, int(address[1], 16))]
+        row = _user_variable(name) if _USER.fullmatch(name) else words(product or "LMDCE").get(name)
+        if row is None or not (name in REGISTERS or _ethernet(row)):
+            return super().describe(word, product or "LMDCE")  # which raises Diagnostic with similar words
+        return [*first, *mcode.page(row, _facts(row, product))]
+
+    def offered(self, product: str, typed: str) -> Iterable[tuple[str, str]]:
+        """Return the words that Modbus carries."""
+        return (each for each in super().offered(product, typed) if each[0] in REACHED)
+
+    def hint(self, text: str, product: str = "") -> str:
+        """Return syntax and meaning of the word being typed, and its register; empty where it is unknown."""
+        said = super().hint(text, product)
+        found = re.match(r"(?:PR )?([A-Z]+\d?)", said)
+        if found is None or lookup(found[1]) is None:
+            return said
+        register = REGISTERS.get(found[1])
+        where = (
+            f"register 0x{register.address:04X}" if register else "" if found[1] in REACHED else "no Modbus register"
+        )
+        return f"{said}; {where}" if where else said
 
 
-def names() -> list[str]:
-    found = {name for name, row in words("LMDCE").items() if _ethernet(row)}
-    return sorted(found | REGISTERS.keys())
-
-
-def knows(word: str) -> bool:
-    """Whether a word, or the address of a register, has help."""
-    name = word.strip().upper()
-    row = words("LMDCE").get(name)
-    return name in REGISTERS or _ADDRESS.fullmatch(name) is not None or (row is not None and _ethernet(row))
-
-
-def describe(word: str, product: str = "") -> list[str]:
-    """Describe a word or a register, line by line. Raises Diagnostic for a reserved register or an unknown word."""
-    name, first = word.strip().upper(), []
-    if (address := _ADDRESS.fullmatch(name)) is not None:
-        register = _at(int(address[1], 16))
-        name, first = register.name, [_place_of(register, int(address[1], 16))]
-    row = _user_variable(name) if _USER.fullmatch(name) else words(product or "LMDCE").get(name)
-    if row is None or not (name in REGISTERS or _ethernet(row)):
-        return mcode.describe(word, product or "LMDCE")  # which raises Diagnostic with similar words
-    return [*first, *mcode.page(row, _facts(row, product))]
-
-
-def complete(prefix: str, product: str = "") -> list[tuple[str, str]]:
-    """Words that begin with the prefix and that Modbus carries, each with its meaning."""
-    return [(name, meaning) for name, meaning in mcode.complete(prefix, product) if name in REACHED]
-
-
-def hint(text: str, product: str = "") -> str:
-    """Syntax and meaning of the word being typed, and its register; empty where it is unknown."""
-    said = mcode.hint(text, product)
-    found = re.match(r"(?:PR )?([A-Z]+\d?)", said)
-    if found is None or lookup(found[1]) is None:
-        return said
-    register = REGISTERS.get(found[1])
-    where = f"register 0x{register.address:04X}" if register else "" if found[1] in REACHED else "no Modbus register"
-    return f"{said}; {where}" if where else said
+LANGUAGE = ModbusLanguage()
 
 
 def _ethernet(row: Mnemonic) -> bool:

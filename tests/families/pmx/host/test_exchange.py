@@ -11,7 +11,8 @@ from multidrop.dialects import End, Hints, Priority, Reply
 from multidrop.dialects.codec import copy_with
 from multidrop.families.pmx.host.codec import Pmx, PmxState
 from multidrop.families.pmx.host.family import PmxFamily
-from multidrop.families.pmx.manual import help, table
+from multidrop.families.pmx.manual import table
+from multidrop.families.pmx.manual.help import LANGUAGE
 from tests.support.paths import FACTS
 from tests.support.procedure import ProcedureRunner
 
@@ -381,12 +382,16 @@ def test_every_command_and_every_refusal_of_the_manual_is_known():
 
 
 def test_help_names_syntax_value_and_place_in_the_manual():
-    lines = help.describe("hspdx")
+    lines = LANGUAGE.describe("hspdx")
     assert lines[0].startswith("HSPD: ") and any("HSPDX, HSPDY" in line for line in lines)
     with pytest.raises(Diagnostic, match="HSPD"):
-        help.describe("HSX")
-    assert ("MSTX", table.COMMANDS["MST"].meaning) in help.complete("ms")
-    assert help.hint("X1000").startswith("X1000") and "capitals" in help.hint("mstx") and help.hint("???") == ""
+        LANGUAGE.describe("HSX")
+    assert ("MSTX", table.COMMANDS["MST"].meaning) in LANGUAGE.complete("ms")
+    assert (
+        LANGUAGE.hint("X1000").startswith("X1000")
+        and "capitals" in LANGUAGE.hint("mstx")
+        and LANGUAGE.hint("???") == ""
+    )
 
 
 def test_words_of_a_motor_status():

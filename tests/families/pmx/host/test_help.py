@@ -11,7 +11,8 @@ from multidrop.base.errors import Diagnostic
 from multidrop.dialects.families import correct_in
 from multidrop.families.pmx.host.family import PmxFamily
 from multidrop.families.pmx.host.values import NAMES, base
-from multidrop.families.pmx.manual import help, script_parser, table
+from multidrop.families.pmx.manual import script_parser, table
+from multidrop.families.pmx.manual.help import LANGUAGE
 from multidrop.families.pmx.simulator.settings import REGISTERS, WINDOWS
 from tests.support.cases import for_each
 from tests.support.paths import FACTS
@@ -21,8 +22,8 @@ SCRIPT_WORDS = FACTS / "pmx-standalone-commands.csv"
 
 @for_each("word", [*script_parser.WORDS, *script_parser.KEYWORDS])
 def test_every_word_of_a_script_has_help(word: str) -> None:
-    lines = help.describe(word)
-    assert help.knows(word) and help.knows(word.lower())
+    lines = LANGUAGE.describe(word)
+    assert LANGUAGE.knows(word) and LANGUAGE.knows(word.lower())
     row = table.lookup(word)
     assert lines[0].startswith(f"{row.name if row else word}: ") and len(lines) > 1
     if word in script_parser.WORDS:
@@ -41,7 +42,7 @@ def test_every_word_of_the_manuals_table_has_help() -> None:
         stem = row.replace("[pos]", "1").replace("[position]", "1").replace("[axis]", "X").replace("[+/-]", "+")
         words = [re.sub(r"\[(\d+)-\d+\]", r"\1", stem)] if "[" in stem else stem.split()
         for word in re.sub(r"(PRG|SUB) (\d)", r"\1\2", " ".join(words)).split():
-            assert help.describe(word), row
+            assert LANGUAGE.describe(word), row
 
 
 @pytest.mark.parametrize(
@@ -63,7 +64,7 @@ def test_every_word_of_the_manuals_table_has_help() -> None:
     ],
 )
 def test_help_says(word: str, line: str) -> None:
-    assert line in help.describe(word)
+    assert line in LANGUAGE.describe(word)
 
 
 def test_the_bits_of_a_status_are_those_of_its_table_in_order() -> None:
@@ -75,9 +76,9 @@ def test_the_bits_of_a_status_are_those_of_its_table_in_order() -> None:
 
 def test_an_unknown_word_is_no_word_of_a_script_by_its_beginning() -> None:
     for word in ("HOM", "WAI", "EC", "GO", "", "+", "X+"):
-        assert not help.knows(word), word
+        assert not LANGUAGE.knows(word), word
     with pytest.raises(Diagnostic):
-        help.describe("HOM")
+        LANGUAGE.describe("HOM")
 
 
 @for_each("name", NAMES)

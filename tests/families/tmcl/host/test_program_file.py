@@ -13,8 +13,9 @@ from hypothesis import strategies as st
 from multidrop.base.files import SourceLine
 from multidrop.dialects.families import correct_in, program_language_of
 from multidrop.dialects.program_files import errors
-from multidrop.families.tmcl.manual import editing, instructions, program_file
+from multidrop.families.tmcl.manual import instructions, program_file
 from multidrop.families.tmcl.manual.commands import Call
+from multidrop.families.tmcl.manual.editing import EDITING
 from multidrop.families.tmcl.manual.program_file import assembled, check, compiled, disassembled, formatted
 from tests.support.cases import for_each
 from tests.support.examples import examples
@@ -209,24 +210,24 @@ def test_no_text_breaks_the_language_or_its_editor(lines: list[str]) -> None:
         formatted(text)
         program_file.measure(text)
     program_file.entries(text)
-    editing.outline(text)
-    named = editing.names(text)
+    EDITING.outline(text)
+    named = EDITING.names(text)
     for line in lines:
         program_file.parts(line)
-        editing.words(line, ())
-        editing.offers(line, named, "")
+        EDITING.words(line, ())
+        EDITING.offers(line, named, "")
 
 
 def test_the_editor_knows_labels_constants_and_fields() -> None:
     text = "Far = 5 // a place\nLoop: MVP ABS, 0, Far\n JA loop\n"
-    named = {each.word: each for each in editing.names(text)}
+    named = {each.word: each for each in EDITING.names(text)}
     assert [(each.kind, len(each.places)) for each in named.values()] == [("constant", 2), ("label", 2)]
     assert named["Far"].remark == "a place"
-    assert editing.renamed(text, named["Loop"], "Round", "") == "Round"
-    assert [each.text for each in editing.offers("  JA Lo", named.values(), "")] == ["Loop"]
-    assert "ABS" in [each.text for each in editing.offers("  MVP ", named.values(), "")]
-    assert [each.text for each in editing.offers("  DJ", named.values(), "")] == ["DJNZ"]
-    assert editing.describe("DJNZ", "")[1].endswith("DJNZ variable, label")
+    assert EDITING.renamed(text, named["Loop"], "Round", "") == "Round"
+    assert [each.text for each in EDITING.offers("  JA Lo", named.values(), "")] == ["Loop"]
+    assert "ABS" in [each.text for each in EDITING.offers("  MVP ", named.values(), "")]
+    assert [each.text for each in EDITING.offers("  DJ", named.values(), "")] == ["DJNZ"]
+    assert EDITING.describe("DJNZ", "")[1].endswith("DJNZ variable, label")
     assert [each.name for each in program_file.entries(text)] == ["0", "Loop"]
 
 
@@ -265,9 +266,9 @@ def test_what_a_minus_cannot_precede(text: str, line: int, what: str, hint: str)
 
 def test_a_constant_is_renamed_behind_a_minus_too() -> None:
     text = "Dist = 10\nROR 0, -Dist ; -Dist\nROR 0, Dist\nSTOP\n"
-    (name,) = editing.names(text)
+    (name,) = EDITING.names(text)
     assert [(place.line, place.start, place.stop) for place in name.places] == [(0, 0, 4), (1, 8, 12), (2, 7, 11)]
-    assert editing.renamed(text, name, "Far", "") == "Far"
+    assert EDITING.renamed(text, name, "Far", "") == "Far"
 
 
 # Whose language a text is

@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from multidrop.families.lexium.manual import help
 from multidrop.families.lexium.manual.grammar import parse
+from multidrop.families.lexium.manual.help import LANGUAGE
 from multidrop.families.lexium.manual.program_checker import check
 from multidrop.families.lexium.manual.statements import condition_of, condition_reading, is_mixed
 from multidrop.families.lexium.simulator.device import MCodeDevice
@@ -65,11 +65,11 @@ def test_check_says_nothing_of_what_the_manual_shows(form: str) -> None:
 
 
 def test_help_says_the_same_while_the_line_is_typed() -> None:
-    assert [help.hint(f"CL K1,{form}") for form, _ in FORMS] == [f"read as {read}" for _, read in FORMS]
-    assert help.hint("BR K1,P<R1+100").startswith("BR <label/address>[,<condition>]")
+    assert [LANGUAGE.hint(f"CL K1,{form}") for form, _ in FORMS] == [f"read as {read}" for _, read in FORMS]
+    assert LANGUAGE.hint("BR K1,P<R1+100").startswith("BR <label/address>[,<condition>]")
     for product in ("", "LMDCM", "MDI", "MDIX"):
         for word in ("BR", "CL"):
-            assert any("R1=1&MV as (R1=1)&MV" in line for line in help.describe(word, product)), (word, product)
+            assert any("R1=1&MV as (R1=1)&MV" in line for line in LANGUAGE.describe(word, product)), (word, product)
 
 
 # -- the simulated drive

@@ -4,12 +4,13 @@ import pytest
 
 from multidrop.base.errors import Diagnostic
 from multidrop.families.lexium.manual import help as mcode_help
+from multidrop.families.lexium.manual.help import LANGUAGE
 from multidrop.families.lexium.manual.table import MNEMONICS
 from tests.support.cases import for_each
 
 
 def test_help_on_a_variable_tells_all_about_it() -> None:
-    assert mcode_help.describe("vm") == [
+    assert LANGUAGE.describe("vm") == [
         "VM: Maximum velocity (variable)",
         "  velocity that moves go up to",
         "  syntax     VM=<velocity>, PR VM",
@@ -38,12 +39,12 @@ def test_help_on_a_variable_tells_all_about_it() -> None:
     ],
 )  # fmt: skip
 def test_help_says(word: str, line: str) -> None:
-    assert line in mcode_help.describe(word)
+    assert line in LANGUAGE.describe(word)
 
 
 @for_each("word", MNEMONICS)
 def test_there_is_help_on_every_word(word: str) -> None:
-    lines = mcode_help.describe(word)
+    lines = LANGUAGE.describe(word)
     assert lines[0].startswith(f"{word}: ") and len(lines) >= 3
     assert all(line == line.rstrip() and "None" not in line for line in lines)
 
@@ -53,26 +54,26 @@ def test_there_is_help_on_every_word(word: str) -> None:
 )
 def test_an_unknown_word_is_answered_with_what_was_perhaps_meant(word: str, meant: str) -> None:
     with pytest.raises(Diagnostic) as caught:
-        mcode_help.describe(word)
+        LANGUAGE.describe(word)
     assert word in caught.value.message and meant in caught.value.hint.replace(",", "").split()
 
 
 def test_an_unknown_word_that_looks_like_nothing_has_no_suggestion() -> None:
     with pytest.raises(Diagnostic) as caught:
-        mcode_help.describe("##")
+        LANGUAGE.describe("##")
     assert caught.value.hint == ""
 
 
 def test_completion_offers_words_with_their_meaning_in_order() -> None:
-    offered = mcode_help.complete("m")
+    offered = LANGUAGE.complete("m")
     assert [word for word, _ in offered] == ["MA", "MD", "MF", "MP", "MR", "MS", "MT", "MU", "MV"]
     assert dict(offered)["MA"] == MNEMONICS["MA"].meaning
-    assert [word for word, _ in mcode_help.complete("o1")] == ["O1"]
-    assert mcode_help.complete("zz") == []
+    assert [word for word, _ in LANGUAGE.complete("o1")] == ["O1"]
+    assert LANGUAGE.complete("zz") == []
 
 
 def test_completion_offers_neither_operators_nor_reserved_words() -> None:
-    words = [word for word, _ in mcode_help.complete("")]
+    words = [word for word, _ in LANGUAGE.complete("")]
     assert "SQ" in words and "D4" in words
     assert not {"FT", "PK", "I7", "+", "<="} & set(words)
 
@@ -86,7 +87,7 @@ def test_completion_offers_neither_operators_nor_reserved_words() -> None:
 )  # fmt: skip
 def test_a_hint_tells_syntax_and_meaning_of_the_leading_word(typed: str, about: str) -> None:
     row = MNEMONICS[about]
-    assert mcode_help.hint(typed) == f"{row.syntax}   {row.meaning}; manual {row.section}"
+    assert LANGUAGE.hint(typed) == f"{row.syntax}   {row.meaning}; manual {row.section}"
 
 
 @pytest.mark.parametrize(
@@ -94,16 +95,16 @@ def test_a_hint_tells_syntax_and_meaning_of_the_leading_word(typed: str, about: 
 )
 def test_a_hint_of_a_print_is_about_what_is_printed(typed: str, about: str) -> None:
     row = MNEMONICS[about]
-    assert mcode_help.hint(typed) == f"PR {about}   {row.meaning}; manual {row.section}"
+    assert LANGUAGE.hint(typed) == f"PR {about}   {row.meaning}; manual {row.section}"
 
 
 @pytest.mark.parametrize("typed", ["", "   ", "512", "Q1=3", "@", '"MR"', "I9"])
 def test_there_is_no_hint_where_nothing_is_known(typed: str) -> None:
-    assert mcode_help.hint(typed) == ""
+    assert LANGUAGE.hint(typed) == ""
 
 
 def test_text_in_quotation_marks_is_not_taken_for_words() -> None:
-    assert mcode_help.hint('PR "VM P') == mcode_help.hint("PR")
+    assert LANGUAGE.hint('PR "VM P') == LANGUAGE.hint("PR")
 
 
 @pytest.mark.parametrize(
@@ -119,18 +120,18 @@ def test_text_in_quotation_marks_is_not_taken_for_words() -> None:
     ],
 )
 def test_help_on_an_error_number_is_that_of_the_product(code: int, product: str, lines: list[str]) -> None:
-    assert mcode_help.describe_error(code, product) == lines
+    assert LANGUAGE.describe_error(code, product) == lines
 
 
 def test_without_a_product_each_family_is_told_that_has_the_number() -> None:
-    (only,) = mcode_help.describe_error(14)
+    (only,) = LANGUAGE.describe_error(14)
     assert only.startswith("error 14 (") and "LMM" in only and "LMD" not in only
 
 
 @pytest.mark.parametrize(("code", "product"), [(500, ""), (14, "LMDCM"), (104, "LMM"), (5, "LMDCM")])
 def test_a_number_that_a_product_does_not_have_is_told(code: int, product: str) -> None:
     with pytest.raises(Diagnostic, match=f"no error {code}"):
-        mcode_help.describe_error(code, product)
+        LANGUAGE.describe_error(code, product)
 
 
 @pytest.mark.parametrize(
@@ -147,7 +148,7 @@ def test_a_number_that_a_product_does_not_have_is_told(code: int, product: str) 
     ],
 )
 def test_help_says_what_the_numbers_and_codes_of_a_word_mean(word: str, parts: tuple[str, ...]) -> None:
-    told = "\n".join(mcode_help.describe(word, "LMDCM"))
+    told = "\n".join(LANGUAGE.describe(word, "LMDCM"))
     assert [part for part in parts if part not in told] == []
 
 
@@ -157,25 +158,25 @@ def test_further_lines_are_of_a_lexiums_words_and_begin_with_a_label(word: str) 
     assert all(each["text"] and set(each) == {"word", "label", "text"} for each in mcode_help.details()[word])
     if (own := mcode_help.MDRIVE.get(word)) is not None and own.products:
         texts = " ".join(each["text"] for each in mcode_help.details()[word])
-        assert texts.split(";")[0] not in "\n".join(mcode_help.describe(word, "MDIX"))
+        assert texts.split(";")[0] not in "\n".join(LANGUAGE.describe(word, "MDIX"))
 
 
 @pytest.mark.parametrize("topic", ["homing", "trip", "Trips", "PARTY", "checksum"])
 def test_a_topic_says_what_several_words_do_together(topic: str) -> None:
-    first, *lines = mcode_help.describe(topic)
-    assert first == f"{topic.lower().removesuffix('s')} (topic)" and len(lines) >= 4 and mcode_help.knows(topic)
+    first, *lines = LANGUAGE.describe(topic)
+    assert first == f"{topic.lower().removesuffix('s')} (topic)" and len(lines) >= 4 and LANGUAGE.knows(topic)
     more = lines[-1].split("help ")[1].split(" says")[0].split(", ")
     assert all(word in MNEMONICS for word in more)
 
 
 def test_an_error_with_a_meaning_of_its_own_in_a_family_has_its_own_remedy() -> None:
-    assert mcode_help.describe_error(94) == [
+    assert LANGUAGE.describe_error(94) == [
         "error 94 (LMD, LMM): the drive is disabled",
         "  do         DE=1 enables it; with hMT, CF after a locked rotor (104)",
         "error 94 (MDI): CF not while moving",
         "  do         stop first (SL 0), then try again",
     ]
-    assert mcode_help.describe_error(94, "MDIE") == [
+    assert LANGUAGE.describe_error(94, "MDIE") == [
         "error 94: CF not while moving",
         "  do         stop first (SL 0), then try again",
     ]

@@ -10,7 +10,7 @@ import pytest
 from multidrop.base.errors import Diagnostic
 from multidrop.dialects.families import FAMILIES
 from multidrop.families.lexium.manual.help import ACCESS
-from multidrop.families.lexium.manual.modbus import help
+from multidrop.families.lexium.manual.modbus.help import LANGUAGE
 from multidrop.families.lexium.manual.modbus.registers import AT, REGISTERS, ROWS
 from tests.support.cases import for_each
 from tests.support.paths import FACTS
@@ -20,7 +20,7 @@ TABLE_OF_FACTS = FACTS / "modbus-registers.csv"
 
 def facts(word: str, product: str = "LMDCE") -> dict[str, str]:
     """The lines of a help page by their labels."""
-    lines = [line for line in help.describe(word, product) if re.match(r"  \S.{9} \S", line)]
+    lines = [line for line in LANGUAGE.describe(word, product) if re.match(r"  \S.{9} \S", line)]
     return {line[2:12].strip(): line[13:] for line in lines}
 
 
@@ -59,16 +59,16 @@ def test_the_help_on_every_name_agrees_with_the_manual() -> None:
 @for_each("address", AT)
 def test_a_register_has_help_by_its_address(address: int) -> None:
     row = AT[address]
-    first, *rest = help.describe(f"0x{address:x}", "LMDCE")
+    first, *rest = LANGUAGE.describe(f"0x{address:x}", "LMDCE")
     assert first.startswith(f"0x{address:04X} is the ") and first.endswith(f" of {row.name}")
-    assert rest == help.describe(row.name, "LMDCE")
-    assert help.knows(f"0x{address:04X}") and help.knows(f"0X{address:x}")
+    assert rest == LANGUAGE.describe(row.name, "LMDCE")
+    assert LANGUAGE.knows(f"0x{address:04X}") and LANGUAGE.knows(f"0X{address:x}")
 
 
 @pytest.mark.parametrize("address", [0x02, 0x23, 0xA2, 0xB8, 0xFFFF])
 def test_a_reserved_register_is_said_to_be_none(address: int) -> None:
     with pytest.raises(Diagnostic, match=rf"no register 0x{address:04X} in the map"):
-        help.describe(f"0x{address:X}")
+        LANGUAGE.describe(f"0x{address:X}")
 
 
 @pytest.mark.parametrize(
@@ -103,24 +103,24 @@ def test_help_says(name: str, label: str, text: str) -> None:
 
 def test_no_page_speaks_of_what_modbus_cannot_do() -> None:
     for name in REGISTERS:
-        text = "\n".join(help.describe(name, "LMDCE"))
+        text = "\n".join(LANGUAGE.describe(name, "LMDCE"))
         assert "<operator>" not in text and "BR <" not in text and "in programs" not in text, text
 
 
-@for_each("name", help.names())
+@for_each("name", LANGUAGE.names())
 def test_every_name_has_help(name: str) -> None:
-    lines = help.describe(name, "LMDCE")
-    assert help.knows(name.lower()) and lines[0].startswith(f"{name}: ") and "None" not in "".join(lines)
+    lines = LANGUAGE.describe(name, "LMDCE")
+    assert LANGUAGE.knows(name.lower()) and lines[0].startswith(f"{name}: ") and "None" not in "".join(lines)
 
 
 def test_a_word_of_another_product_is_not_known() -> None:
-    assert not help.knows("S1") and not help.knows("GAS") and not help.knows("0x")
+    assert not LANGUAGE.knows("S1") and not LANGUAGE.knows("GAS") and not LANGUAGE.knows("0x")
     with pytest.raises(Diagnostic, match="no mnemonic 'VMM'"):
-        help.describe("VMM")
+        LANGUAGE.describe("VMM")
 
 
 def test_completion_offers_only_what_modbus_carries() -> None:
-    offered = [name for name, _ in help.complete("", "LMDCE")]
+    offered = [name for name, _ in LANGUAGE.complete("", "LMDCE")]
     assert {"P", "IS", "EX", "E", "PR", "SN"} <= set(offered) and not {"UV", "CK", "PG", "VA"} & set(offered)
 
 
@@ -135,8 +135,8 @@ def test_completion_offers_only_what_modbus_carries() -> None:
     ],
 )
 def test_the_hint_names_the_register(text: str, end: str) -> None:
-    assert help.hint(text, "LMDCE").endswith(end)
+    assert LANGUAGE.hint(text, "LMDCE").endswith(end)
 
 
 def test_the_family_has_this_help() -> None:
-    assert FAMILIES["modbus"].language is help
+    assert FAMILIES["modbus"].language is LANGUAGE
