@@ -10,7 +10,7 @@ from multidrop.base.errors import Diagnostic
 from multidrop.base.files import split_lines
 from multidrop.dialects.editing import Block, EditingLanguage, Offer, Span, Use, UserName, Word, collected, last_line
 from multidrop.families.lexium.manual.grammar import NAME_FORM, Token, divided, is_name, statement_tokens, tokens
-from multidrop.families.lexium.manual.groups import EVERY_PLACE
+from multidrop.families.lexium.manual.groups import EVERY_PLACE, TURNING
 from multidrop.families.lexium.manual.help import LANGUAGE, rows_offered
 from multidrop.families.lexium.manual.mnemonic import EVERY, Mnemonic
 from multidrop.families.lexium.manual.program_file import LONGEST, ProgramLine, bare, remark_at, scan
