@@ -121,8 +121,7 @@ def _of_instruction(row: Mnemonic, statement: Statement, value: int | None) -> E
             return Effect(begins=(Move(MoveKind.POSITION, AXIS, absolute, relative),))
         case Motion.SLEW if value == 0:
             return Effect(ends=ONLY)
-        case Motion.SLEW:
-            # A velocity that is not a number may be 0.
+        case Motion.SLEW:  # a velocity that is not a number may be 0
             return Effect(begins=(Move(MoveKind.VELOCITY, AXIS, endless=value is not None),))
         case Motion.HOMING if statement.arguments:
             return Effect(begins=(Move(MoveKind.HOMING, AXIS),))
@@ -134,7 +133,7 @@ def _of_instruction(row: Mnemonic, statement: Statement, value: int | None) -> E
             return Effect(halts=True)
         case Motion.RELEASE:
             return Effect(clears=True)
-        case Motion.RESUME:  # what was paused goes on, perhaps to another target
+        case Motion.RESUME:  # what PS has paused goes on, perhaps to another target
             return Effect(unknown=ONLY, resumes=True)
     return None
 

@@ -281,7 +281,7 @@ class Steps:
 
 
 MDRIVE_COUNTS = 2048
-"""Encoder counts in a turn of an MDrivePlus; EE=1 needs a VI of one count or more (error 90)."""
+"""Encoder counts in a turn of an MDrivePlus with its own encoder; EE=1 needs a VI of one count or more (error 90)."""
 STEPS_PER_TURN = 200
 """Full steps."""
 
@@ -348,7 +348,8 @@ def _enter_counts(steps: Steps) -> None:
         return
     slowest, resolution = steps.number("VI"), steps.number("MS")
     if steps.product in MDRIVE_PLUS and resolution is not None:
-        least = ceil(resolution * STEPS_PER_TURN / MDRIVE_COUNTS)
+        lines = steps.number("EL")  # of a unit with expanded I/O
+        least = ceil(resolution * STEPS_PER_TURN / (4 * lines if lines else MDRIVE_COUNTS))
         if slowest is None or slowest < least:
             fastest = steps.number("VM")
             if fastest is None or fastest <= least:

@@ -40,6 +40,19 @@ def steps(product, wanted, *present, named=(), program=PROGRAM):
     return [change.text for change in plan], dict(plan.withheld + plan.impossible)
 
 
+@pytest.mark.parametrize(
+    ("present", "sent"),
+    [
+        (("EL=60", "VI=30"), ["VI=214", "EE=1"]),
+        (("EL=60", "VI=214"), ["EE=1"]),
+        (("EL=6000", "VI=3"), ["EE=1"]),
+        (("VI=20",), ["VI=25", "EE=1"]),
+    ],
+)
+def test_counting_begins_with_a_velocity_of_one_count_of_the_encoder_that_there_is(present, sent):
+    assert steps("MDIX", {"EE": 1}, *present, named=("EE",)) == (sent, {})
+
+
 @examples(25, nightly=600)
 @given(st.randoms(use_true_random=False), st.sampled_from(PRODUCTS))
 def test_no_step_between_any_two_settings_is_refused(random, product):
