@@ -249,7 +249,7 @@ def _kind(annotation: Any, scope: Mapping[str, Any], where: str) -> tuple[Any, A
     if isinstance(annotation, str):
         try:
             annotation = eval(annotation, dict(scope))
-        except Exception as problem:  # whatever an annotation raises, it is one that cannot be read
+        except (NameError, AttributeError, SyntaxError, TypeError, LookupError, ValueError) as problem:
             raise Diagnostic(f"the type of {where} cannot be read: {problem}") from None
     argument = NO_ARGUMENT
     if get_origin(annotation) is Annotated:
