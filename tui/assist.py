@@ -122,6 +122,7 @@ class Assist:
         """Import what the first typed letter needs, in a thread; the rest depends on the drive and is less."""
         await asyncio.to_thread(imported, "multidrop.shell.prompt.complete:complete")
         await asyncio.to_thread(imported, "multidrop.shell.verbs.work:ALL")
+        await asyncio.to_thread(lambda: [*imported("multidrop.shell.operations.table:VERBS")])
         self.hint(ANY_LETTER)
         self.complete(ANY_LETTER)
 

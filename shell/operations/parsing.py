@@ -95,6 +95,8 @@ class LineParser(argparse.ArgumentParser):
         super().__init__(add_help=False, allow_abbrev=False, exit_on_error=False)
         self._rest = next((each for each in parameters if each.argument.rest), None)
         self._parameters = parameters
+        self._words: list[str] = []
+        """The words that are parsed."""
         add_parameters(self, [each for each in parameters if each is not self._rest], OnceFlag)
 
     def line(self, text: str, where: str) -> dict[str, Any]:
@@ -116,6 +118,7 @@ class LineParser(argparse.ArgumentParser):
                 raise WrongWords(str(wrong)) from None
         else:
             words = split(text, where)
+        self._words = words
         try:
             found = self.parse_intermixed_args(words)
         except argparse.ArgumentError as wrong:
@@ -124,9 +127,15 @@ class LineParser(argparse.ArgumentParser):
 
     def error(self, message: str) -> NoReturn:
         """Raise WrongWords for words that are missing, or too many."""
-        beyond = message.partition("unrecognized arguments: ")[2].split()
-        option = next((each for each in beyond if each.startswith("-")), "")
+        beyond = message.partition("unrecognized arguments: ")[2].split() or self._words
+        option = next((each for each in beyond if self._is_unknown(each)), "")
         raise WrongWords(f"no option {option.partition('=')[0]}" if option else "")
+
+    def _is_unknown(self, word: str) -> bool:
+        """Whether a word looks like an option, and is none of these."""
+        known = {name for each in self._parameters if each.option for name in each.names}
+        looks = len(word) > 1 and word.startswith("-") and not self._negative_number_matcher.match(word)
+        return looks and word.partition("=")[0] not in known
 
 
 def _in_words(wrong: argparse.ArgumentError) -> str:

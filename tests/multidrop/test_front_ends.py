@@ -15,7 +15,6 @@ from typing import Any
 import pytest
 
 from multidrop.__main__ import main
-from multidrop.cli import parse
 from multidrop.shell.batch.virtual_loop import VirtualLoop
 from multidrop.transports.serial_ports import PortInfo
 from tests.support.cases import for_each
@@ -50,8 +49,8 @@ def test_the_screen_gets_urls_and_options(person: Person, words: list[str], give
         screen = Called(7)
         patched.setattr("multidrop.tui.launch.run", screen)
         assert person(*words) == Done(7, "", "")
-    [(*urls_and_more, prepare, around)] = screen.calls
-    assert tuple(urls_and_more) == given and callable(prepare) and callable(around)
+    [(urls, *more, prepare, around)] = screen.calls
+    assert ([*urls], *more) == given and callable(prepare) and callable(around)
 
 
 @for_each("closed", ["stdin", "stdout"])
@@ -77,7 +76,7 @@ def test_the_prompt_gets_urls_and_options(person: Person, words: list[str], give
         assert person("shell", "a", "b", *words).returncode == 6
     usual = {"reconnect": True, "agreed": False, "beyond": False, "raw": False}
     [(urls, named)] = prompt.calls
-    assert callable(named.pop("prepare")) and (urls, named) == (["a", "b"], usual | given)
+    assert callable(named.pop("prepare")) and ([*urls], named) == (["a", "b"], usual | given)
 
 
 @pytest.fixture
@@ -117,6 +116,7 @@ def test_a_poll_gets_its_arguments(multidrop: Command, words: list[str], given: 
         patched.setattr("multidrop.shell.plots.poll.poll", poll)
         assert multidrop("poll", "sim:", *words).returncode == 9
     [(url, asked, named)] = poll.calls
+    asked = ([*asked[0]], *asked[1:])
     assert url == "sim:" and (*asked, named["reconnect"]) == (given[0], given[1], given[2], asked[3], *given[4:])
     assert (asked[3] or 0) == given[3]
 
@@ -139,7 +139,7 @@ def test_a_cell_is_served_as_its_options_say(
     own = (tmp_path / "own.mxt",)
     given = [Path(each).resolve() for each in (Path.cwd() / "x",)]
     assert calls[:2] == [
-        (parse(["sim"]).cell, {"json": False, "speed": 1.0, "allow": ()}),
+        (None, {"json": False, "speed": 1.0, "allow": ()}),
         ("a.toml", {"json": True, "speed": 3.0, "allow": own}),
     ]
     assert [Path(each).resolve() for each in calls[2][1]["allow"]] == given, "the demo cell needs no configuration"

@@ -108,7 +108,7 @@ def frames(data):
 
 
 REFUSED = [
-    ("@a R1={1 mm}", "no quantity is taken here; nothing was sent; valid: MA, MR"),
+    ("@a R1={1 mm}", "no quantity is taken here; nothing was sent; valid: A, D, MA, MR"),
     ("@a MR {1 mm}+{1 mm}", "no quantity is taken here"),
     ("@a PR {1 mm}", "no quantity is taken here"),
     ("@a MR {3 deg}", "the scale of the axis is 5 mm/turn; nothing was sent"),

@@ -30,7 +30,7 @@ async def test_what_moves_is_found_by_a_quick_look_and_what_does_not_answer_is_n
         found = await shop.session.in_motion()
         assert shop.session.now() - begun <= 2.0
         assert found[0] == "press:a moves at 5000 a second"
-        assert found[1] == "press:c is not known: last seen standing 6 s ago"
+        assert found[1] == "press:c is not known: last seen standing 7 s ago"
         assert found[2] == "line:d is not known: started 6 s ago and not read since"
         assert found[3].startswith("stages:00 moves at ") and len(found) == 4
 

@@ -47,8 +47,8 @@ async def test_a_renamed_bus_is_known_by_its_new_name_everywhere(session):
     [
         ("/rename eth", "a bus eth is open already"),
         ("/rename a:b", "is not a name"),
-        ("/rename -b", "is not a name"),
-        ("/keep -b", "not a name"),
+        ("/rename -b", "no option -b; usage: /rename NAME"),
+        ("/keep -b", "no option -b; usage: /keep NAME"),
         ("/rename new nosuch", "no bus nosuch"),
         ("/rename", "usage: /rename NAME"),
         ("/tab up", "usage: /tab left|right"),
