@@ -142,13 +142,15 @@ FIXED = {
     8000715: "a stop of the computer that lends the port, soon after one of its client (of the simulation itself)",
     300197: "the stop of an early end that was owed after a loss, which failed for a controller and a module",
     300003: "a stop of a half-sent line, which another key met on its way (of the simulation itself)",
-    300935: "a slow disk that kept the thread from writing the rest of a stop (of the simulation itself)",
+    300935: "a slow disk that kept the thread from writing the rest of a stop, and a key behind a stop that was "
+    "owed after a loss (of the simulation itself)",
     301438: "a move into a limit that is active, whose error may be another motion's (of the simulation itself)",
     15371770: "the same, refused with a NAK on a line with a checksum (of the simulation itself)",
     12867803: "a stop behind that of a key that came as its line was being opened (of the simulation itself)",
     301731: "two lines that ask, the same, of which the first was agreed to (of the simulation itself)",
     300170: "a stop on a line that was lost again as it came back (of the simulation itself)",
     8002337: "a stop of which a loop that was held up sent the other controllers nothing for four seconds",
+    16408372: "a value that another drive's late reply to a mark cut in two (of the simulation itself)",
 }
 EVERY = range(1, 21)
 """Seeds of every run. `make mutants` lives the same."""

@@ -17,13 +17,14 @@ from soak.languages import LANGUAGES
 from soak.simulation import living, shrinking, story, world
 from soak.simulation.__main__ import main
 from soak.simulation.acts.act import Act
+from soak.simulation.judges.departures import under_way
 from soak.simulation.judges.judge import RULES, Judgement, broken
 from soak.simulation.judges.outcomes import OUTCOMES
 from soak.simulation.judges.rule import Granted, Rule
 from soak.simulation.living import lived
 from soak.simulation.records.climate import FAULTS
 from soak.simulation.records.commands import Command, Outcome
-from soak.simulation.records.history import Damage, Executed, Held, History, Shown
+from soak.simulation.records.history import Damage, Executed, Held, History, Shown, Stop
 from soak.simulation.records.places import Place
 from soak.simulation.records.told import Fact
 from soak.simulation.runs import STEPS, derived, lives, result, run
@@ -230,6 +231,45 @@ def test_a_datagram_that_arrives_late_or_twice_is_granted(what: History) -> None
     assert each.grant.name == "a datagram that arrives twice or late"
     [[each]] = found(what, 1, (9.0, "l.plant"), (5.2, "m.plant"), (1.2, "m.plant")).values()
     assert isinstance(each, str)
+
+
+@pytest.mark.parametrize("late", [b'PR "~41",DN\r\n~41"b"\r\n', b'PR R1,DN\r\nv70000003"b"\r\n', b"50000001\r\n"])
+def test_a_value_that_another_print_cut_in_two_is_granted_without_a_checksum(late: bytes) -> None:
+    history = shown("0002")
+    history.received["l"] = [(5.5, b"PR R1,DN\r\nv7000" + late + b'0002"a"\r\n')]
+    [[each]] = found(history, checksum=0).values()
+    assert isinstance(each, Granted)
+    assert each.grant.name == "a damaged value without a checksum"
+    [[each]] = found(history).values()
+    assert isinstance(each, str)
+
+
+@pytest.mark.parametrize("heard", [b'v70000002"a"\r\n', b'v7000PR "~41",DN\r\n0002"a"\r\n', b'0002"a"\r\n'])
+def test_the_end_of_a_value_that_nothing_cut_in_two_is_a_breach(heard: bytes) -> None:
+    history = shown("0002")
+    history.received["l"] = [(4.5, b'PR "~41",DN\r\n~41"b"\r\n'), (5.5, b"PR R1,DN\r\n" + heard)]
+    [[each]] = found(history, checksum=0).values()
+    assert isinstance(each, str)
+
+
+@pytest.mark.parametrize(
+    ("back", "said", "begun"),
+    [
+        (9.5, "l0: the stop of 1, 2 was sent first (the loss kept it from the drives)", True),
+        (5.0, "l0: the stop of 1, 2 was sent first (the loss kept it from the drives)", False),
+        (9.5, "l1: the stop of 1, 2 was sent first (the loss kept it from the drives)", False),
+        (9.5, "l0 is back after 6.8 s", False),
+    ],
+)
+def test_a_key_goes_on_with_a_stop_that_a_line_was_owed(back: float, said: str, begun: bool) -> None:
+    """The key that it is from is long ago. Without a loss it is a stop of an automation, which holds up no key."""
+    own = {"l0": (1, 0)}
+    stop = Stop(10.0, {"l0": (b"stop",)}, written=1, own=own, parts={"l0": (b"stop",)})
+    history = History(stops=[Stop(1.0, {}), stop], written=[(9.9, "l0", b"stop")])
+    history.opened.append((back, "l0", 0))
+    history.notices.append((back, said))
+    world: Any = SimpleNamespace(history=history, place=lambda line: Place("l0", "tmcl", ("1",), 1, 0, 9600, True))
+    assert under_way(world, "l0", stop) is begun
 
 
 def test_with_a_checksum_noise_alone_excepts_nothing() -> None:

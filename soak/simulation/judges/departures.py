@@ -152,9 +152,10 @@ def _written(life: Lived, line: str, index: int) -> bytes:
 def under_way(life: Lived, line: str, stop: Stop) -> bool:
     """Whether a person's stop before it is on its way to the drives: then this one goes on with that.
 
-    A stop of an automation, of some drives, is none.
+    A stop that was owed to a lost line, and left as it came back, is one. That of an automation, of some drives, is
+    none.
     """
-    before = any(
+    before = _after_a_loss(life, line, stop) or any(
         each is not stop and each.at <= stop.at and (line in each.lost or each.at >= stop.at - STILL)
         for each in life.history.stops
     )
@@ -170,6 +171,13 @@ def under_way(life: Lived, line: str, stop: Stop) -> bool:
             known = before and any(_is_stop(each, line, left) for each in (stop, *earlier))
             return known or _of_an_opening(life, line, stop, left)
     return bool(earlier)  # nothing of it has left yet
+
+
+def _after_a_loss(life: Lived, line: str, stop: Stop) -> bool:
+    """Whether a line came back right before a stop, and is said to have got one first, which it was owed."""
+    history, said = life.history, re.compile(rf"{line[:2]}: the stop of .* was sent first")
+    back = any(name == line and stop.at - STILL <= at <= stop.at for at, name, _ in history.opened)
+    return back and any(at <= stop.at and said.match(text) for at, text in history.notices)
 
 
 def _of_an_opening(life: Lived, line: str, stop: Stop, left: bytes) -> bool:

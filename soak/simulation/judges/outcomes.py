@@ -26,6 +26,8 @@ AFTER = 2.0
 
 PRINTED = re.compile(rb"(?:tick )?5\d{7}\r\n")
 """A line of the program that prints: see `soak.languages.PROGRAM`."""
+LATE = re.compile(rb'PR [^\r\n]*\r\n[^\r\n]*"\w"\r\n')
+"""A whole reply of MCode and the repetition of its question, which is not at the head of a line that it met."""
 PROMPTLY = 0.1
 """The longest time, s, from a datagram's arrival to its execution."""
 OUTAGE = 10.0
@@ -350,9 +352,13 @@ def _endings(history: History, shown: Shown) -> list[bytes]:
 
 
 def _divided(history: History, shown: Shown, heard: bytes) -> bool:
-    """Whether another drive's program printed while the value came, so that what was shown is its end."""
-    whole = PRINTED.sub(b"", heard)
-    return any(each in whole and each not in heard for each in _endings(history, shown))
+    """Whether another drive printed while the value came, so that what was shown is its end.
+
+    It was a program's print, or a late reply.
+    """
+    wholes = [each.sub(b"", heard) for each in (PRINTED, LATE)]
+    endings = _endings(history, shown)
+    return any(each in whole and each not in heard for whole in wholes for each in endings)
 
 
 def _overtaken(life: Lived, shown: Shown) -> bool:
