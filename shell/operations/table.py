@@ -10,7 +10,6 @@ import re
 from argparse import ArgumentParser
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import cache, cached_property
-from itertools import chain
 from typing import TypeVar
 
 from multidrop.base import registry
@@ -21,18 +20,13 @@ from multidrop.shell.operations.operation import Operation
 from multidrop.shell.operations.parsing import LineParser
 from multidrop.shell.operations.verb import Verb
 
-VERB_GROUPS = {
-    "Stop and end": "/stop /resume /quit /exit",
-    "Lines and drives": "/open /close /use /drives /scan /status /units /referenced /rename /tab /keep",
-    "Settings and values": "/params /snapshot /plot /register /coil /device",
-    "Programs of drives": "/check /download /upload /list /trace /step /continue /break /watch",
-    "Macros": "/macros /macro /record /play /key",
-    "Waits": "/wait /sleep",
-    "Bytes": "/raw /hex /bytes",
-    "The session and its screen": "/help /clear /log /page /tour /times /filter /save /unsent",
-    "Simulated drives": "/sim",
-}
-"""The verbs in the order and the groups of `/help`."""
+VERB_ORDER = """/stop /resume /quit /exit
+    /open /close /use /drives /scan /status /units /referenced /rename /tab /keep
+    /params /snapshot /plot /register /coil /device
+    /check /download /upload /list /trace /step /continue /break /watch
+    /macros /macro /record /play /key
+    /wait /sleep /raw /hex /bytes
+    /help /clear /log /page /tour /times /filter /save /unsent /sim"""
 COMMAND_ORDER = """demo tui shell send run sim program params macro poll snapshot ports relay scan rescue
     log config features help report completion"""
 _VERB = re.compile(r"/[a-z][a-z0-9-]*")
@@ -80,17 +74,18 @@ class Declared(Mapping[str, D]):
         self._order, self._by_name, self._extended, self._named = order, by_name, extended, named
 
     @cached_property
-    def _core(self) -> Mapping[str, D]:
+    def of_core(self) -> Mapping[str, D]:
+        """The core's operations by name, without what features add."""
         return self._by_name(core())
 
     @cached_property
     def core_names(self) -> Sequence[str]:
         """The names of the core's operations."""
-        return list(dict.fromkeys((*(each for each in self._order if each in self._core), *self._core)))
+        return list(dict.fromkeys((*(each for each in self._order if each in self.of_core), *self.of_core)))
 
     def __getitem__(self, name: str) -> D:
-        if name in self._core:
-            return self._extended(self._core[name])
+        if name in self.of_core:
+            return self._extended(self.of_core[name])
         feature = registry.with_word(name)
         for each in (feature,) if feature is not None else registry.by_others():
             if (found := self._added(each).get(name)) is not None:
@@ -148,7 +143,7 @@ def _with_forms(verb: Verb) -> Verb:
     return verb.extended(added) if added else verb
 
 
-VERBS: Declared[Verb] = Declared(" ".join(VERB_GROUPS.values()).split(), _verbs, _with_forms, _VERB)
+VERBS: Declared[Verb] = Declared(VERB_ORDER.split(), _verbs, _with_forms, _VERB)
 """By name, in the order of `/help`."""
 COMMANDS: Declared[Operation] = Declared(COMMAND_ORDER.split(), _commands, lambda each: each, _COMMAND)
 """By their words, in the order of `--help`; the parts of a group after it."""
@@ -167,15 +162,16 @@ def script_verb(name: str) -> Operation | None:
 
 
 def groups() -> dict[str, list[str]]:
-    """The verbs by the titles of `/help`, those of features among them."""
-    found = {title: names.split() for title, names in VERB_GROUPS.items()}
-    added = dict[str, dict[str, str]]()
-    for name in set(VERBS) - set(chain.from_iterable(found.values())):
-        operation = VERBS[name]
-        added.setdefault(operation.group or BY_OTHERS, {})[name] = operation.after
+    """The verbs by the titles of `/help`, those of features among them; titles in the order of their first verbs."""
+    core: dict[str, list[str]] = {}
+    for name in VERBS.core_names:
+        core.setdefault(VERBS.of_core[name].group, []).append(name)
+    added: dict[str, dict[str, str]] = {}
+    for name in set(VERBS) - set(VERBS.core_names):
+        added.setdefault(VERBS[name].group or BY_OTHERS, {})[name] = VERBS[name].after
     for title, after in added.items():
-        registry.place(dict(sorted(after.items())), found.setdefault(title, []))
-    return found
+        registry.place(dict(sorted(after.items())), core.setdefault(title, []))
+    return core
 
 
 def _wrong(added: Sequence[Operation]) -> str:

@@ -332,3 +332,9 @@ def test_an_option_that_another_form_has_is_not_called_unknown() -> None:
         verb.parsed("--fast")
     with pytest.raises(Diagnostic, match="^/z: no option --other; usage: /z FILE"):
         verb.parsed("--other")
+
+
+def test_every_verb_of_the_core_is_in_the_group_that_it_names_also_where_a_feature_adds_forms():
+    listed = {name: title for title, names in table.groups().items() for name in names}
+    assert listed["/plot"] == "Settings and values"
+    assert all(listed[name] == verb.group != "" for name, verb in table.VERBS.of_core.items())
