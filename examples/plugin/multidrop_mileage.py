@@ -8,9 +8,9 @@ from typing import Annotated, Any
 from multidrop.base.errors import Diagnostic
 from multidrop.base.feature import Feature
 from multidrop.drives.events import Restarted, Sample
+from multidrop.shell.at_session import AtSession
 from multidrop.shell.batch.runner import run
 from multidrop.shell.events import Entered
-from multidrop.shell.hooks import AtSession
 from multidrop.shell.operations.argument_types import Address, Url
 from multidrop.shell.operations.operation import Operation
 from multidrop.shell.operations.parameter import Argument

@@ -18,16 +18,16 @@ from typing import Any
 from multidrop.base import new_file
 from multidrop.base.errors import Diagnostic, DriveError, NoAnswer, Refused, Stopped, TransportLost
 from multidrop.base.files import escaped_toml, text_of, toml_of
-from multidrop.base.on_demand import imported
 from multidrop.base.text import counted
 from multidrop.dialects.certifying import BYTES, FITS, MOVES, Certifying, Occupied, Question
 from multidrop.dialects.owed_settings import owed, restored
 from multidrop.drives.conversations import refuse_stranger
 from multidrop.drives.drive import Drive
 from multidrop.drives.events import Concluded, Transaction
+from multidrop.shell import travel
 from multidrop.shell.channel import running
 from multidrop.shell.events import By
-from multidrop.shell.session import TRAVEL, Session
+from multidrop.shell.session import Session
 from multidrop.shell.waits import wait
 
 HEAD = (
@@ -307,7 +307,7 @@ class Asking:
             await asyncio.sleep(float(line.removeprefix(SLEEP)))
             return DONE
         if question.does == MOVES and session.scaled:
-            await imported(TRAVEL)(session.units, drive, line, By.OPERATOR)
+            await travel.ask(session.units, drive, line, By.OPERATOR)
         taken: list[Transaction] = []
 
         def note(concluded: Concluded) -> None:

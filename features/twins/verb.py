@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from multidrop.base.errors import Diagnostic
 from multidrop.features.twins.twins import Twins
-from multidrop.shell.verbs.call import Call
+from multidrop.shell.session import Call
 
 
 def list_twins(call: Call) -> None:

@@ -14,7 +14,7 @@ from multidrop.shell.operations.parameter import Argument, Listed
 
 if TYPE_CHECKING:
     from multidrop.drives.drive import Drive
-    from multidrop.shell.verbs.call import Call
+    from multidrop.shell.session import Call
 
 GROUP = "Lines and drives"
 NewBusName = Annotated[str, Argument(metavar="NAME")]

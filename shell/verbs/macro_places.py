@@ -10,7 +10,7 @@ from multidrop.base.errors import Diagnostic
 
 if TYPE_CHECKING:
     from multidrop.macros import MacroStore
-    from multidrop.shell.verbs.call import Call
+    from multidrop.shell.session import Call
 
 
 class Macros:

@@ -20,7 +20,7 @@ from multidrop.shell.operations.parameter import Argument, Listed
 from multidrop.shell.verbs.macro_places import AtTerminal, Macros, at_terminal, changing
 
 if TYPE_CHECKING:
-    from multidrop.shell.verbs.call import Call
+    from multidrop.shell.session import Call
 
 GROUP = "Macros"
 NewName = Annotated[str, Argument("the other name", metavar="NAME")]

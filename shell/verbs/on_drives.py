@@ -15,8 +15,7 @@ from multidrop.shell.operations.argument_types import Address, Drives, DrivesOfF
 if TYPE_CHECKING:
     from multidrop.drives.drive import Drive
     from multidrop.shell.events import By
-    from multidrop.shell.session import Session
-    from multidrop.shell.verbs.call import Call
+    from multidrop.shell.session import Call, Session
 
 Work = Callable[["Session"], Awaitable["int | None"]]
 """What is done in a session; it returns the exit code of a good end, where that is not 0."""

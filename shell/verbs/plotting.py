@@ -11,8 +11,7 @@ from multidrop.shell.events import By
 from multidrop.shell.plots.series import parse_series, read_first
 
 if TYPE_CHECKING:
-    from multidrop.shell.session import Session
-    from multidrop.shell.verbs.call import Call
+    from multidrop.shell.session import Call, Session
 
 
 def say(session: Session) -> None:

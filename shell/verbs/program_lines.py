@@ -18,7 +18,7 @@ from multidrop.shell.line_syntax import split_target
 from multidrop.shell.programs import debugging
 from multidrop.shell.programs.checking import examine
 from multidrop.shell.programs.debugging import LEFT, Debugger
-from multidrop.shell.verbs.call import Call
+from multidrop.shell.session import Call
 from multidrop.simulator.declared import simulated
 from multidrop.simulator.families import PROGRAMS
 

@@ -15,7 +15,7 @@ from multidrop.shell.operations.parameter import Argument
 if TYPE_CHECKING:
     from multidrop.shell import raw
     from multidrop.shell.raw import RawLine
-    from multidrop.shell.verbs.call import Call
+    from multidrop.shell.session import Call
 
 GROUP = "Bytes"
 BREAK = 250

@@ -13,7 +13,7 @@ from multidrop.shell.roles import EVERYTHING, TIMES, Filter
 
 if TYPE_CHECKING:
     from multidrop.shell.roles import Transcripts
-    from multidrop.shell.verbs.call import Call
+    from multidrop.shell.session import Call
 
 STOPS, SCREEN = "Stop and end", "The session and its screen"
 Word = Annotated[str, Argument(metavar="WORD|NUMBER", listed=(Listed.WORD,))]

@@ -27,8 +27,7 @@ from multidrop.shell.verbs.on_drives import (
 )
 
 if TYPE_CHECKING:
-    from multidrop.shell.session import Session
-    from multidrop.shell.verbs.call import Call
+    from multidrop.shell.session import Call, Session
 
 GROUP = "Settings and values"
 NewFile = Annotated[str, Argument("the new file; -: standard output", metavar="FILE", listed=(Listed.FILE,))]

@@ -1,8 +1,8 @@
 """What the acts at the prompt come to, watched where each line and each verb of a session passes.
 
-Typed lines and those of macros and scripts go one way (`Session.run`, `LinePath`). Here each is told from the other: a
-line for a drive in program mode is stored, a text for a line in raw mode is only written, and a verb that works by
-itself has an end, after which its drives are looked at.
+Typed lines and those of macros and scripts go one way (`Session.run`, then `LinePath` or `VerbPath`). Here each is told
+from the other: a line for a drive in program mode is stored, a text for a line in raw mode is only written, and a verb
+that works by itself has an end, after which its drives are looked at.
 """
 
 from __future__ import annotations
@@ -14,8 +14,9 @@ from typing import TYPE_CHECKING, Any
 
 from multidrop.base.errors import Diagnostic, DriveError
 from multidrop.shell.events import By
+from multidrop.shell.line_path import LinePath
 from multidrop.shell.line_syntax import DriveLine, VerbLine
-from multidrop.shell.session import LinePath
+from multidrop.shell.session import VerbPath
 from soak.simulation.records.history import Executed
 from soak.simulation.records.phrases import PHRASES
 from soak.simulation.records.told import Put, Run
@@ -40,17 +41,8 @@ class WatchedPath(LinePath):
     """The way of the lines of a session, watched."""
 
     def __init__(self, session: Session, world: World) -> None:
-        super().__init__(session)
+        super().__init__(session, session.automations, session.units)
         self._world = world
-
-    async def verb(self, parsed: VerbLine, by: By) -> None:
-        """Run a verb; one that works by itself has an end."""
-        told = self._world.history.told
-        if parsed.name == "/resume":
-            told.latches.append((self._world.loop.now, False))
-        run = told.runs.get(parsed.typed.strip())
-        work = super().verb(parsed, by)
-        await (work if run is None else watched(self._world, run, work))
 
     async def text(self, parsed: DriveLine, by: By) -> None:
         """Pass a text on; note it where it is stored, or written as it is."""
@@ -65,7 +57,7 @@ class WatchedPath(LinePath):
             put.sent = True
 
     def _put(self, parsed: DriveLine) -> Put | None:
-        session, history = self._session, self._world.history
+        session, history = self._workspace, self._world.history
         typed = parsed.typed.strip()
         with contextlib.suppress(Diagnostic, DriveError):
             bus = session.bus(parsed.bus)
@@ -84,6 +76,23 @@ class WatchedPath(LinePath):
                 history.told.stored.append(put)
                 return put
         return None
+
+
+class WatchedVerbs(VerbPath):
+    """The way of the verbs of a session, watched."""
+
+    def __init__(self, session: Session, world: World) -> None:
+        super().__init__(session)
+        self._world = world
+
+    async def run(self, parsed: VerbLine, by: By) -> None:
+        """Run a verb; one that works by itself has an end."""
+        told = self._world.history.told
+        if parsed.name == "/resume":
+            told.latches.append((self._world.loop.now, False))
+        run = told.runs.get(parsed.typed.strip())
+        work = super().run(parsed, by)
+        await (work if run is None else watched(self._world, run, work))
 
 
 async def watched(world: World, run: Run, work: Awaitable[Any]) -> None:
