@@ -13,6 +13,7 @@ from multidrop.shell import motions, travel
 from multidrop.shell.automation import AGREED, Automations, only_ends
 from multidrop.shell.events import FAILURES, By, Entered, Printed
 from multidrop.shell.line_syntax import EVERYONE, DriveLine, join_target
+from multidrop.shell.origin import Origin
 from multidrop.shell.program_listing import Sight
 from multidrop.shell.raw import RawLine, text_of
 from multidrop.shell.sending import sending
@@ -29,14 +30,14 @@ class LinePath:
     def __init__(self, workspace: Workspace, automations: Automations, units: Units) -> None:
         self._workspace, self._automations, self._units = workspace, automations, units
 
-    async def text(self, parsed: DriveLine, by: By) -> None:
+    async def text(self, parsed: DriveLine, origin: Origin) -> None:
         """Send a text to its drive and publish what it prints; on a bus in raw mode send it with its terminator."""
-        workspace = self._workspace
-        bus = workspace.bus(parsed.bus)
+        workspace, by = self._workspace, origin.by
+        bus = workspace.bus(origin.played(parsed.bus))
         if (raw := workspace.of(bus).raw) is not None:
-            return await self._raw_text(raw, parsed, by)
+            return await self._raw_text(raw, parsed, origin)
         drive = workspace.drive(bus.name, parsed.address)
-        workspace.publish(Entered(workspace.now(), parsed.typed.strip(), by, bus.name, drive.address))
+        workspace.publish_of(origin, Entered(workspace.now(), parsed.typed.strip(), by, bus.name, drive.address))
         self.allow(by)
         text, check, values, stops = parsed.text, None, "", drive.stops
         if (workspace.doubted or workspace.of(bus).doubt) and not _only_reads(drive, text):
@@ -45,7 +46,7 @@ class LinePath:
             line = await self._units.line(drive, text)
             text, check, values = line.text, line.check, line.values
             drive.check_line(text)
-            await travel.ask(self._units, drive, text, by)
+            await travel.ask(self._units, drive, text, origin)
         drive.check_line(text)
         await self.guard(drive, text, by)
         if drive.stops != stops:
@@ -58,14 +59,14 @@ class LinePath:
         if workspace.recording:
             workspace.changed()
         workspace.addressed.add((bus.name, drive.address))
-        workspace.lately.begin()
+        workspace.lately.begin(origin)
         before = drive.commands
         if _changes_program(drive, text):
             Sight(workspace, drive).changes()
         try:
             ends = only_ends(drive, text)
-            async with sending(self._automations, drive, text, starts=starts, only_ends=ends):
-                printed = await motions.send(workspace, drive, text, check)
+            async with sending(self._automations, origin, drive, text, starts=starts, only_ends=ends):
+                printed = await motions.send(workspace, origin, drive, text, check)
         except FAILURES as failure:
             if recorded is not None:
                 recorded.came_back([f"failed: {failure}"])
@@ -79,27 +80,28 @@ class LinePath:
             bus.drives[drive.address] = drive  # it replied, so it exists: a stop and a wait must know it
             workspace.changed()
         for each in printed:
-            workspace.publish(Printed(workspace.now(), bus.name, drive.address, each, by))
+            workspace.publish_of(origin, Printed(workspace.now(), bus.name, drive.address, each, by))
         if workspace.scaled:
             await self._units.look(drive, text)
 
-    async def _raw_text(self, raw: RawLine, parsed: DriveLine, by: By) -> None:
+    async def _raw_text(self, raw: RawLine, parsed: DriveLine, origin: Origin) -> None:
+        by = origin.by
         workspace, name, typed = self._workspace, raw.bus.name, parsed.typed.strip()
         if by is By.MACRO:
             raise Diagnostic(f"{name} is raw: a macro's lines are for drives", typed, "/raw off finds them")
         if parsed.address is not None:
             hint = f"@{name}: TEXT sends text; /raw off finds the drives"
             raise Diagnostic(f"{name} is raw: it has no address {parsed.address}", typed, hint)
-        workspace.publish(Entered(workspace.now(), typed, by, name))
+        workspace.publish_of(origin, Entered(workspace.now(), typed, by, name))
         self.allow(by)
         await self.undoubted([raw.bus], by)
         await self.guard(raw.bus.at(""), parsed.text, by)
         starts = raw.bus.roster.family.codec.starts_motion(parsed.text)
-        await self.send_bytes(raw.bus, raw.encoded(parsed.text), by, starts)
+        await self.send_bytes(raw.bus, raw.encoded(parsed.text), origin, starts)
         if workspace.recording and by is By.OPERATOR:
             workspace.notify("text in raw mode is not recorded", warning=True)
 
-    async def send_bytes(self, bus: Bus, data: bytes, by: By, starts: bool = True) -> None:
+    async def send_bytes(self, bus: Bus, data: bytes, origin: Origin, starts: bool = True) -> None:
         """Write bytes on a bus in raw mode: once, unchanged. Raises Diagnostic where it is not in raw mode.
 
         `starts`: they can start motion or a program.
@@ -107,10 +109,10 @@ class LinePath:
         raw = self._workspace.of(bus).raw
         if raw is None:
             raise Diagnostic(f"{bus.name} is not in raw mode; nothing was sent", "", "/raw on begins it")
-        self.allow(by)
-        await self.agreed_to_write(bus.at(""), text_of(data), by)
+        self.allow(origin.by)
+        await self.agreed_to_write(bus.at(""), text_of(data), origin.by)
         if starts:
-            self._automations.starts(raw.everyone)
+            self._automations.starts(origin, raw.everyone)
         raw.send(data)
 
     async def guard(self, drive: Drive, text: str, by: By = By.OPERATOR) -> None:
@@ -150,10 +152,12 @@ class LinePath:
             raise Stopped("a stop came before the answer counted; nothing was sent")
 
     @contextlib.asynccontextmanager
-    async def starting(self, drive: Drive, text: str = "", *, parts: bool = False) -> AsyncIterator[None]:
+    async def starting(
+        self, origin: Origin, drive: Drive, text: str = "", *, parts: bool = False
+    ) -> AsyncIterator[None]:
         """Send in the body a line, or what can start anything in a drive. `parts`: it is several requests."""
         if text and not drive.starts(text):
-            async with sending(self._automations, drive, text, starts=False, parts=parts):
+            async with sending(self._automations, origin, drive, text, starts=False, parts=parts):
                 yield
             return
         drive.check_start(text)
@@ -163,7 +167,7 @@ class LinePath:
         if not text:  # a program may be among it
             drive.motions.runs()
         before = drive.commanded_at
-        async with sending(self._automations, drive, text, starts=True, parts=parts):
+        async with sending(self._automations, origin, drive, text, starts=True, parts=parts):
             drive.starts_now()
             noted = drive.commanded_at
             try:

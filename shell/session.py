@@ -10,9 +10,8 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-from collections.abc import Coroutine, Iterator, Sequence
-from contextvars import ContextVar
-from dataclasses import dataclass
+from collections.abc import Coroutine, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -35,7 +34,7 @@ from multidrop.shell.openings import Failed as OpeningFailed
 from multidrop.shell.openings import Openings
 from multidrop.shell.operations.table import find, load_others
 from multidrop.shell.operations.verb import Chosen, Verb
-from multidrop.shell.playing import played_by
+from multidrop.shell.origin import PERSON, Origin
 from multidrop.shell.quitting import ENDING as QUITTING
 from multidrop.shell.quitting import EVEN_NOW, Unanswered
 from multidrop.shell.units import Units
@@ -45,8 +44,6 @@ from multidrop.shell.workspace import Workspace
 if TYPE_CHECKING:
     from multidrop.macros import Macro
 
-_published: ContextVar[list[BaseException] | None] = ContextVar("published", default=None)
-"""The failures published in this task's outermost `run`."""
 BARE_WORDS = {"exit": "/quit", "quit": "/quit", "help": "/help", "?": "/help"}
 
 
@@ -136,17 +133,22 @@ class Session(Workspace):
 
     # The path of a command
 
-    async def run(self, line: str | TypedLine, by: By = By.OPERATOR, since: int | None = None) -> None:
+    async def run(self, line: str | TypedLine, origin: Origin | None = None, since: int | None = None) -> None:
         """Run one line, as typed or parsed before, and publish what it prints.
 
-        `since` is the value of `stops` when the line was typed; a line older than the last stop is refused with
-        Stopped. Raises DriveError, Diagnostic or TransportLost, after one Failed event.
+        `origin`: by default that of the session. `since` is the value of `stops` when the line was typed; a line older
+        than the last stop is refused with Stopped.
+
+        Raises DriveError, Diagnostic or TransportLost, after one Failed event.
         """
         if self.front.ready is not None:
             await self.front.ready()
         target, place = DriveLine(""), self.place
         typed = line if isinstance(line, str) else line.typed
-        with self.under_way(f"running {typed.strip()}"), _published_failures() as published:
+        origin = origin or self.origin
+        published = [] if origin.published is None else origin.published
+        origin, by = replace(origin, published=published), origin.by
+        with self.under_way(f"running {typed.strip()}"):
             try:
                 if since is not None and since != self.stops:
                     raise Stopped(f"a stop came after '{typed.strip()}' was typed; it was not sent")
@@ -158,11 +160,11 @@ class Session(Workspace):
                 if isinstance(parsed, DriveLine):
                     target = parsed
                     with self.unanswered.sending(typed):
-                        await self.path.text(parsed, by)
+                        await self.path.text(parsed, origin)
                 elif parsed is not None:
-                    await self.verbs.run(parsed, by)
+                    await self.verbs.run(parsed, origin)
             except FAILURES as failure:
-                bus, address = _place_of(target, place)
+                bus, address = _place_of(origin, target, place)
                 if (
                     failure not in published
                 ):  # once, whatever lines (a macro's, the `/play` around it) it passes through
@@ -183,16 +185,18 @@ class Session(Workspace):
             return "/scan"
         return f"/bytes {raw.end.hex(' ').upper()}" if raw is not None and raw.end else ""
 
-    def start(self, line: str | TypedLine, by: By = By.OPERATOR, since: int | None = None) -> asyncio.Task[bool]:
+    def start(
+        self, line: str | TypedLine, origin: Origin | None = None, since: int | None = None
+    ) -> asyncio.Task[bool]:
         """Run one line in the background; the task returns whether it succeeded. A failure is published only.
 
-        `since` as for `run`; by default the line counts as typed now.
+        `origin` and `since` as for `run`; by default the line counts as typed now.
         """
         typed = self.stops if since is None else since
 
         async def succeeds() -> bool:
             try:
-                await self.run(line, by, typed)
+                await self.run(line, origin, typed)
             except FAILURES:
                 return False  # published as a Failed event
             return True
@@ -251,9 +255,14 @@ class Call:
     session: Session
     verb: Verb
     rest: str
-    by: By = By.OPERATOR
+    origin: Origin = PERSON
     shown: str | Macro | None = None
     """What a person was shown of the file that the line names; see `line_syntax.VerbLine`."""
+
+    @property
+    def by(self) -> By:
+        """Who has entered the line."""
+        return self.origin.by
 
     @cached_property
     def chosen(self) -> Chosen:
@@ -299,10 +308,22 @@ class Call:
     def wrong(self, message: str = "") -> Diagnostic:
         return self.verb.wrong(message)
 
+    def bus(self, name: str = "") -> Bus:
+        """Find an open bus by name or role; the selected one for an empty name. Raises Diagnostic."""
+        return self.session.bus(self.origin.played(name))
+
     def drive(self, target: str = "") -> Drive:
         """Find the drive of `ADDR` or `BUS:ADDR`; the selected drive for an empty target."""
-        bus, address = split_target(target)
+        bus, address = self.origin.target(target)
         return self.session.drive(bus, address or None)
+
+    async def run(self, line: str) -> None:
+        """Run a line as a part of this one: what it starts is stopped with that. Raises as `Session.run` does."""
+        await self.session.run(line, self.origin)
+
+    def output(self, text: str, *, columns: bool = False) -> None:
+        """Publish a line of the result. `columns`: a screen breaks it between words."""
+        self.session.output(text, columns=columns, origin=self.origin)
 
 
 class VerbPath:
@@ -325,12 +346,12 @@ class VerbPath:
             return VerbLine(BARE_WORDS[word], "", parsed.typed)
         raise bare(word)
 
-    async def run(self, parsed: VerbLine, by: By) -> None:
+    async def run(self, parsed: VerbLine, origin: Origin) -> None:
         """Run a verb, as a task that a stop ends."""
-        session = self._session
-        session.publish(Entered(session.now(), parsed.typed.strip(), by))
+        session, by = self._session, origin.by
+        session.publish_of(origin, Entered(session.now(), parsed.typed.strip(), by))
         verb = find(parsed.name)
-        call = Call(session, verb, parsed.rest, by, parsed.shown)
+        call = Call(session, verb, parsed.rest, origin, parsed.shown)
         session.path.allow(by)
         if call.changes:
             await session.path.undoubted([*session.buses.values()], by)
@@ -355,22 +376,8 @@ def _raw_line(workspace: Workspace, line: str | TypedLine) -> DriveLine | None:
     return DriveLine(typed.rstrip("\r\n"), typed=typed)
 
 
-def _place_of(target: DriveLine, selected: Place) -> Place:
+def _place_of(origin: Origin, target: DriveLine, selected: Place) -> Place:
     """The bus and the address that a line was for; `selected`: those that were selected when it was typed."""
-    bus = played_by(target.bus) or selected.bus
+    bus = origin.played(target.bus) or selected.bus
     plain = target.text and target.address is None and bus == selected.bus
     return Place(bus, selected.address if plain else target.address or "")
-
-
-@contextlib.contextmanager
-def _published_failures() -> Iterator[list[BaseException]]:
-    """The failures published so far in the outermost `run` of this task."""
-    found = _published.get()
-    if found is not None:
-        yield found
-        return
-    token = _published.set(found := [])
-    try:
-        yield found
-    finally:
-        _published.reset(token)

@@ -160,7 +160,7 @@ async def send_bytes(call: Call, text: Bytes) -> None:
     line, data = in_raw_mode(call), parse_bytes(text)
     if not data:
         raise call.wrong()
-    await call.session.path.send_bytes(line.bus, data, call.by)
+    await call.session.path.send_bytes(line.bus, data, call.origin)
 
 
 OPERATIONS = (

@@ -13,9 +13,9 @@ from collections.abc import Awaitable
 from typing import TYPE_CHECKING, Any
 
 from multidrop.base.errors import Diagnostic, DriveError
-from multidrop.shell.events import By
 from multidrop.shell.line_path import LinePath
 from multidrop.shell.line_syntax import DriveLine, VerbLine
+from multidrop.shell.origin import Origin
 from multidrop.shell.session import VerbPath
 from soak.simulation.records.history import Executed
 from soak.simulation.records.phrases import PHRASES
@@ -44,11 +44,11 @@ class WatchedPath(LinePath):
         super().__init__(session, session.automations, session.units)
         self._world = world
 
-    async def text(self, parsed: DriveLine, by: By) -> None:
+    async def text(self, parsed: DriveLine, origin: Origin) -> None:
         """Pass a text on; note it where it is stored, or written as it is."""
-        put = self._put(parsed)
+        put = self._put(parsed, origin)
         try:
-            await super().text(parsed, by)
+            await super().text(parsed, origin)
         except BaseException:
             if put is not None:
                 put.sent = False
@@ -56,11 +56,11 @@ class WatchedPath(LinePath):
         if put is not None:
             put.sent = True
 
-    def _put(self, parsed: DriveLine) -> Put | None:
+    def _put(self, parsed: DriveLine, origin: Origin) -> Put | None:
         session, history = self._workspace, self._world.history
         typed = parsed.typed.strip()
         with contextlib.suppress(Diagnostic, DriveError):
-            bus = session.bus(parsed.bus)
+            bus = session.bus(origin.played(parsed.bus))
             if bus.name in session.raw:
                 history.commands.pop(typed, None)
                 put = Put(session.now(), bus.name, "", str(parsed.text))
@@ -85,13 +85,13 @@ class WatchedVerbs(VerbPath):
         super().__init__(session)
         self._world = world
 
-    async def run(self, parsed: VerbLine, by: By) -> None:
+    async def run(self, parsed: VerbLine, origin: Origin) -> None:
         """Run a verb; one that works by itself has an end."""
         told = self._world.history.told
         if parsed.name == "/resume":
             told.latches.append((self._world.loop.now, False))
         run = told.runs.get(parsed.typed.strip())
-        work = super().run(parsed, by)
+        work = super().run(parsed, origin)
         await (work if run is None else watched(self._world, run, work))
 
 
