@@ -101,17 +101,18 @@ class Channel(Publisher[SessionEvent]):
         """Call back with every event of these kinds; see `Publisher.subscribe`. What others wrote is guarded."""
         return super().subscribe(foreign.callback(callback), *kinds)
 
-    def publish_of(self, origin: Origin, event: SessionEvent) -> None:
-        """Publish what a line enters or prints; who the line belongs to hears of it first."""
-        origin.hear(event)
-        self.publish(event)
+    def publish(self, event: SessionEvent, origin: Origin | None = None) -> None:
+        """Publish an event. `origin`: of the line that enters or prints it; who that belongs to hears of it first."""
+        if origin is not None:
+            origin.hear(event)
+        super().publish(event)
 
     def output(self, text: str, *, columns: bool = False, origin: Origin | None = None) -> None:
         """Publish a line of a verb's result. `columns`: a screen breaks it between words.
 
         `origin`: that of the line; by default that of the session.
         """
-        self.publish_of(origin or self.origin, Output(self.now(), text, columns))
+        self.publish(Output(self.now(), text, columns), origin or self.origin)
 
     def notify(self, text: str, *, bus: str = "", warning: bool = False, outcome: bool = False) -> None:
         """Publish a notice for a person. `outcome`: of what was asked for, so that every front end shows it."""

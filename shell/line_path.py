@@ -37,7 +37,7 @@ class LinePath:
         if (raw := workspace.of(bus).raw) is not None:
             return await self._raw_text(raw, parsed, origin)
         drive = workspace.drive(bus.name, parsed.address)
-        workspace.publish_of(origin, Entered(workspace.now(), parsed.typed.strip(), by, bus.name, drive.address))
+        workspace.publish(Entered(workspace.now(), parsed.typed.strip(), by, bus.name, drive.address), origin)
         self.allow(by)
         text, check, values, stops = parsed.text, None, "", drive.stops
         if (workspace.doubted or workspace.of(bus).doubt) and not _only_reads(drive, text):
@@ -80,7 +80,7 @@ class LinePath:
             bus.drives[drive.address] = drive  # it replied, so it exists: a stop and a wait must know it
             workspace.changed()
         for each in printed:
-            workspace.publish_of(origin, Printed(workspace.now(), bus.name, drive.address, each, by))
+            workspace.publish(Printed(workspace.now(), bus.name, drive.address, each, by), origin)
         if workspace.scaled:
             await self._units.look(drive, text)
 
@@ -92,7 +92,7 @@ class LinePath:
         if parsed.address is not None:
             hint = f"@{name}: TEXT sends text; /raw off finds the drives"
             raise Diagnostic(f"{name} is raw: it has no address {parsed.address}", typed, hint)
-        workspace.publish_of(origin, Entered(workspace.now(), typed, by, name))
+        workspace.publish(Entered(workspace.now(), typed, by, name), origin)
         self.allow(by)
         await self.undoubted([raw.bus], by)
         await self.guard(raw.bus.at(""), parsed.text, by)

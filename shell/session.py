@@ -349,7 +349,7 @@ class VerbPath:
     async def run(self, parsed: VerbLine, origin: Origin) -> None:
         """Run a verb, as a task that a stop ends."""
         session, by = self._session, origin.by
-        session.publish_of(origin, Entered(session.now(), parsed.typed.strip(), by))
+        session.publish(Entered(session.now(), parsed.typed.strip(), by), origin)
         verb = find(parsed.name)
         call = Call(session, verb, parsed.rest, origin, parsed.shown)
         session.path.allow(by)

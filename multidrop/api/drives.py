@@ -155,6 +155,10 @@ def _of_axis(drive: DriveFacts, axes: Sequence[A]) -> A:
     return found
 
 
+async def _homing_ended(calls: Calls, drive: Drive, axis: str) -> bool:
+    return await calls.run(lambda origin: drive.homing_ended(axis))
+
+
 class AsyncDrive(DriveFacts):
     """A drive of a session. Steps are the drive's own units: motor steps, or counts with its encoder in use."""
 
@@ -244,14 +248,11 @@ class AsyncDrive(DriveFacts):
         drive, shell, timeout = self._drive, self._calls.shell, seconds(timeout, "wait")
         await self._calls.run(lambda origin: waits.wait(shell, origin, timeout, idle=idle, drives=[drive], said="wait"))
         for axis in [each for each in drive.homings if each not in drive.homed]:
-            well = await self._homing_ended(axis)
+            well = await _homing_ended(self._calls, drive, axis)
             if not (well or self._drive.family.values.actions.no_error) and await self.error() is not None:
                 raise DriveError(f"{self.name}: the homing has ended with an error; read_error() reads and clears it")
         if self._calls.returns is not None:
             await self.motion()
-
-    async def _homing_ended(self, axis: str) -> bool:
-        return await self._calls.run(lambda origin: self._drive.homing_ended(axis))
 
     async def wait_for(self, condition: str, timeout: float = waits.LIMIT) -> None:
         """Wait until the drive reports a value: `I1=1`, `P>=51200`, `P > {10 mm}`.
@@ -297,7 +298,7 @@ class AsyncDrive(DriveFacts):
             self._check_executes()
             if not await self._calls.run(lambda origin: still(drive)):
                 return False
-            await self._homing_ended(axis)
+            await _homing_ended(self._calls, drive, axis)
         return drive.homed.get(axis, False) and not drive.state.unreferenced & {axis, ""}
 
     async def accept(self) -> None:

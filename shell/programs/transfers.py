@@ -307,5 +307,5 @@ class _Download:
         async with workspace.path.starting(origin, drive, line):
             printed = await motions.send(workspace, origin, drive, line)
         for text in printed:
-            workspace.publish_of(origin, Printed(workspace.now(), drive.link.name, drive.address, text))
+            workspace.publish(Printed(workspace.now(), drive.link.name, drive.address, text), origin)
         self._say(f"started ({line})")
