@@ -178,9 +178,14 @@ def under_way(life: Lived, line: str, stop: Stop) -> bool:
 
 
 def _after_a_loss(life: Lived, line: str, stop: Stop) -> bool:
-    """Whether a line is said to have got a stop that it was owed, right before this one: it had been lost."""
-    said = re.compile(rf"{line[:2]}: the stop of .* was sent first")
-    return any(stop.at - STILL <= at <= stop.at and said.match(text) for at, text in life.history.notices)
+    """Whether a line got a stop that it was owed, right before this one: it had been lost, and is said to have got one.
+
+    That is said at the first connection; each one that follows, until the line is back, begins with the stop.
+    """
+    history, said = life.history, re.compile(rf"{line[:2]}: the stop of .* was sent first")
+    owed = [at for at, text in history.notices if at <= stop.at and said.match(text)]
+    opened = any(name == line and stop.at - STILL <= at <= stop.at for at, name, _ in history.opened)
+    return bool(owed) and (opened or owed[-1] >= stop.at - STILL)
 
 
 def _of_an_opening(life: Lived, line: str, stop: Stop, left: bytes) -> bool:
