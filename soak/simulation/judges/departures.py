@@ -159,7 +159,9 @@ def under_way(life: Lived, line: str, stop: Stop) -> bool:
         _after_a_loss(life, line, stop)
         or any(stop.at - STILL <= at <= stop.at and TYPED.match(text) for at, text in life.history.notices)
         or any(
-            each is not stop and each.at <= stop.at and (line in each.lost or each.at >= stop.at - STILL)
+            each is not stop
+            and each.at <= stop.at
+            and (line in each.lost or each.at >= stop.at - STILL or _nothing_else(life, line, each, stop))
             for each in life.history.stops
         )
     )
@@ -178,9 +180,24 @@ def under_way(life: Lived, line: str, stop: Stop) -> bool:
 
 
 def _after_a_loss(life: Lived, line: str, stop: Stop) -> bool:
-    """Whether a line is said to have got a stop that it was owed, right before this one: it had been lost."""
-    said = re.compile(rf"{line[:2]}: the stop of .* was sent first")
-    return any(stop.at - STILL <= at <= stop.at and said.match(text) for at, text in life.history.notices)
+    """Whether a line got a stop that it was owed, right before this one: it had been lost, and is said to have got one.
+
+    That is said at the first connection; each one that follows, until the line is back, begins with the stop.
+    """
+    history, said = life.history, re.compile(rf"{line[:2]}: the stop of .* was sent first")
+    owed = [at for at, text in history.notices if at <= stop.at and said.match(text)]
+    opened = any(name == line and stop.at - STILL <= at <= stop.at for at, name, _ in history.opened)
+    return bool(owed) and (opened or owed[-1] >= stop.at - STILL)
+
+
+def _nothing_else(life: Lived, line: str, before: Stop, stop: Stop) -> bool:
+    """Whether nothing but parts of a stop has left between two: with many motors it takes seconds."""
+    if line not in before.own:
+        return False
+    between = range(before.own[line][0], stop.own[line][0])
+    mine = (index for index in between if life.history.written[index][1] == line)
+    lefts = filter(None, (_written(life, line, index) for index in mine))
+    return all(_is_stop(before, line, left) or _is_stop(stop, line, left) for left in lefts)
 
 
 def _of_an_opening(life: Lived, line: str, stop: Stop, left: bytes) -> bool:
