@@ -471,7 +471,7 @@ def risk(name: str, value: Value, now: Mapping[str, Value | None]) -> str:
         return "the drive may make up lost steps at once"
     if name == "EE" and now.get("PM"):
         return TURNS[Alone.CORRECTION]
-    if name in groups.TRIPS and isinstance(value, tuple) and isinstance(value[1], int) and value[1]:
+    if name in groups.TRIPS and isinstance(value, tuple) and any(each and isinstance(each, int) for each in value[1:2]):
         return "it calls an address, which may hold another program's line"
     point = name.startswith(tuple(groups.LISTS)) or manual.POINT.fullmatch(name) is not None
     if not point or name.startswith(("LS", "OS")) or not isinstance(value, tuple):
