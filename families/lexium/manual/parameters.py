@@ -24,6 +24,7 @@ from multidrop.families.lexium.manual.mnemonic import (
     MDRIVE_ENCODER,
     Mnemonic,
 )
+from multidrop.families.lexium.manual.point_types import FRESH
 from multidrop.families.lexium.manual.supported import lacks
 from multidrop.families.lexium.manual.table import MNEMONICS, lookup, words
 from multidrop.families.lexium.manual.value_forms import value_form
@@ -82,15 +83,17 @@ def locks_resolution(product: str) -> bool:
 
 def fresh(name: str) -> Value | None:
     """The default of a set-up; None for any other word."""
-    special: dict[str, Value] = {"S5": (9, 0), "S7": (33, 0), "S8": (33, 0), "S13": (60, 0, 0), "PF": (10, 6, 0, 0)}
-    if name in special:
-        return special[name]
+    if name in FRESH:
+        return FRESH[name]
     if name in TRIPS:
         return 0
-    if re.fullmatch(r"S\d+", name):
+    if POINT.fullmatch(name):
         return (0, 0, 0)
-    found = re.fullmatch(r"(IS|OS|LS)\d", name)
-    return None if found is None else {"IS": (0, 0), "OS": (16, 0), "LS": (0, 0)}[found[1]]
+    found = _SETUP.fullmatch(name)
+    if found is not None:
+        return (16, 0) if found[1] == "OS" else (0, 0)
+    default = MNEMONICS[name].default if name in MNEMONICS else None
+    return tuple(map(int, default.split(","))) if isinstance(default, str) and "," in default else None
 
 
 def section(name: str) -> str:
