@@ -100,7 +100,7 @@ def _has(place: Place, word: str, now: float) -> bool:
     return word in f"{place.name} {sign} {place.alarm()} {place.glance.product}".casefold()
 
 
-class Column(NamedTuple):
+class DriveColumn(NamedTuple):
     """A column of the list. A number that is longer than it takes the room from the next one."""
 
     head: str
@@ -147,16 +147,16 @@ def _name(place: Place, now: float, chosen: bool, cells: int) -> Span:
 
 
 COLUMNS = (
-    Column("drive", 17, _name, gap=1),
-    Column("state", STATE, _state),
-    Column("position", 13, _position, right=True),
-    Column("velocity", 11, _velocity, right=True, gap=1, least=NARROW),
-    Column("20 s", 16, _last_seconds, right=True, gap=2, least=NARROW, few=5),
+    DriveColumn("drive", 17, _name, gap=1),
+    DriveColumn("state", STATE, _state),
+    DriveColumn("position", 13, _position, right=True),
+    DriveColumn("velocity", 11, _velocity, right=True, gap=1, least=NARROW),
+    DriveColumn("20 s", 16, _last_seconds, right=True, gap=2, least=NARROW, few=5),
 )
 """The columns of the list; what matters most besides these fills the row."""
 
 
-def _columns(width: int) -> list[Column]:
+def _columns(width: int) -> list[DriveColumn]:
     return [each for each in COLUMNS if width >= each.least]
 
 
