@@ -10,8 +10,8 @@ from multidrop.features.plot_files.plot import USUAL_OPTIONS, begin, write
 from multidrop.features.plot_files.request import parse_target
 from multidrop.shell.plots.batch import Batch
 from multidrop.shell.plots.series import parse_series, read_first
+from multidrop.shell.session import Call
 from multidrop.shell.verbs import plotting
-from multidrop.shell.verbs.call import Call
 
 ENDINGS = (".rrd", ".csv", ".parquet")
 

@@ -9,7 +9,7 @@ from multidrop.shell.operations.operation import Group, Operation, typed
 from multidrop.shell.operations.parameter import Argument, Listed
 
 if TYPE_CHECKING:
-    from multidrop.shell.verbs.call import Call
+    from multidrop.shell.session import Call
 
 Plotted = Annotated[str, Argument(metavar="ADDR", listed=(Listed.DRIVE,))]
 Access = Annotated[

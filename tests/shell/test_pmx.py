@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+from dataclasses import replace
 
 import pytest
 
@@ -54,7 +55,7 @@ async def test_a_stop_stops_both_axes_of_every_controller(session):
     moving = [await say(session, f"@{n} MST{axis}") for n in ("00", "01", "02") for axis in "XY"]
     assert moving == [["0"]] * 6
     with pytest.raises(Stopped):
-        await session.run("X100", By.MACRO)
+        await session.run("X100", replace(session.origin, by=By.MACRO))
 
 
 async def test_a_program_that_moves_is_stopped_for_good(session):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import itertools
+from dataclasses import replace
 
 import pytest
 
@@ -69,7 +70,7 @@ async def test_a_stop_stops_every_module_and_the_other_family_too(session):
     assert not [text for text in told if "not known" in text or "STILL" in text]
     assert await say(session, "@1 GAP 3, 0", "@7 GAP 3, 0", "@press: PR V") == ["0", "0", "0"]
     with pytest.raises(Stopped):
-        await session.run("@1 ROR 0, 5", By.MACRO)
+        await session.run("@1 ROR 0, 5", replace(session.origin, by=By.MACRO))
 
 
 async def test_what_is_typed_after_a_stop_is_sent(session):

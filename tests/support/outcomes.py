@@ -5,14 +5,15 @@ from __future__ import annotations
 import pytest
 
 from multidrop.base.errors import MotionFailed
+from multidrop.shell.origin import PERSON
 from multidrop.shell.session import Session
 
 
 async def sent(session: Session, *lines: str) -> None:
     """Run lines as one automation, as `send` does."""
-    async with session.automations.run():
+    async with session.automations.run(PERSON) as origin:
         for line in lines:
-            await session.run(line)
+            await session.run(line, origin)
 
 
 async def failed(session: Session, *lines: str) -> MotionFailed:
