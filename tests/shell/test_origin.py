@@ -84,7 +84,7 @@ async def test_a_line_that_a_feature_by_others_runs_without_its_origin_is_refuse
         await shop.session.run("@a SL 1000", shop.session.origin)
 
     shop.events.clear()
-    with pytest.raises(Diagnostic, match=r"@a SL 1000: a feature ran it without its origin; it was not sent.*call\.run"):
+    with pytest.raises(Diagnostic, match=r"a feature ran it without its origin; it was not sent.*call\.run"):
         await Guard("gauge").function(verb)()
     assert shop.written("press") == b"" and shop.moving() == set()
     await Guard("gauge").function(said)()
