@@ -52,7 +52,11 @@ def test_every_file_exists(file):
 
 
 def test_the_page_stays_short():
-    assert len((ROOT / "docs" / "architecture.md").read_text(encoding="utf-8").splitlines()) <= 190
+    page, _, glossary = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8").partition("\n## Glossary\n")
+    assert len(page.splitlines()) <= 190
+    words = re.findall(r"^\| ([a-z ]+) \|", glossary, re.M)[1:]
+    assert 30 <= len(words) <= 40
+    assert len(words) == len(set(words))
 
 
 def test_the_index_leads_to_every_page():
