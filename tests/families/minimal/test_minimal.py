@@ -10,7 +10,7 @@ import pytest
 
 from multidrop.base import registry
 from multidrop.base.errors import Diagnostic, DriveError
-from multidrop.base.registry import Entry
+from multidrop.base.registry import FeatureEntry
 from multidrop.drives.events import Sample
 from multidrop.shell.events import OnBus
 from tests.support import knock
@@ -22,7 +22,7 @@ pytestmark = pytest.mark.virtual
 
 @pytest.fixture
 async def cell(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> AsyncIterator[CellSession]:
-    monkeypatch.setattr(registry, "_others", {"p": (Entry("knock", "dist", "1", "p"), knock.FAMILY)})
+    monkeypatch.setattr(registry, "_others", {"p": (FeatureEntry("knock", "dist", "1", "p"), knock.FAMILY)})
     async with CellSession(tmp_path, bus("line", drive("KNOCK", "A"), drive("KNOCK", "B"), baud=0)) as opened:
         yield opened
 
