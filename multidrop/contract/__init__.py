@@ -21,9 +21,12 @@ pytest.register_assert_rewrite(
 
 from multidrop.contract.sample import (  # noqa: E402
     Absent,
+    Error,
     FamilySample,
+    Homed,
     Moved,
     Program,
+    Ran,
     Read,
     Scaled,
     Setting,
@@ -34,10 +37,13 @@ from multidrop.contract.suite import FamilyContract  # noqa: E402
 
 __all__ = [
     "Absent",
+    "Error",
     "FamilyContract",
     "FamilySample",
+    "Homed",
     "Moved",
     "Program",
+    "Ran",
     "Read",
     "Scaled",
     "Setting",

@@ -2,16 +2,39 @@
 
 from __future__ import annotations
 
+import asyncio
+import re
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+
 import pytest
 
 import multidrop
+from multidrop import Timeout
 from multidrop.base.errors import Diagnostic, DriveError, Inexpressible, MotionFailed, Refused
 from multidrop.contract.desk import Desk, in_virtual_time
 from multidrop.contract.settings import Programs
+from multidrop.shell.events import Entered, SessionEvent
 
 
 class Api(Programs):
     """`multidrop.connect_async`, whose calls are those of `multidrop.connect`."""
+
+    entered: list[str]
+    """The lines that the program has sent."""
+
+    @asynccontextmanager
+    async def program(self, desk: Desk) -> AsyncIterator[multidrop.AsyncDrive]:
+        """The first drive of a line, in a program."""
+        self.entered = []
+
+        def take(event: SessionEvent) -> None:
+            if isinstance(event, Entered) and event.bus and not event.line.startswith("/"):
+                self.entered.append(event.line.partition(" ")[2])
+
+        async with multidrop.connect_async(desk.url) as session:
+            session._shell.subscribe(take)
+            yield session.drive(desk.names[0])
 
     @in_virtual_time
     async def test_a_program_reads_moves_waits_and_stops(self, desk: Desk) -> None:
@@ -69,21 +92,122 @@ class Api(Programs):
             assert isinstance(failure.value, DriveError)
 
     @in_virtual_time
-    async def test_a_program_runs_homes_and_switches_or_is_told_that_it_cannot(self, desk: Desk) -> None:
-        async with desk.session() as opened:
-            actions = opened.drive.family.values.actions
-            axis = (await opened.motions(desk.names[0]))[0].axis
-            homings = actions.homings(axis)
-            usual = next(iter(homings.values()), {})
-            assert usual.get("-", usual.get("")) == self.sample.homes
-            for line, made in ((self.sample.runs, actions.run), (self.sample.output, actions.output)):
-                given = (axis, 1000) if made == actions.run else (1, True)
-                if line is None:
-                    with pytest.raises(Inexpressible, match="nothing was sent"):
-                        made(*given)
-                else:
-                    found = made(*given)
-                    assert line == (found if isinstance(found, str) else found[-1])
+    async def test_a_program_homes_it_and_sees_how_that_ended(self, desk: Desk) -> None:
+        homes = self.sample.homes
+        async with self.program(desk.again(homes.drive) if homes is not None else desk) as axis:
+            if homes is None:
+                with pytest.raises(Inexpressible, match="homes them; nothing was sent"):
+                    await axis.home("-")
+                return
+            assert await axis.homed() is False
+            for line in homes.setup:
+                await axis.send(line)
+            for wrong in ("left", "-" if homes.direction == "" else ""):
+                with pytest.raises(Diagnostic, match="direction"):
+                    await axis.home(wrong)
+            with pytest.raises(Diagnostic, match="no mode nowhere; valid: "):
+                await axis.home(homes.direction, "nowhere")
+            assert self.entered == [*homes.setup]
+            await axis.home(homes.direction)
+            assert self.entered == [*homes.setup, homes.line]
+            assert await axis.homed() is False and await axis.moving()
+            await axis.wait()
+            assert await axis.homed() is True
+            await axis.move(10)
+            await axis.wait()
+            assert await axis.homed() is True
+
+    @in_virtual_time
+    async def test_a_program_runs_it_at_a_velocity(self, desk: Desk) -> None:
+        async with self.program(desk) as axis:
+            if (runs := self.sample.runs) is None:
+                with pytest.raises(Inexpressible, match="nothing was sent"):
+                    await axis.run_at(1000)
+                return
+            with pytest.raises(TypeError):
+                await axis.run_at(0.5)
+            await axis.run_at(runs.velocity)
+            assert self.entered == [*runs.lines]
+            await asyncio.sleep(0.5)
+            assert await axis.velocity() and await axis.moving()
+            with pytest.raises(Timeout, match=rf"^wait: {axis.name} still runs after 0.1 s$"):
+                await axis.wait(0.1)
+            await axis.run_at(0)
+            await axis.wait()
+            assert self.entered == [*runs.lines, *runs.ends]
+            assert await axis.position() * runs.velocity > 0
+
+    @in_virtual_time
+    async def test_a_program_switches_output_and_current_and_reads_inputs(self, desk: Desk) -> None:
+        sample = self.sample
+        async with self.program(desk) as axis:
+            if sample.output is None:
+                with pytest.raises(Inexpressible, match="nothing was sent"):
+                    await axis.set_output(1, True)
+            else:
+                await axis.set_output(1, True)
+                assert self.entered == [sample.output]
+            if sample.current is None:
+                for call in (axis.enable, axis.disable):
+                    with pytest.raises(Inexpressible, match=r"able\(\): "):
+                        await call()
+            else:
+                await axis.disable()
+                assert await axis.read(sample.current) == 0
+                await axis.enable()
+                assert await axis.read(sample.current) == 1
+            if sample.inputs is None:
+                with pytest.raises(Inexpressible):
+                    await axis.inputs()
+            else:
+                assert {*await axis.inputs()} == sample.inputs
+            assert await axis.position() == 0
+
+    @in_virtual_time
+    async def test_a_program_reads_an_error_and_only_one_call_clears_it(self, desk: Desk) -> None:
+        error = self.sample.error
+        async with self.program(desk.again(self.sample.limited) if self.sample.limited else desk) as axis:
+            if error is None:
+                for call in (axis.error, axis.read_error):
+                    with pytest.raises(Inexpressible):
+                        await call()
+                return
+            assert await axis.error() is None and await axis.read_error() is None
+            for line in (*self.sample.setup, self.sample.far):
+                await axis.send(line)
+            while await axis.moving():  # a wait would read the error for its reason
+                await asyncio.sleep(0.5)
+            found = await axis.error()
+            assert found is not None and re.fullmatch(error.said, str(found)), found
+            assert await axis.error() == found
+            try:
+                read = await axis.read_error()
+            except MotionFailed:  # the motion is judged before its sign is cleared
+                read = await axis.read_error()
+            assert read is not None and re.fullmatch(error.reading, str(read)), read
+            assert await axis.error() is None
+
+    @in_virtual_time
+    async def test_a_wait_for_a_value_has_a_limit(self, desk: Desk) -> None:
+        word, place = self.sample.position, self.sample.moves.place
+        async with self.program(desk) as axis:
+            if word is None:
+                with pytest.raises((Diagnostic, DriveError)):
+                    await axis.wait_for("QQ=1", timeout=0.2)
+                return
+            for line in self.sample.setup:
+                await axis.send(line)
+            await axis.move_to(place)
+            await axis.wait_for(f"{word}>={place // 2}")
+            await axis.wait()
+            await axis.wait_for(f"{word}={place}", timeout=0)
+            with pytest.raises(
+                Timeout, match=rf"^wait_for {word}\S*=7: {axis.name} still reports {place} after 0.2 s$"
+            ):
+                await axis.wait_for(f"{word}=7", timeout=0.2)
+            for wrong in ("nonsense", "@b P=1", ""):
+                with pytest.raises(Diagnostic, match="no condition"):
+                    await axis.wait_for(wrong)
 
     @in_virtual_time
     async def test_a_motion_that_fails_is_an_exception(self, desk: Desk) -> None:

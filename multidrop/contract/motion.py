@@ -114,12 +114,14 @@ class Motions(OfFamily):
             await asyncio.sleep(2.0)
             looking.close()
             found = [each.event for each in opened.events if isinstance(each, OnBus)]
-            samples = [each for each in found if isinstance(each, Sample) and each.axis in ("", "x", "0")]
-            own = [each for each in samples if each.address == desk.names[0]]
+            samples = [each for each in found if isinstance(each, Sample)]
+            axes = [each.axis for each in await opened.motions(desk.names[0])]
+            own = [each for each in samples if (each.address, each.axis) == (desk.names[0], axes[0])]
             assert len(own) > 5 and own[-1].velocity != 0
             assert len({each.position for each in own}) == len(own)
-            rest = [each for each in samples if each.address != desk.names[0]]
-            assert {each.position for each in rest} <= {0} and bool(rest) == (len(desk.names) > 1)
+            seen = {(each.address, each.axis) for each in samples}
+            assert seen == {(name, axis) for name in desk.names for axis in axes}
+            assert {each.position for each in samples if each not in own} <= {0}
 
     @in_virtual_time
     async def test_it_is_known_which_lines_can_start_something(self, desk: Desk) -> None:
@@ -164,9 +166,8 @@ class Stopping(Motions):
     async def test_the_stop_reaches_each_drive_and_is_confirmed(self, desk: Desk) -> None:
         async with desk.session() as opened:
             for name in desk.names:
-                await opened.say(
-                    *(f"@{name} {line}" if name else line for line in (*self.sample.setup, self.sample.far))
-                )
+                lines = (*self.sample.setup, self.sample.far, *self.sample.far_others)
+                await opened.say(*(f"@{name} {line}" if name else line for line in lines))
             await asyncio.sleep(0.5)
             opened.begin()
             opened.session.stop()
@@ -177,10 +178,11 @@ class Stopping(Motions):
             assert not [text for text in opened.told() if "not known" in text or "STILL" in text]
             for part in self.sample.stop_all:
                 assert part in opened.written
-            stood = await self.places(opened)
-            assert all(position and not velocity for position, velocity in stood)
+            stood = [await opened.motions(name) for name in desk.names]
+            assert not any(each.velocity for axes in stood for each in axes)
+            assert all(sum(each.position != 0 for each in axes) == 1 + len(self.sample.far_others) for axes in stood)
             await asyncio.sleep(5.0)
-            assert await self.places(opened) == stood
+            assert [await opened.motions(name) for name in desk.names] == stood
 
     @in_virtual_time
     async def test_after_a_stop_a_person_goes_on_and_automation_waits_for_resume(self, desk: Desk) -> None:

@@ -97,6 +97,36 @@ class Program(NamedTuple):
     """What the check says of that, after the name of the file: a regular expression."""
 
 
+class Homed(NamedTuple):
+    """A homing of the first axis: the table of a drive with a home switch, how a program begins it, and its line.
+
+    `direction`: what `home` is given; empty: settings of the drive fix the direction. `setup`: lines for that.
+    """
+
+    drive: str
+    line: str
+    direction: str = "-"
+    setup: tuple[str, ...] = ()
+
+
+class Ran(NamedTuple):
+    """The lines that a program sends to run the first axis at a velocity, and to let it rest."""
+
+    velocity: int
+    lines: tuple[str, ...]
+    ends: tuple[str, ...]
+
+
+class Error(NamedTuple):
+    """What a program is told of the error that a motion into the limit leaves, by `error` and by `read_error`.
+
+    Regular expressions. `read_error` clears it.
+    """
+
+    said: str
+    reading: str
+
+
 @dataclass(frozen=True, kw_only=True)
 class FamilySample:
     """A family, as the suite tries it.
@@ -134,6 +164,8 @@ class FamilySample:
     moves: Moved
     far: str
     """A line that moves the first axis away for a long time, without a limit in the way."""
+    far_others: tuple[str, ...] = ()
+    """Lines that move its other axes away, for the stop."""
     ends: str | None
     """A line that stops that motion; None: only the stop does."""
     limited: str = ""
@@ -182,12 +214,20 @@ class FamilySample:
     """A word of the language, and the first line of its help; None: there is none."""
     completes: Read | None
     """The beginning of a word, and one that completion offers."""
-    runs: str | None
-    """The line by which a program of the API runs the first axis at velocity 1000; None: it has none."""
-    homes: str | None
-    """The line of the usual homing in the minus direction; None: it has none."""
+    position: str | None
+    """The word for the position of the first axis; None: there is none."""
+    runs: Ran | None
+    """How a program runs it at a velocity; None: it cannot."""
+    homes: Homed | None
+    """How a program homes it; None: it cannot."""
     output: str | None
-    """The line that switches output 1 on; None: it has none."""
+    """The line that switches output 1 on; None: a program cannot."""
+    current: str | None
+    """The word that tells whether there is current, which a program switches; None: it cannot."""
+    inputs: frozenset[int | str] | None
+    """The inputs that a program reads; None: it reads none."""
+    error: Error | None
+    """What a program reads of errors; None: there is nothing to read."""
 
     def to_first(self, line: str) -> str:
         """A line with the address of the first drive; a verb as it is."""

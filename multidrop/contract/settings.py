@@ -112,7 +112,7 @@ class Settings(Motions):
                 assert (await opened.say("/register 5"))[0].startswith("0x0005 = ")
             else:
                 for line in ("/register 5", "/coil 1", "/device"):
-                    await self.lacks(opened, line, "")
+                    await self.lacks(opened, line, f"{{}}: no registers; {line.split()[0]} is valid on ")
 
     @in_virtual_time
     async def test_a_snapshot_is_the_same_drive_in_the_simulator(self, desk: Desk) -> None:

@@ -2,10 +2,13 @@
 
 from multidrop.contract import (
     Absent,
+    Error,
     FamilyContract,
     FamilySample,
+    Homed,
     Moved,
     Program,
+    Ran,
     Read,
     Scaled,
     Setting,
@@ -14,6 +17,7 @@ from multidrop.contract import (
 )
 
 SWITCH = 'set = { IS = ["1,2,0"] }\nworld = { limit_plus = 30000 }'
+HOME = 'set = { IS = ["1,1,0"] }\nworld = { home = -2000 }'
 SHUTTLE = "PG 1\nLB G1\nMA 20000\nH\nMA 0\nH\nBR G1\nE\nPG\n"
 VM = Setting("VM", "VM=600000", "VM: here 600000, there 768000 steps/s", "VM=768000 (was 600000)", saves=b"S")
 SCALE = "5 mm/turn, 51200 steps a turn, one step is 0.0000977 mm, MS=256, EE=0, AS=0"
@@ -61,9 +65,13 @@ class TestMCode(FamilyContract):
         guarded="IP",
         help=Read("VM", "VM: Maximum velocity (variable)"),
         completes=Read("VI", "VI"),
-        runs="SL 1000",
-        homes="HM 1",
+        position="P",
+        runs=Ran(-20000, ("SL -20000",), ("SL 0",)),
+        homes=Homed(f'personality = "LMDCM"\nparty = true\n{HOME}', "HM 1"),
         output="O1=1",
+        current="DE",
+        inputs=frozenset({1, 2, 3, 4}),
+        error=Error("an error is set; read_error.. reads and clears its number", "error 83: plus limit.*"),
     )
 
 
@@ -109,7 +117,11 @@ class TestModbus(FamilyContract):
         guarded="IP",
         help=Read("VM", "VM: Maximum velocity (variable)"),
         completes=Read("VI", "VI"),
-        runs="SL 1000",
-        homes="HM 1",
+        position="P",
+        runs=Ran(-20000, ("SL -20000",), ("SL 0",)),
+        homes=Homed(f'personality = "LMDCE"\n{HOME}', "HM 1"),
         output="O1=1",
+        current="DE",
+        inputs=frozenset({1, 2, 3, 4}),
+        error=Error("an error is set; read_error.. reads and clears its number", "error 83: plus limit.*"),
     )

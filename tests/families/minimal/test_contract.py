@@ -42,9 +42,13 @@ class TestKnock(FamilyContract):
         guarded=None,
         help=None,
         completes=None,
+        position=None,
         runs=None,
         homes=None,
         output=None,
+        current=None,
+        inputs=None,
+        error=None,
     )
 
     @pytest.fixture(autouse=True)
