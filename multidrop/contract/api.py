@@ -103,7 +103,8 @@ class Api(Programs):
             for line in homes.setup:
                 await axis.send(line)
             for wrong in ("left", "-" if homes.direction == "" else ""):
-                with pytest.raises(Diagnostic, match="direction"):
+                sends = re.escape(f"home({repr(homes.direction) if homes.direction else ''}) sends {homes.line}")
+                with pytest.raises(Diagnostic, match=f"direction.*{sends}"):
                     await axis.home(wrong)
             with pytest.raises(Diagnostic, match="no mode nowhere; valid: "):
                 await axis.home(homes.direction, "nowhere")
@@ -138,7 +139,9 @@ class Api(Programs):
             assert await axis.position() * runs.velocity > 0
 
     @in_virtual_time
-    async def test_a_program_switches_output_and_current_and_reads_inputs(self, desk: Desk) -> None:
+    async def test_a_program_switches_output_and_current_and_reads_inputs(
+        self, desk: Desk, caplog: pytest.LogCaptureFixture
+    ) -> None:
         sample = self.sample
         async with self.program(desk) as axis:
             if sample.output is None:
@@ -149,10 +152,11 @@ class Api(Programs):
                 assert self.entered == [sample.output]
             if sample.current is None:
                 for call in (axis.enable, axis.disable):
-                    with pytest.raises(Inexpressible, match=r"able\(\): "):
+                    with pytest.raises(Inexpressible, match=rf"able\(\): {re.escape(sample.no_current)}"):
                         await call()
             else:
                 await axis.disable()
+                assert f"{axis.name}: no current: nothing holds the load; a load that hangs may drop" in caplog.messages
                 assert await axis.read(sample.current) == 0
                 await axis.enable()
                 assert await axis.read(sample.current) == 1
@@ -169,7 +173,7 @@ class Api(Programs):
         async with self.program(desk.again(self.sample.limited) if self.sample.limited else desk) as axis:
             if error is None:
                 for call in (axis.error, axis.read_error):
-                    with pytest.raises(Inexpressible):
+                    with pytest.raises(Inexpressible, match=re.escape(f"{axis.name}: {self.sample.no_error}")):
                         await call()
                 return
             assert await axis.error() is None and await axis.read_error() is None
@@ -216,9 +220,11 @@ class Api(Programs):
         limited = desk.again(drive=self.sample.limited)
         async with multidrop.connect_async(limited.url) as session:
             axis = session.drive(desk.names[0])
+            assert await axis.limits() == multidrop.Limits(False, False, None)
             for line in (*self.sample.setup, self.sample.far):
                 await axis.send(line)
             with pytest.raises(MotionFailed) as failure:
                 await axis.wait()
+            assert await axis.limits() == multidrop.Limits(False, True, None)
             assert self.said(self.sample.limit, str(failure.value))
             assert failure.value.position == await axis.position()

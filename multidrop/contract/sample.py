@@ -224,10 +224,14 @@ class FamilySample:
     """The line that switches output 1 on; None: a program cannot."""
     current: str | None
     """The word that tells whether there is current, which a program switches; None: it cannot."""
+    no_current: str = "such drives have no line for it"
+    """How the reason begins for which it cannot."""
     inputs: frozenset[int | str] | None
     """The inputs that a program reads; None: it reads none."""
     error: Error | None
     """What a program reads of errors; None: there is nothing to read."""
+    no_error: str = "such drives report no error by a number"
+    """How the reason begins for which there is nothing to read."""
 
     def to_first(self, line: str) -> str:
         """A line with the address of the first drive; a verb as it is."""

@@ -57,6 +57,18 @@ class Settings(Motions):
             assert await opened.say(f"/params diff {file}") == []
 
     @in_virtual_time
+    async def test_a_twin_follows_it_or_it_is_said_that_none_can(self, desk: Desk) -> None:
+        if with_word("/twin") is None:
+            return
+        async with desk.session() as opened:
+            twin = " ".join(f"/twin on {desk.names[0]}".split())
+            if self.sample.setting is None:
+                await self.lacks(opened, twin, "{}: no settings of such drives are known; nothing was sent")
+            else:
+                await opened.say(twin)
+                await opened.say("/twin off")
+
+    @in_virtual_time
     async def test_settings_are_saved_or_it_is_said_that_none_can_be(self, desk: Desk) -> None:
         saves = self.sample.setting.saves if self.sample.setting is not None else None
         async with desk.session() as opened:

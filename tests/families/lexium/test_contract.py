@@ -16,7 +16,7 @@ from multidrop.contract import (
     Wrong,
 )
 
-SWITCH = 'set = { IS = ["1,2,0"] }\nworld = { limit_plus = 30000 }'
+SWITCH = 'set = { IS = ["1,2,0", "2,3,0"] }\nworld = { limit_plus = 30000 }'
 HOME = 'set = { IS = ["1,1,0"] }\nworld = { home = -2000 }'
 SHUTTLE = "PG 1\nLB G1\nMA 20000\nH\nMA 0\nH\nBR G1\nE\nPG\n"
 VM = Setting("VM", "VM=600000", "VM: here 600000, there 768000 steps/s", "VM=768000 (was 600000)", saves=b"S")

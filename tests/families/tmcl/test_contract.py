@@ -74,6 +74,8 @@ class TestTmcl(FamilyContract):
         homes=Homed('personality = "TMCM-1241"\nworld.limit_minus = -2000', "RFS START, 0", "", ("SAP 193, 0, 1",)),
         output="SIO 1, 2, 1",
         current=None,
+        no_current="direct mode has no command for it",
         inputs=frozenset({0, 1, "home", "lim+", "lim-"}),
         error=None,
+        no_error="a module has no error to read: each refusal says its own; read('AP208')",
     )
