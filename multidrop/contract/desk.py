@@ -117,6 +117,7 @@ class Desk:
     ) -> None:
         registry.load_others()
         self.sample, self.folder = sample, folder
+        folder.mkdir(exist_ok=True)
         self.cell = cell or self._cell(drive or sample.drive)
         for name in ("CONFIG", "STATE", "DATA"):
             patch.setenv(f"MULTIDROP_{name}_DIR", str(folder / name.lower()))

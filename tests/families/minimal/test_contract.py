@@ -1,13 +1,16 @@
 """The least that a family must have, in the suite that all families pass: most of it says what it lacks."""
 
-from pathlib import Path
-
 import pytest
 
 from multidrop.base import registry
 from multidrop.base.registry import Entry
 from multidrop.contract import Absent, FamilyContract, FamilySample, Moved, Read, Wrong
 from tests.support import knock
+
+
+def listed(patch: pytest.MonkeyPatch) -> None:
+    """List the family, as the entry point of an installed package does."""
+    patch.setattr(registry, "_others", {"p": (Entry("knock", "dist", "1", "p"), knock.FAMILY)})
 
 
 class TestKnock(FamilyContract):
@@ -52,5 +55,5 @@ class TestKnock(FamilyContract):
     )
 
     @pytest.fixture(autouse=True)
-    def _listed(self, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-        monkeypatch.setattr(registry, "_others", {"p": (Entry("knock", "dist", "1", "p"), knock.FAMILY)})
+    def _listed(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        listed(monkeypatch)
