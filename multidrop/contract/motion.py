@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import re
 
 import pytest
 
@@ -13,6 +14,9 @@ from multidrop.dialects.families import FAMILIES
 from multidrop.dialects.motions import NO_SIGNS
 from multidrop.drives.events import Sample
 from multidrop.shell.events import By, OnBus
+
+FAR = 900_000
+"""A place that takes long to reach."""
 
 
 class Motions(OfFamily):
@@ -68,8 +72,21 @@ class Motions(OfFamily):
                         opened.events.clear()
                         await opened.run(line)
             assert self.said(limit, str(failure.value)), failure.value
-            assert failure.value.outcome == "limit"
+            assert line == "/wait stopped" and failure.value.outcome == "limit"
             assert (failure.value.position, 0) == (await self.places(opened))[0]
+
+    @in_virtual_time
+    async def test_a_limit_short_of_the_target_fails_the_wait_with_both_places(self, desk: Desk) -> None:
+        if (limit := self.sample.limit) is None:
+            return
+        async with desk.again(self.sample.limited).session() as opened:
+            await opened.say(*self.sample.setup, *FAMILIES[self.sample.family].move_to("", FAR))
+            with pytest.raises(MotionFailed) as failure:
+                await opened.run("/wait stopped")
+            place = (await self.places(opened))[0][0]
+            assert (failure.value.outcome, failure.value.position, failure.value.target) == ("limit", place, FAR)
+            reason = limit.partition(": ")[2]
+            assert re.search(f"stopped at {place} of {FAR}: {reason}$", str(failure.value)), failure.value
 
     @in_virtual_time
     async def test_a_stop_by_another_host_fails_the_wait(self, desk: Desk) -> None:
@@ -84,6 +101,22 @@ class Motions(OfFamily):
             with pytest.raises(MotionFailed) as failure:
                 await waiting
             assert (failure.value.outcome, failure.value.reason) == ("stopped", "not by this script")
+
+    @in_virtual_time
+    async def test_a_relative_move_has_the_target_that_it_had_at_its_beginning(self, desk: Desk) -> None:
+        if self.sample.limit is None or self.sample.ends is None:
+            return
+        family, place = FAMILIES[self.sample.family], self.sample.moves.place
+        async with desk.session() as opened:
+            await opened.say(*self.sample.setup, self.sample.moves.line, "/wait stopped", *family.move("", -place // 2))
+            await opened.say("/wait stopped")
+            assert (await self.places(opened))[0] == (place - place // 2, 0)
+            await opened.say(*family.move("", FAR))
+            await asyncio.sleep(0.3)
+            await opened.drive.run(opened.drive.family.perform(self.sample.ends))
+            with pytest.raises(MotionFailed) as failure:
+                await opened.run("/wait stopped")
+            assert (failure.value.outcome, failure.value.target) == ("stopped", place - place // 2 + FAR)
 
     @in_virtual_time
     async def test_an_automation_that_ends_early_stops_what_it_moved(self, desk: Desk) -> None:

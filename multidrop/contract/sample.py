@@ -75,6 +75,8 @@ class Setting(NamedTuple):
     """What `/params restore` prints, after the name of the drive."""
     saves: bytes | None
     """What the drive is sent to keep its settings, as a part of the bytes; None: it keeps none."""
+    defaults: bool = True
+    """The value in a new drive is known, and is that of the sample's drive."""
 
 
 class Program(NamedTuple):

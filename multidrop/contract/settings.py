@@ -48,12 +48,18 @@ class Settings(Motions):
             assert f"{self.sample.name}: nothing differs" in opened.told()
             await opened.say(setting.line)
             assert await opened.say(f"/params diff {file}") == [setting.differs]
+            if setting.defaults:
+                assert setting.differs in await opened.say("/params diff --defaults")
+            else:
+                said = await opened.refusal("/params diff --defaults")
+                assert said == f"{self.sample.name}: the defaults of its settings are not known; compare with a file"
             opened.session.questions.agreed = False
             said = await opened.refusal(f"/params restore {file}")
             assert "will be written" in said and said.endswith("nothing was sent; --yes agrees to it"), said
             opened.session.questions.agreed = True
             assert await opened.say(f"/params restore {file}") == [f"{self.sample.name}: {setting.restored}"]
             assert any("1 setting restored and read back" in text for text in opened.told())
+            assert not any("home before a move" in text for text in opened.told())
             assert await opened.say(f"/params diff {file}") == []
 
     @in_virtual_time

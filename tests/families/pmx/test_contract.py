@@ -52,7 +52,9 @@ class TestPmx(FamilyContract):
         axis="x",
         scaled=Scaled("0.01 mm/step", "0.01 mm/step, one step is 0.01 mm, SLX=0, POLX=0", "X{5 mm}", 500, (5.0, "mm")),
         turn="the controller does not report the steps of a turn",
-        setting=Setting("HSPD", "HSPD=600", "HSPD: here 600, there 1000 pulses/s", "HSPD=1000 (was 600)", b"STORE"),
+        setting=Setting(
+            "HSPD", "HSPD=600", "HSPD: here 600, there 1000 pulses/s", "HSPD=1000 (was 600)", b"STORE", False
+        ),
         program=Program("shuttle.prg", SHUTTLE, "0", "SR0=1", 13, "X1000", "FROB\n", "1:1: .*"),
         guarded="STORE",
         help=Read("HSPD", "HSPD: high speed: what a move runs at; an axis's own counts unless it is 0"),
