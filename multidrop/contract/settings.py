@@ -11,6 +11,11 @@ from multidrop.base.registry import with_word
 from multidrop.contract.desk import LINE, Desk, Opened, in_virtual_time
 from multidrop.contract.motion import Motions
 from multidrop.dialects.values import Value
+from multidrop.drives import telemetry
+from multidrop.drives.events import Valued
+from multidrop.shell.events import OnBus
+from multidrop.shell.plots.series import parse_series
+from multidrop.shell.roles import Series
 
 
 class Settings(Motions):
@@ -107,9 +112,26 @@ class Settings(Motions):
             if (word := self.sample.word) is not None:
                 found = await opened.drive.run(values.first(values.check(word.line)))
                 assert found == float(word.printed)
+                assert parse_series(opened.session, [word.line]) == (Series(LINE, desk.names[0], word.line),)
+                reading = opened.bus.telemetry.read([telemetry.Value(desk.names[0], word.line)], 0.1)
+                await asyncio.sleep(2.0)
+                reading.close()
+                events = [each.event for each in opened.events if isinstance(each, OnBus)]
+                read = [each.value for each in events if isinstance(each, Valued)]
+                assert len(read) > 10 and {*read} == {float(word.printed)}
             with pytest.raises(Exception, match="QQQQQQ") as failure:
                 await opened.drive.run(values.first(values.check("QQQQQQ")))
             assert "\n" not in str(failure.value)
+
+    def test_a_word_is_polled_by_a_command(self, desk: Desk) -> None:
+        if (word := self.sample.word) is None:
+            return
+        done = desk.command(
+            "poll", desk.url, word.line, "--drive", desk.names[0] or "all", "--every", "1", "--rows", "1"
+        )
+        head, row = done.out.splitlines()
+        named = f"{desk.names[0] or LINE}.{word.line}"
+        assert (done.code, head.split(), row.split()[1:]) == (0, ["time", named], [word.printed]), done
 
     @in_virtual_time
     async def test_its_conditions_are_read_in_parts_and_move_nothing(self, desk: Desk) -> None:

@@ -21,7 +21,6 @@ from multidrop.simulator.wire import Transmission, Wire
 from multidrop.simulator.world import World
 
 FRAME = Struct(">BBBBiB")
-BYTE = 10 / 9600
 
 
 class Frames:

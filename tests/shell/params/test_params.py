@@ -33,20 +33,6 @@ party = true
 set = { EM = 1, CK = 1, VM = 512000 }
 program_text = "PG 1\\nLB G1\\nH 1000\\nBR G1\\nE\\nPG\\n"
 """
-OTHERS = """
-[[bus]]
-name = "pmx"
-[[bus.drive]]
-personality = "PMX"
-[[bus]]
-name = "slide"
-[[bus.drive]]
-personality = "TMCM"
-[[bus]]
-name = "old"
-[[bus.drive]]
-personality = "MDIX"
-"""
 
 
 async def opened(tmp_path, text):
