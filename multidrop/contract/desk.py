@@ -35,7 +35,7 @@ from multidrop.simulator.families import family_of
 from multidrop.simulator.floor import Floor
 from multidrop.simulator.serving.in_process import SimPipe
 from multidrop.simulator.serving.running import RunningFloor
-from multidrop.transports import Transport
+from multidrop.transports import Transport, Unreachable
 
 LONGEST = 1e5
 """Virtual seconds after which a test has failed."""
@@ -66,6 +66,14 @@ def in_virtual_time(test: Callable[..., Coroutine[Any, Any, None]]) -> Callable[
             runner.run(limited(*given, **named))
 
     return run
+
+
+def _deaf(receive: Callable[..., None], port: object) -> Callable[..., None]:
+    def heard(self: object, data: bytes, now: float) -> None:
+        if self is not port:
+            receive(self, data, now)
+
+    return heard
 
 
 class Wire(SimPipe):
@@ -155,6 +163,8 @@ class Desk:
         return f'[[bus]]\nname = "{LINE}"\nbaud = 0\n{"".join(tables)}'
 
     async def _open(self, *given: object, **named: object) -> Transport:
+        if self.floor.floor.wires[LINE].hung_up:
+            raise Unreachable(f"{LINE}: unplugged")
         self.wire = Wire(self.floor, self.scheme != "" and self.sample.family != self._simulated)
         self.wire.lossy = self.deaf
         return self.wire
@@ -172,11 +182,16 @@ class Desk:
             self._floors[loop] = RunningFloor(Floor(read(self.cell, str(self.folder / "cell.toml"))))
         return self._floors[loop]
 
+    def silence(self, address: str) -> None:
+        """Let no bytes reach a drive any more, as if its cable were cut."""
+        (drive,) = [each for each in self.floor.floor.drives if each.spec.name == address]
+        self._patch.setattr(type(drive.unit.port), "receive", _deaf(type(drive.unit.port).receive, drive.unit.port))
+
     @asynccontextmanager
     async def session(self, *, agreed: bool = True) -> AsyncIterator[Opened]:
         """A session on the line; `agreed`: a person says yes to each question."""
         folder = self.folder
-        session = Session(Settings({}, folder / "config", folder / "state", data=folder / "data"))
+        session = Session(Settings({}, folder / "config", folder / "state", data=folder / "data"), reconnect=True)
         session.questions.agreed = agreed
         opened = Opened(self, session)
         session.subscribe(opened.events.append)

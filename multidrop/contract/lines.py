@@ -11,7 +11,7 @@ from typing import ClassVar
 
 import pytest
 
-from multidrop.base.errors import DriveError, Inexpressible, NoAnswer, Refused
+from multidrop.base.errors import DriveError, Inexpressible, NoAnswer, Refused, TransportLost
 from multidrop.contract.desk import LINE, TIMEOUT, Desk, in_virtual_time
 from multidrop.contract.sample import FamilySample
 from multidrop.dialects.codec import Procedure
@@ -205,6 +205,40 @@ class Lines(OfFamily):
             opened.wire.lossy = False
             await asyncio.sleep(20.0)
             assert (await opened.motions(self.sample.addresses[0]))[0].position == moves.place
+
+    @in_virtual_time
+    async def test_a_line_that_was_lost_comes_back_with_its_drives(self, desk: Desk) -> None:
+        reads = self.sample.reads
+        async with desk.session() as opened:
+            await opened.say(*self.sample.setup, self.sample.moves.line, "/wait stopped")
+            desk.floor.command(f"/sim unplug {LINE}")
+            with pytest.raises(TransportLost) as failure:
+                await opened.run(self.sample.moves.line)
+            assert "\n" not in str(failure.value)
+            await asyncio.sleep(5.0)
+            desk.floor.command(f"/sim plug {LINE}")
+            await asyncio.sleep(60.0)
+            assert [*opened.bus.drives] == [*self.sample.addresses]
+            (place, *_) = await opened.motions(self.sample.addresses[0])
+            assert (place.position, place.velocity) == (self.sample.moves.place, 0)
+            assert len(await opened.say(reads.line)) == 1
+
+    @in_virtual_time
+    async def test_a_drive_that_is_silent_once_the_line_is_back_is_named_and_kept(self, desk: Desk) -> None:
+        if len(self.sample.addresses) < 2:
+            return
+        silent = self.sample.addresses[-1]
+        async with desk.session() as opened:
+            desk.floor.command(f"/sim unplug {LINE}")
+            await asyncio.sleep(5.0)
+            desk.silence(silent)
+            opened.events.clear()
+            desk.floor.command(f"/sim plug {LINE}")
+            await asyncio.sleep(60.0)
+            assert [*opened.bus.drives] == [*self.sample.addresses]
+            assert any(re.fullmatch(f"{LINE}: .*{silent} does not reply", text) for text in opened.told()), (
+                opened.told()
+            )
 
     @in_virtual_time
     async def test_a_guarded_line_waits_for_a_yes(self, desk: Desk) -> None:
