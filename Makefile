@@ -14,8 +14,9 @@ PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
 demo: $(VENV)/.run
 	$(BIN)/multidrop demo
 
+# SINCE=main: what the changes since that commit can break; it says what it leaves out.
 test: $(VENV)/.dev
-	$(PYTEST)
+	$(PYTEST) $(if $(SINCE),--since $(SINCE))
 
 # One process a core: nothing here waits, and each collects for seconds.
 QUICK := not process and not tui and not wide and not slow
@@ -60,10 +61,11 @@ contracts: $(VENV)/.dev
 measured: $(VENV)/.dev
 	$(PYTEST) --cov --cov-report=
 
-# Measure again which tests coverage leaves out: a quarter of an hour.
+# Measure again which tests coverage leaves out, and which are slow: a quarter of an hour.
 unmeasured: $(VENV)/.dev
 	-$(PYTEST) --measure-all --cov --cov-report= --cov-context=test --durations=0 > $(VENV)/durations.txt
 	$(BIN)/python -m tests.support.choose_measured .coverage $(VENV)/durations.txt
+	$(BIN)/python -m tests.support.choose_slow $(VENV)/durations.txt
 
 # Measure again which tests execute which line, for `make mutants`: half an hour. TESTS="tests/drives": of these alone.
 map: $(VENV)/.dev

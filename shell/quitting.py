@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Iterable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from typing import Any
 
 from multidrop.base.text import counted, visible
@@ -29,7 +29,8 @@ class Unanswered:
     """The lines for drives that a session has begun to send, and that are not answered yet."""
 
     def __init__(self) -> None:
-        self._sent: dict[asyncio.Task[Any], str] = {}
+        self._sent: dict[asyncio.Task[Any], tuple[str, asyncio.Event]] = {}
+        """By the task that sends it: a line, and what is set once it is answered. The task may go on with others."""
 
     @contextmanager
     def sending(self, text: str) -> Iterator[None]:
@@ -38,19 +39,23 @@ class Unanswered:
         if task is None or task in self._sent:
             yield
             return
-        self._sent[task] = text.strip()
+        answered = asyncio.Event()
+        self._sent[task] = text.strip(), answered
         try:
             yield
         finally:
             del self._sent[task]
+            answered.set()
 
     async def answered(self, limit: float) -> list[str]:
         """Wait until all of them are answered, for `limit` seconds at most; return a text for each other one."""
         own = asyncio.current_task()
-        waiting = [task for task in self._sent if task is not own]
-        if waiting:
-            await asyncio.wait(waiting, timeout=limit, return_when=asyncio.ALL_COMPLETED)
-        return [f"'{self._sent[task]}' is not answered yet" for task in waiting if task in self._sent]
+        waiting = [sent for task, sent in self._sent.items() if task is not own]
+        with suppress(TimeoutError):
+            async with asyncio.timeout(limit):
+                for _, answered in waiting:
+                    await answered.wait()
+        return [f"'{text}' is not answered yet" for text, answered in waiting if not answered.is_set()]
 
 
 def say_unsent(channel: Channel, lines: Iterable[str]) -> None:

@@ -29,6 +29,7 @@ from tests.support.procedure import ProcedureRunner
 pytest_plugins = [
     "tests.support.marks",
     "tests.support.measuring",
+    "tests.support.since",
     "tests.support.front_door",
     "tests.support.served_cell",
 ]

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
-QUIET, LONGEST_QUIET = 0.1, 1.0
-"""Seconds without a byte after which the drives have replied to what made a line harmless, and the longest wait."""
+QUIET, LONGEST_QUIET = 0.6, 2.0
+"""Seconds without a byte after which the drives have replied to what made a line harmless, and the longest wait.
+
+A busy drive takes up to half a second. This wait is rare: a client has gone within a line.
+"""
 
 
 class Settling:

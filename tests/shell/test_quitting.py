@@ -41,3 +41,20 @@ async def test_an_end_waits_for_the_lines_that_were_sent_but_only_so_long() -> N
         assert asyncio.get_running_loop().time() - begun == pytest.approx(3.0)
         assert await lines.answered(10.0) == [], "it does not wait for itself"
     await asyncio.gather(*sent)
+
+
+async def test_an_end_does_not_wait_for_what_the_task_does_once_its_line_is_answered() -> None:
+    """The task of a prompt's lines goes on with the next one, which may be the quit."""
+    lines = Unanswered()
+
+    async def prompt() -> None:
+        with lines.sending("PR P"):
+            await asyncio.sleep(0.1)
+        await asyncio.sleep(1000.0)
+
+    task = asyncio.create_task(prompt())
+    await asyncio.sleep(0)
+    begun = asyncio.get_running_loop().time()
+    assert await lines.answered(20.0) == []
+    assert asyncio.get_running_loop().time() - begun == pytest.approx(0.1)
+    task.cancel()

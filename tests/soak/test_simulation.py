@@ -253,23 +253,27 @@ def test_the_end_of_a_value_that_nothing_cut_in_two_is_a_breach(heard: bytes) ->
 
 
 @pytest.mark.parametrize(
-    ("back", "said", "begun"),
+    ("at", "said", "begun"),
     [
         (9.5, "l0: the stop of 1, 2 was sent first (the loss kept it from the drives)", True),
         (5.0, "l0: the stop of 1, 2 was sent first (the loss kept it from the drives)", False),
         (9.5, "l1: the stop of 1, 2 was sent first (the loss kept it from the drives)", False),
         (9.5, "l0 is back after 6.8 s", False),
+        (9.5, "/stop: stop sent to every drive; macros and scripts wait for /resume", True),
+        (5.0, "/stop: stop sent to every drive; macros and scripts wait for /resume", False),
+        (10.0, "Ctrl+X: stop sent to every drive; macros and scripts wait for /resume", False),
     ],
 )
-def test_a_key_goes_on_with_a_stop_that_a_line_was_owed(back: float, said: str, begun: bool) -> None:
-    """The key that it is from is long ago. Without a loss it is a stop of an automation, which holds up no key."""
+def test_a_key_goes_on_with_a_typed_stop_or_one_that_a_line_was_owed(at: float, said: str, begun: bool) -> None:
+    """Otherwise what leaves is a stop of an automation, which holds up no key."""
     own = {"l0": (1, 0)}
     stop = Stop(10.0, {"l0": (b"stop",)}, written=1, own=own, parts={"l0": (b"stop",)})
     history = History(stops=[Stop(1.0, {}), stop], written=[(9.9, "l0", b"stop")])
-    history.opened.append((back, "l0", 0))
-    history.notices.append((back, said))
+    history.notices.append((at, said))
     world: Any = SimpleNamespace(history=history, place=lambda line: Place("l0", "tmcl", ("1",), 1, 0, 9600, True))
     assert under_way(world, "l0", stop) is begun
+    history.opened.append((9.0, "l0", 0))
+    assert under_way(world, "l0", stop) is (begun or said.startswith("l0: the stop")), "each connection begins with it"
 
 
 def test_with_a_checksum_noise_alone_excepts_nothing() -> None:

@@ -35,6 +35,9 @@ STARTS = frozenset({"subprocess.Popen", "os.fork", "os.forkpty", "os.posix_spawn
 NIGHTLY = frozenset(Path(__file__).with_name("nightly.txt").read_text(encoding="utf-8").splitlines())
 """Cases that take long and differ from others of their test, which every run takes, in a value only."""
 
+SLOW = frozenset(Path(__file__).with_name("slow.txt").read_text(encoding="utf-8").splitlines())
+"""Test functions that were measured to take long, and are marked slow without a word in their file."""
+
 _running: list[pytest.Item] = []
 """The test that runs, its fixtures included."""
 
@@ -203,8 +206,12 @@ def nightly(pytestconfig: pytest.Config) -> bool:
     return bool(pytestconfig.getoption("nightly"))
 
 
+@pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Leave out what only the nightly run takes, and spread what waits."""
+    """Mark what was measured to be slow, leave out what only the nightly run takes, and spread what waits."""
+    for item in items:
+        if re.split(r"[\[|]", item.nodeid, maxsplit=1)[0] in SLOW:
+            item.add_marker("slow")
     _leave_out(config, items)
     items[:] = _spread(items)
 

@@ -152,12 +152,18 @@ def _written(life: Lived, line: str, index: int) -> bytes:
 def under_way(life: Lived, line: str, stop: Stop) -> bool:
     """Whether a person's stop before it is on its way to the drives: then this one goes on with that.
 
-    A stop that was owed to a lost line, and left as it came back, is one. That of an automation, of some drives, is
-    none.
+    A stop that was owed to a lost line, and left as it came back, is one, and `/stop` is. That of an automation, of
+    some drives, is none.
     """
-    before = _after_a_loss(life, line, stop) or any(
-        each is not stop and each.at <= stop.at and (line in each.lost or each.at >= stop.at - STILL)
-        for each in life.history.stops
+    before = (
+        _after_a_loss(life, line, stop)
+        or any(stop.at - STILL <= at <= stop.at and TYPED.match(text) for at, text in life.history.notices)
+        or any(
+            each is not stop
+            and each.at <= stop.at
+            and (line in each.lost or each.at >= stop.at - STILL or _nothing_else(life, line, each, stop))
+            for each in life.history.stops
+        )
     )
     stops = [each for each in life.history.stops if stop.at - STILL <= each.at <= stop.at and line in each.own]
     earlier = stops[: stops.index(stop)]
@@ -174,10 +180,24 @@ def under_way(life: Lived, line: str, stop: Stop) -> bool:
 
 
 def _after_a_loss(life: Lived, line: str, stop: Stop) -> bool:
-    """Whether a line came back right before a stop, and is said to have got one first, which it was owed."""
+    """Whether a line got a stop that it was owed, right before this one: it had been lost, and is said to have got one.
+
+    That is said at the first connection; each one that follows, until the line is back, begins with the stop.
+    """
     history, said = life.history, re.compile(rf"{line[:2]}: the stop of .* was sent first")
-    back = any(name == line and stop.at - STILL <= at <= stop.at for at, name, _ in history.opened)
-    return back and any(at <= stop.at and said.match(text) for at, text in history.notices)
+    owed = [at for at, text in history.notices if at <= stop.at and said.match(text)]
+    opened = any(name == line and stop.at - STILL <= at <= stop.at for at, name, _ in history.opened)
+    return bool(owed) and (opened or owed[-1] >= stop.at - STILL)
+
+
+def _nothing_else(life: Lived, line: str, before: Stop, stop: Stop) -> bool:
+    """Whether nothing but parts of a stop has left between two: with many motors it takes seconds."""
+    if line not in before.own:
+        return False
+    between = range(before.own[line][0], stop.own[line][0])
+    mine = (index for index in between if life.history.written[index][1] == line)
+    lefts = filter(None, (_written(life, line, index) for index in mine))
+    return all(_is_stop(before, line, left) or _is_stop(stop, line, left) for left in lefts)
 
 
 def _of_an_opening(life: Lived, line: str, stop: Stop, left: bytes) -> bool:
@@ -214,6 +234,8 @@ def stop_bytes(life: Lived, line: str, stop: Stop, until: float) -> bytes:
         return whole[len(before) :]
 
 
+TYPED = re.compile(r"(?!Ctrl\+X)\S+: stop sent to every drive")
+"""What is said of a stop that came by no key, such as `/stop`."""
 STILL = 2.0
 """The time, s, in which a stop may still be on its way, although the loop has written nothing since."""
 UNDER_WAY = 0.2
