@@ -23,9 +23,9 @@ TEXTS = "tests/docs/test_links.py"
 @pytest.mark.parametrize(
     ("change", "runs", "leaves"),
     [
-        ("features/usb/schemes.py", (USB, RECORDS, TEXTS), (WIRE, SCREEN, PMX, DOOR)),
-        ("features/usb/anything.csv", (USB, RECORDS, TEXTS), (WIRE, SCREEN, PMX, DOOR)),
-        ("features/usb/not_there.py", (USB, RECORDS, TEXTS), (WIRE, SCREEN, PMX, DOOR)),
+        ("features/usb/schemes.py", (USB, RECORDS, TEXTS), (WIRE, SCREEN, HOST, DOOR)),
+        ("features/usb/anything.csv", (USB, RECORDS, TEXTS), (WIRE, SCREEN, HOST, DOOR)),
+        ("features/usb/not_there.py", (USB, RECORDS, TEXTS), (WIRE, SCREEN, HOST, DOOR)),
         ("families/pmx/manual/commands.csv", (PMX, TEXTS), (WIRE, SCREEN, DOOR)),
         ("tui/app.py", (SCREEN, DOOR, SUITE, TEXTS), (WIRE, HOST)),
         ("drives/inbox.py", (WIRE, SCREEN, DOOR, TEXTS), ("tests/transports/test_pipes.py", "tests/macros/")),
