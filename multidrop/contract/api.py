@@ -71,7 +71,7 @@ class Api(Programs):
     @in_virtual_time
     async def test_a_program_moves_by_quantities(self, desk: Desk) -> None:
         if (scaled := self.sample.scaled) is None:
-            return
+            self.without("lines with quantities")
         async with multidrop.connect_async(desk.url) as session:
             axis, (place, unit) = session.drive(desk.names[0]), scaled.quantity
             await session.send(" ".join(f"/units {self.sample.measured} {scaled.scale}".split()))
@@ -216,7 +216,7 @@ class Api(Programs):
     @in_virtual_time
     async def test_a_motion_that_fails_is_an_exception(self, desk: Desk) -> None:
         if self.sample.limit is None:
-            return
+            self.without("signs of how a motion ended")
         limited = desk.again(drive=self.sample.limited)
         async with multidrop.connect_async(limited.url) as session:
             axis = session.drive(desk.names[0])

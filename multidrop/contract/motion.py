@@ -63,7 +63,7 @@ class Motions(OfFamily):
     @in_virtual_time
     async def test_a_limit_fails_the_wait_and_the_next_line_is_not_sent(self, desk: Desk) -> None:
         if (limit := self.sample.limit) is None:
-            return
+            self.without("signs of how a motion ended")
         async with desk.again(self.sample.limited).session() as opened:
             session, reads = opened.session, self.sample.reads
             with pytest.raises(MotionFailed) as failure:
@@ -78,7 +78,7 @@ class Motions(OfFamily):
     @in_virtual_time
     async def test_a_limit_short_of_the_target_fails_the_wait_with_both_places(self, desk: Desk) -> None:
         if (limit := self.sample.limit) is None:
-            return
+            self.without("signs of how a motion ended")
         async with desk.again(self.sample.limited).session() as opened:
             await opened.say(*self.sample.setup, *FAMILIES[self.sample.family].move_to("", FAR))
             with pytest.raises(MotionFailed) as failure:
@@ -91,7 +91,7 @@ class Motions(OfFamily):
     @in_virtual_time
     async def test_a_stop_by_another_host_fails_the_wait(self, desk: Desk) -> None:
         if self.sample.limit is None or self.sample.ends is None:
-            return
+            self.without("signs of how a motion ended")
         async with desk.session() as opened:
             await self.far(opened)
             waiting = asyncio.ensure_future(opened.run("/wait stopped"))
@@ -105,7 +105,7 @@ class Motions(OfFamily):
     @in_virtual_time
     async def test_a_relative_move_has_the_target_that_it_had_at_its_beginning(self, desk: Desk) -> None:
         if self.sample.limit is None or self.sample.ends is None:
-            return
+            self.without("signs of how a motion ended")
         family, place = FAMILIES[self.sample.family], self.sample.moves.place
         async with desk.session() as opened:
             await opened.say(*self.sample.setup, self.sample.moves.line, "/wait stopped", *family.move("", -place // 2))
