@@ -241,6 +241,7 @@ class Programs(Settings):
             await asyncio.sleep(5.0)
             assert await self.places(opened) == stood
             await opened.say(f"/upload {desk.folder / ('back-' + program.file)}")
+            assert (desk.folder / f"back-{program.file}").read_text() == program.text
             opened.begin()
             await opened.say(f"/download {desk.folder / ('back-' + program.file)} --only-changed")
             assert any("already; nothing was sent" in text for text in opened.told()), opened.told()
