@@ -1,5 +1,7 @@
 """MCode and Modbus in the suite that all families pass."""
 
+from dataclasses import replace
+
 from multidrop.contract import (
     Absent,
     Error,
@@ -72,6 +74,22 @@ class TestMCode(FamilyContract):
         current="DE",
         inputs=frozenset({1, 2, 3, 4}),
         error=Error("an error is set; read_error.. reads and clears its number", "error 83: plus limit.*"),
+    )
+
+
+OLD = 'personality = "MDIX"\nparty = true'
+
+
+class TestMDrivePlus(FamilyContract):
+    sample = replace(
+        TestMCode.sample,
+        drive=f'{OLD}\nset = {{ S1 = "16,1,0" }}',
+        product="MDIX",
+        limited=f'{OLD}\nset = {{ S2 = "2,0,0", S3 = "3,0,0" }}\nworld = {{ limit_plus = 30000 }}',
+        scaled=Scaled("5 mm/turn", f"{SCALE.removesuffix(', AS=0')}, EL=512", "MA {10 mm}", 102400, (10.0, "mm")),
+        setting=Setting("S4", "S4=17,1", "S4: here [17, 1, 0], there [0, 0, 0]", "S4=0,0,0 (was [17, 1, 0])", b"S"),
+        homes=Homed(f'{OLD}\nset = {{ S1 = "1,0,0" }}\nworld = {{ home = -2000 }}', "HM 1"),
+        inputs=frozenset({2, 3, 4}),
     )
 
 
