@@ -1,9 +1,9 @@
 """What a feature declares: its name, its meaning, and everything that it adds, in one record.
 
 A feature adds records of the classes that the rooms read: `shell.operations.operation.Operation` (a verb, a command),
-`shell.hooks.Options` (options of a command that is there), `shell.hooks.AtSession` (what is done when a session opens:
-subscribe to its events), and so on; docs/plugins.md lists them. The rooms ask `base.registry.added` for the records of
-their class, so they know no feature.
+`shell.hooks.Options` (options of a command that is there), `shell.at_session.AtSession` (what is done when a session
+opens: subscribe to its events), and so on; docs/plugins.md lists them. The rooms ask `base.registry.added` for the
+records of their class, so they know no feature.
 
 A class of records may have two methods: `claims` gives what only one feature can add, in words, and `passes` the kinds
 of errors that the callers of its functions expect, by the names of these (`base.foreign`).

@@ -1,26 +1,37 @@
 """Where a user's files are: the configuration, the state that a run leaves for the next one, and the data.
 
-`MULTIDROP_CONFIG_DIR`, `MULTIDROP_STATE_DIR` and `MULTIDROP_DATA_DIR` move them. With `--no-config` the
-configuration file and a person's own features are ignored.
+`MULTIDROP_CONFIG_DIR`, `MULTIDROP_STATE_DIR` and `MULTIDROP_DATA_DIR` move them. With `MULTIDROP_NO_CONFIG`, which
+`--no-config` sets, the configuration file and a person's own features are ignored.
 """
 
 from __future__ import annotations
 
 import os
-from contextvars import ContextVar
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
-_ignored: ContextVar[bool] = ContextVar("ignored", default=False)
+NO_CONFIG = "MULTIDROP_NO_CONFIG"
+"""The variable that says so; a thread and a program that this one starts see it as well."""
 
 
-def ignore_configuration() -> None:
-    """Ignore the configuration file and a person's own features from now on, in this context (`--no-config`)."""
-    _ignored.set(True)
+@contextmanager
+def without_configuration() -> Iterator[None]:
+    """Ignore the configuration file and a person's own features while the body runs (`--no-config`)."""
+    before = os.environ.get(NO_CONFIG)
+    os.environ[NO_CONFIG] = "1"
+    try:
+        yield
+    finally:
+        if before is None:
+            del os.environ[NO_CONFIG]
+        else:
+            os.environ[NO_CONFIG] = before
 
 
 def configuration_ignored() -> bool:
     """Whether the configuration file and a person's own features are ignored."""
-    return _ignored.get()
+    return bool(os.environ.get(NO_CONFIG))
 
 
 def config_folder() -> Path:

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Iterable
-from typing import TypeVar
+from collections.abc import Callable, Iterable, Mapping
+from typing import Any, TypeVar
 
 from multidrop.base.errors import TransportLost
-from multidrop.dialects import DriveState, Hints, Procedure
+from multidrop.dialects import DriveState, Hints, Procedure, Started
 from multidrop.dialects.families import DEFAULT, FAMILIES
 from multidrop.drives.conversations import Conversations
 from multidrop.drives.drive import Drive
@@ -40,20 +40,16 @@ class Bus:
         keeper = keeper or Keeper()
         assumed = FAMILIES[family or DEFAULT]
         self.line = Line(assumed.codec, baud=baud, local_echo=local_echo, timeout=timeout)
-        self.link = link = Link(name, transport, self.line, keeper)
-        self.start, self.now, self.watch, self.notify = link.start, link.now, link.watch, link.notify
+        self.link = Link(name, transport, self.line, keeper)
         self._conversations = Conversations(self.link, keeper)
-        self.run = self._conversations.run
         self.witnesses = self._conversations.witnesses
         """The functions called at the end of every conversation."""
         self.keeper = keeper
         self.silent = ""
         """Why no drive is listed: the failure of the search for them; empty: none has failed."""
         self.roster = Roster(self._conversations, assumed, keeper)
-        self.at = self.roster.at
         self.telemetry = Telemetry(self.roster)
         self._stopping = Stopping(self.roster)
-        self.stop_ahead, self.halt, self.halted = self._stopping.ahead, self._stopping.halt, self._stopping.halted
 
     @property
     def name(self) -> str:
@@ -64,7 +60,31 @@ class Bus:
         """The loss of the port, until its drives are found again; None otherwise."""
         return self.link.loss
 
+    def start(self) -> None:
+        """Begin to read the line."""
+        self.link.start()
+
+    def now(self) -> float:
+        """The time on the clock of the line, s."""
+        return self.link.now()
+
+    def watch(self, callback: Callable[[Any], None], *kinds: type) -> Callable[[], None]:
+        """Call back with every event of these kinds; see `Publisher.subscribe`."""
+        return self.link.watch(callback, *kinds)
+
+    def notify(self, text: str, address: str = "", warning: bool = False) -> None:
+        """Publish a notice for a person."""
+        self.link.notify(text, address, warning)
+
+    async def run(self, procedure: Procedure[T], state: DriveState, searching: bool = False) -> T:
+        """Run a conversation to its end; see `Conversations.run`."""
+        return await self._conversations.run(procedure, state, searching)
+
     # Drives
+
+    def at(self, address: str) -> Drive:
+        """The drive at an address, listed or not; see `Roster.at`."""
+        return self.roster.at(address)
 
     @property
     def drives(self) -> dict[str, Drive]:
@@ -171,6 +191,24 @@ class Bus:
     @property
     def last_stop(self) -> Halt | None:
         return self._stopping.last
+
+    def stop_ahead(self) -> None:
+        """Write the stop from any thread; `halt` must follow in the loop."""
+        self._stopping.ahead()
+
+    def halt(
+        self,
+        only: Iterable[Drive] | None = None,
+        follows: bool = True,
+        *,
+        started: Mapping[Drive, Started] | None = None,
+    ) -> Halt:
+        """Write a stop of all drives or some, and nothing else; see `Stopping.halt`. `halted` must follow."""
+        return self._stopping.halt(only, follows, started=started)
+
+    def halted(self, halt: Halt, confirm: bool = True) -> None:
+        """Publish a stop, and look for its effect."""
+        self._stopping.halted(halt, confirm)
 
     def stop(self, only: Iterable[Drive] | None = None) -> Halt:
         """Stop every drive at once, or some: both phases, for a caller with one bus."""

@@ -9,6 +9,7 @@ import asyncio
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from math import inf, nextafter
+from typing import Any
 
 from multidrop.base.errors import TransportLost
 from multidrop.base.isolation import isolated
@@ -87,14 +88,27 @@ class Link:
         self._rest: list[StopPiece] = []
         """What was still to be written of a stop then."""
         self._loop = running_loop()
-        self.now, self.call_soon = self._loop.time, self._loop.call_soon_threadsafe
         self._stamped = -inf
         self._waiting: dict[int, OnAnswer] = {}
         self._advancing = self._further = False
         self._news = events.EventQueue(name)
-        self.watch, self.publish = self._news.subscribe, self._news.publish
         self._timer: asyncio.TimerHandle | None = None
         self._answering = isolated(f"a conversation on {name}")
+
+    def now(self) -> float:
+        """The time on the event loop's clock, s."""
+        return self._loop.time()
+
+    def call_soon(self, callback: Callable[[], None]) -> None:
+        """Have the event loop call back; from any thread."""
+        self._loop.call_soon_threadsafe(callback)
+
+    def watch(self, callback: Callable[[Any], None], *kinds: type) -> Callable[[], None]:
+        """Call back with every event of these kinds; see `Publisher.subscribe`."""
+        return self._news.subscribe(callback, *kinds)
+
+    def publish(self, event: events.BusEvent) -> None:
+        self._news.publish(event)
 
     def start(self) -> None:
         self._opened_at = self.now()

@@ -240,7 +240,6 @@ class Roster:
         self.sweep: tuple[StopPiece, ...] = ()
         """A stop of the whole link ends with it: of addresses that a search has asked, and that have not replied."""
         self.restarts = Restarts(self.link, lambda: self.drives.values())
-        self.homes = self.restarts.homes
         self.stated: tuple[str, ...] = ()
         """The addresses that the first search was given."""
         self.on_stored_stop: Callable[[Drive], None] = lambda drive: None
@@ -291,6 +290,10 @@ class Roster:
         self.unlisted |= {drive.address: drive for drive in before.values() if drive not in self.drives.values()}
         self.settings_may_have_changed(self.unlisted.values())
         self._follow()
+
+    def homes(self, drive: Drive, axis: str) -> None:
+        """Watch the homing of a drive to its end."""
+        self.restarts.homes(drive, axis)
 
     def at(self, address: str) -> Drive:
         """The drive at an address; an unknown one, or all (`*`, `^`), is taken to be set like the first."""

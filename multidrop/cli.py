@@ -11,12 +11,9 @@ import argparse
 import os
 import sys
 from collections.abc import Mapping, Sequence
-from contextvars import copy_context
-from functools import partial
+from contextlib import AbstractContextManager, nullcontext
 from importlib.machinery import PathFinder
 from typing import TYPE_CHECKING, Any, NoReturn
-
-from multidrop.base.on_demand import imported
 
 if TYPE_CHECKING:
     from _typeshed import SupportsWrite
@@ -160,13 +157,11 @@ def _has_others(given: Sequence[str], known: Sequence[Parameter]) -> bool:
 
 def _load_others(given: Sequence[str]) -> None:
     """Load the features by others, whose commands a line may mean; say of each that cannot be loaded why."""
-    from multidrop.base.places import ignore_configuration
+    from multidrop.base.places import without_configuration
     from multidrop.shell.operations.table import load_others
 
-    context = copy_context()
-    if "--no-config" in given:
-        context.run(ignore_configuration)
-    _warn(context.run(load_others))
+    with without_configuration() if "--no-config" in given else nullcontext():
+        _warn(load_others())
 
 
 def _warn(warnings: Sequence[str]) -> None:
@@ -217,17 +212,24 @@ def run(chosen: argparse.Namespace) -> int:
     from multidrop.shell.hooks import Added
     from multidrop.shell.streams.stdout import fail
 
-    context = copy_context()
-    if hasattr(chosen, "no_config"):
-        context.run(imported("multidrop.commands.machine:ignore"))
     try:
-        more = {"added": Added(chosen.command, chosen)} if getattr(chosen.run_by, "open", False) else {}
-        code: int = context.run(partial(command, **more), chosen)
-        return code
+        with _without_configuration() if hasattr(chosen, "no_config") else nullcontext():
+            more = {"added": Added(chosen.command, chosen)} if getattr(chosen.run_by, "open", False) else {}
+            code: int = command(chosen, **more)
+            return code
     except (Diagnostic, TransportLost) as problem:
         return fail(problem)
     finally:
         _warn(registry.warnings())  # of features that were loaded for a word of a file, without a session
+
+
+def _without_configuration() -> AbstractContextManager[None]:
+    """Ignore the configuration file, once it is said what of it is not in force."""
+    from multidrop.base.places import without_configuration
+    from multidrop.commands.machine import say_not_in_force
+
+    say_not_in_force()
+    return without_configuration()
 
 
 def extras() -> dict[str, str]:

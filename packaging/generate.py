@@ -220,6 +220,7 @@ SECTIONS = {
         ("MULTIDROP_CONFIG_DIR", "the folder of the configuration and the macros"),
         ("MULTIDROP_STATE_DIR", "the folder of the history and of what an interrupted session left"),
         ("MULTIDROP_DATA_DIR", "the folder of the backups of programs"),
+        ("MULTIDROP_NO_CONFIG", "if set, the configuration is not read, as with --no-config"),
     ],
     "FILES": [("~/.config/multidrop/multidrop.toml", "saved connections: tables [connections.NAME] with a url")],
 }

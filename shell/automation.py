@@ -12,8 +12,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 from collections.abc import AsyncIterator, Callable, Collection, Iterator, Mapping
-from contextvars import ContextVar
-from dataclasses import dataclass, field
+from dataclasses import replace
 
 from multidrop.base.errors import Diagnostic
 from multidrop.base.isolation import isolated
@@ -25,6 +24,8 @@ from multidrop.drives.port_journal import GLOBAL
 from multidrop.drives.stopping import Halt
 from multidrop.shell import stop_report
 from multidrop.shell.at_rest import excused
+from multidrop.shell.automation_record import Automation, Claim, Sent
+from multidrop.shell.origin import Origin
 from multidrop.shell.workspace import Workspace
 
 LINGER = 3.0
@@ -40,46 +41,6 @@ TRIAL = 10.0
 AGREED = "/resume agrees to that (send, run: --yes)"
 UNKNOWN = " and any other drive on this line"
 """What the stop of a line without an address stops as well."""
-Claim = tuple["Link", str]
-"""A link and an address on it; a global address is all of the link."""
-_current: ContextVar[Automation | None] = ContextVar("automation", default=None)
-
-
-@dataclass(frozen=True)
-class Sent:
-    """What an automation has sent to a drive that can have started it."""
-
-    at: float
-    """When the last of it was about to be sent, s of the link's clock."""
-    what: Started
-    why: str = ""
-    """Why it may move, where none of that has started it."""
-
-
-@dataclass(eq=False)
-class Automation:
-    """One automation: the drives it started, and their stops. The address `*` is all of a bus."""
-
-    stops: int
-    """The number of stops of everything before its first start."""
-    name: str = ""
-    """Its name in messages, such as `macro shuttle`."""
-    claims: frozenset[Claim] = frozenset()
-    """The drives that it will start."""
-    still: str = ""
-    """The reason why it may start nothing now; empty: it may."""
-    started: dict[Drive, Sent] = field(default_factory=dict)
-    stopped: dict[Drive, Sent] = field(default_factory=dict)
-    """Those of `started` whose stops are written."""
-    halts: list[Halt] = field(default_factory=list)
-    """The stops of its drives, once they are written."""
-
-    def has(self, claim: Claim) -> bool:
-        """True if a drive is one of those that it claimed or started."""
-        own = [*self.claims, *((drive.link, drive.address) for drive in self.started)]
-        return any(
-            each[0] is claim[0] and (each[1] == claim[1] or each[1] in GLOBAL or claim[1] in GLOBAL) for each in own
-        )
 
 
 class Automations:
@@ -94,23 +55,23 @@ class Automations:
         """An interruption came; another one would end the lines after a macro's early end, too."""
 
     @contextlib.asynccontextmanager
-    async def run(self, name: str = "", claims: Collection[Claim] = ()) -> AsyncIterator[None]:
-        """Run the body as an automation, or as a part of the current one. Its early end stops what it started.
+    async def run(self, origin: Origin, name: str = "", claims: Collection[Claim] = ()) -> AsyncIterator[Origin]:
+        """Run the body as an automation, or as a part of that of the origin. Its early end stops what it started.
 
-        Raises Diagnostic where another automation has one of the claimed drives.
+        The lines of the body have the origin that it is given. Raises Diagnostic where another automation has one of
+        the claimed drives.
         """
-        part_of = _current.get()
+        part_of = origin.automation
         for claim in claims:
             self._check_free(claim, part_of)
         if part_of is not None:
             with _claiming(part_of, name, claims):
-                yield
+                yield origin
             return
         automation = Automation(self._workspace.stops, name, frozenset(claims))
         self._running.append(automation)
-        token = _current.set(automation)
         try:
-            yield
+            yield replace(origin, automation=automation)
         except (asyncio.CancelledError, GeneratorExit):
             self._stop(automation)  # the canceller goes on, and sees the outcome of the stop
             raise
@@ -121,7 +82,6 @@ class Automations:
                 self._workspace.notify(text, warning=True)
             raise
         finally:
-            _current.reset(token)
             self._running.remove(automation)
 
     def _check_free(self, claim: Claim, own: Automation | None) -> None:
@@ -133,19 +93,15 @@ class Automations:
                 hint = "wait for its end, or stop it (/play stop)"
                 raise Diagnostic(f"{who} moves it, so nothing was sent", where, hint)
 
-    @property
-    def current(self) -> Automation | None:
-        return _current.get()
-
-    def starts(self, drive: Drive, what: Started | None = None, *, only_ends: bool = False) -> None:
-        """Record that the current automation can start a drive now; by default anything in it.
+    def starts(self, origin: Origin, drive: Drive, what: Started | None = None, *, only_ends: bool = False) -> None:
+        """Record that the automation of a line can start a drive now; by default anything in it.
 
         Raises Diagnostic where it may not: another automation has the drive. `only_ends`: with a line that can only
         end motion, which is refused to no `still` one, and starts nothing.
         """
         if self._workspace.doubted and not only_ends:
             raise Diagnostic(self._workspace.doubted, drive.shown, f"press Ctrl+X once; {AGREED}")
-        automation = _current.get()
+        automation = origin.automation
         if automation is None:
             return
         if automation.still and not only_ends:
@@ -171,9 +127,9 @@ class Automations:
         elif drive in automation.started:
             automation.started[drive] = before
 
-    async def end(self) -> list[Halt]:
-        """Stop at once what the current automation started; what it starts after that is new. Return the stops."""
-        automation = _current.get()
+    async def end(self, origin: Origin) -> list[Halt]:
+        """Stop at once what the automation started; what it starts after that is new. Return the stops."""
+        automation = origin.automation
         if automation is None:
             return []
         try:
@@ -185,15 +141,15 @@ class Automations:
             automation.halts.clear()
         return halts
 
-    def leave(self) -> None:
-        """Let what the current automation started go on, whatever becomes of it."""
-        if (automation := _current.get()) is not None:
+    def leave(self, origin: Origin) -> None:
+        """Let what the automation started go on, whatever becomes of it."""
+        if (automation := origin.automation) is not None:
             automation.started.clear()
 
     @contextlib.contextmanager
-    def still(self, why: str) -> Iterator[None]:
-        """Refuse to start any drive while the body runs. An empty reason refuses nothing."""
-        automation = _current.get()
+    def still(self, origin: Origin, why: str) -> Iterator[None]:
+        """Refuse to let the automation start any drive while the body runs. An empty reason refuses nothing."""
+        automation = origin.automation
         if automation is None:
             yield
             return
@@ -321,16 +277,6 @@ def _rested(drive: Drive, sent: Sent) -> bool:
 def only_ends(drive: Drive, text: str) -> bool:
     """True if a line that counts as a start can only end motion, as a velocity of 0."""
     return drive.family.only_ends(text)
-
-
-def sequence(workspace: Workspace) -> object:
-    """Who sends the lines of this task: an automation, else the person at the session."""
-    return _current.get() or workspace
-
-
-def is_automation() -> bool:
-    """True if an automation sends the lines of this task."""
-    return _current.get() is not None
 
 
 async def settled(workspace: Workspace) -> None:

@@ -19,6 +19,7 @@ from multidrop.dialects import Procedure
 from multidrop.drives.drive import Drive
 from multidrop.drives.events import Publisher
 from multidrop.shell.events import By, Notified, Output, Progressed, SessionEvent, StateChanged, kind_of
+from multidrop.shell.origin import PERSON, Origin
 from multidrop.shell.roles import Transcripts
 
 T = TypeVar("T")
@@ -93,14 +94,25 @@ class Channel(Publisher[SessionEvent]):
         super().__init__("a front end", kind_of)
         self.front = Front()
         """The front end, as far as it can be asked."""
+        self.origin = PERSON
+        """The origin of lines that are passed without one: a person's, or those of the program that has the session."""
 
     def subscribe(self, callback: Callable[[Any], None], *kinds: type) -> Callable[[], None]:
         """Call back with every event of these kinds; see `Publisher.subscribe`. What others wrote is guarded."""
         return super().subscribe(foreign.callback(callback), *kinds)
 
-    def output(self, text: str, *, columns: bool = False) -> None:
-        """Publish a line of a verb's result. `columns`: a screen breaks it between words."""
-        self.publish(Output(self.now(), text, columns))
+    def publish(self, event: SessionEvent, origin: Origin | None = None) -> None:
+        """Publish an event. `origin`: of the line that enters or prints it; who that belongs to hears of it first."""
+        if origin is not None:
+            origin.hear(event)
+        super().publish(event)
+
+    def output(self, text: str, *, columns: bool = False, origin: Origin | None = None) -> None:
+        """Publish a line of a verb's result. `columns`: a screen breaks it between words.
+
+        `origin`: that of the line; by default that of the session.
+        """
+        self.publish(Output(self.now(), text, columns), origin or self.origin)
 
     def notify(self, text: str, *, bus: str = "", warning: bool = False, outcome: bool = False) -> None:
         """Publish a notice for a person. `outcome`: of what was asked for, so that every front end shows it."""

@@ -6,7 +6,7 @@ A feature's verbs and commands are `shell.operations.operation.Operation`s.
 from __future__ import annotations
 
 import argparse
-from collections.abc import Awaitable, Callable, Iterator, Mapping, Sequence
+from collections.abc import Awaitable, Callable, Iterator, Sequence
 from contextlib import AbstractContextManager, ExitStack, contextmanager, nullcontext
 from dataclasses import replace
 from itertools import takewhile
@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from multidrop.base import registry
 from multidrop.base.errors import Diagnostic
-from multidrop.base.feature import Kinds
 from multidrop.shell.operations.operation import Examples
 from multidrop.shell.operations.parameter import Parameter, guarded_as, of_fields
 from multidrop.shell.operations.parsing import values
@@ -32,19 +31,6 @@ Around = Callable[[App], AbstractContextManager[object]]
 
 def nothing(session: Session) -> None:
     """Prepare nothing."""
-
-
-class AtSession(NamedTuple):
-    """What is done as a session begins, before anything is open: subscribe to its events (`Session.subscribe`).
-
-    `shell.session_hooks.SessionHooks`, the session's `hooks`, has lists of functions that take a line.
-    """
-
-    begin: Callable[[Session], None]
-
-    def passes(self) -> Mapping[str, Kinds]:
-        """See `base.foreign`: `begin` below takes whatever it raises."""
-        return {"begin": (Exception, SystemExit)}
 
 
 COMMANDS = ("shell", "tui")
@@ -175,25 +161,6 @@ class Predicting(NamedTuple):
 def switches() -> Iterator[Switch]:
     """All switches of features."""
     return registry.added(Switch)
-
-
-def begin(session: Session) -> list[str]:
-    """Load the features by others, and let every feature begin in a session.
-
-    Return a warning for each that cannot be loaded or cannot begin; the others and the session go on.
-    """
-    from multidrop.base.isolation import at_once
-    from multidrop.shell.operations.table import load_others
-
-    warnings = load_others()
-    for feature in registry.features():
-        for each in registry.records((feature,), AtSession):
-            why: list[str] = []
-            with registry.Attempt(why):
-                at_once(each.begin)
-                each.begin(session)
-            warnings += [f"the feature {feature.name} cannot begin: {text}" for text in why]
-    return warnings
 
 
 def options(command: str) -> Iterator[Options]:

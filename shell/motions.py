@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Awaitable, Callable, Iterable, Sequence
-from contextvars import ContextVar
 from dataclasses import replace
 from typing import TypeVar
 
@@ -19,12 +18,10 @@ from multidrop.dialects.motions import NO_SIGNS, Ending, Evidence, Motions, Move
 from multidrop.drives.drive import NOT_SENT, Check, Drive, still
 from multidrop.drives.motion_record import Course, Courses, restart
 from multidrop.drives.port_journal import GLOBAL
-from multidrop.shell.automation import is_automation, sequence
+from multidrop.shell.origin import Origin
 from multidrop.shell.workspace import Workspace
 
 T = TypeVar("T")
-OUTCOME: ContextVar[list[str] | None] = ContextVar("outcome", default=None)
-"""Takes the word of a `/wait ended`, for the script whose line it is."""
 MISSES = 3
 """Readings in a row without a reply after which nobody knows how a motion ended."""
 WORST = (
@@ -54,17 +51,19 @@ def _motions(drive: Drive) -> Motions:
 # Lines
 
 
-async def send(workspace: Workspace, drive: Drive, text: str, check: Check | None = None) -> tuple[str, ...]:
+async def send(
+    workspace: Workspace, origin: Origin, drive: Drive, text: str, check: Check | None = None
+) -> tuple[str, ...]:
     """Send a line as `Drive.send` does, and record what it does to motions.
 
     Raises MotionFailed where an error shows that a motion of the same automation has failed: before the line, which is
     then not sent, or after it. A person at the session is only told. A line that ends motion is never held back.
     """
-    line = _Line(workspace, drive, (text,), check)
+    line = _Line(workspace, origin, drive, (text,), check)
     return await line.run(lambda check: drive.send(text, check))
 
 
-async def perform(workspace: Workspace, drive: Drive, lines: Sequence[str], work: Procedure[T]) -> T:
+async def perform(workspace: Workspace, origin: Origin, drive: Drive, lines: Sequence[str], work: Procedure[T]) -> T:
     """Run a conversation that does what these lines do, as `send` sends a line."""
 
     def checked(check: Check | None) -> Procedure[T]:
@@ -72,7 +71,7 @@ async def perform(workspace: Workspace, drive: Drive, lines: Sequence[str], work
             yield from check(drive)
         return (yield from work)
 
-    return await _Line(workspace, drive, lines, None).run(lambda check: drive.run(checked(check), typed=True))
+    return await _Line(workspace, origin, drive, lines, None).run(lambda check: drive.run(checked(check), typed=True))
 
 
 class _Before:
@@ -85,9 +84,11 @@ class _Before:
 class _Line:
     """A line, the drives that it reaches, and what it does to their motions."""
 
-    def __init__(self, workspace: Workspace, drive: Drive, lines: Sequence[str], check: Check | None) -> None:
+    def __init__(
+        self, workspace: Workspace, origin: Origin, drive: Drive, lines: Sequence[str], check: Check | None
+    ) -> None:
         motions = _motions(drive)
-        self.by = sequence(workspace)
+        self.by, self._unattended = origin.sequence(workspace), origin.automation is not None
         self.effect = joined(() if drive.stores else [motions.effect(each) for each in lines])
         bus = workspace.buses.get(drive.link.name)
         to_all = bus is not None and drive.address in GLOBAL
@@ -197,7 +198,7 @@ class _Line:
     def _report(self, drive: Drive, failed: Ending, fate: str) -> None:
         name = self._workspace.display_name(drive)
         _note_restart(self._workspace, drive, failed)
-        if is_automation():
+        if self._unattended:
             error = failure(name, failed)
             error.args = (f"{error}{fate}",)
             raise error
@@ -249,10 +250,10 @@ def _note_restart(workspace: Workspace, drive: Drive, ending: Ending) -> None:
 class Watch:
     """The motions whose end a wait waits for: those of its own sequence, else whatever moves each drive."""
 
-    def __init__(self, workspace: Workspace, drives: Sequence[Drive], ended: bool = False) -> None:
+    def __init__(self, workspace: Workspace, origin: Origin, drives: Sequence[Drive], ended: bool = False) -> None:
         """`ended`: the wait accepts every ending, also of a motion that was judged before."""
         self._workspace, self.drives = workspace, drives
-        self._by, self._accepts = sequence(workspace), ended
+        self._by, self._accepts = origin.sequence(workspace), ended
         self._signs: dict[Drive, Signs] = {}
         self._errors: dict[Drive, int] = {}
         self._restarts = {each: each.motions.restarts for each in drives}
@@ -358,13 +359,13 @@ def _rank(ending: Ending) -> int:
     return WORST.index(ending.outcome)
 
 
-async def check_own(workspace: Workspace, drives: Iterable[Drive] | None = None) -> None:
+async def check_own(workspace: Workspace, origin: Origin, drives: Iterable[Drive] | None = None) -> None:
     """Judge the motions of this automation that have come to rest. Raises MotionFailed for one that failed.
 
     `drives` None: of every open bus. For waits that ask for something else than the end of a motion.
     """
-    by = sequence(workspace)
+    by = origin.sequence(workspace)
     every = drives if drives is not None else [each for bus in workspace.buses.values() for each in bus.all_drives]
     for drive in every:
         if drive.motions.open_of(by) and not drive.programming and await still(drive):
-            await Watch(workspace, [drive]).judge(drive)
+            await Watch(workspace, origin, [drive]).judge(drive)

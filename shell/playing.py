@@ -1,22 +1,15 @@
-"""A macro that plays: how far it is, and which bus plays each of its roles."""
+"""A macro that plays: how far it is."""
 
 from __future__ import annotations
 
 import asyncio
-import contextlib
-from collections.abc import Iterator, Mapping
-from contextvars import ContextVar
 from dataclasses import dataclass, field
-from types import MappingProxyType
 
 from multidrop.shell.channel import PERIOD, Channel
 from multidrop.shell.events import Progressed
 
 FOREVER = "forever"
 """The word for rounds without an end."""
-NO_ROLES: Mapping[str, str] = MappingProxyType({})
-"""No bus plays a role."""
-_roles: ContextVar[Mapping[str, str]] = ContextVar("roles", default=NO_ROLES)
 
 
 @dataclass(eq=False)
@@ -95,18 +88,3 @@ class StepProgress:
         if self._timer is not None:
             self._timer.cancel()
             self._timer = None
-
-
-@contextlib.contextmanager
-def cast(roles: Mapping[str, str]) -> Iterator[None]:
-    """Let buses play roles while the body runs, and in the tasks that it starts."""
-    token = _roles.set({**_roles.get(), **roles})
-    try:
-        yield
-    finally:
-        _roles.reset(token)
-
-
-def played_by(name: str) -> str:
-    """The name of the bus that plays a role; any other name stays."""
-    return _roles.get().get(name, name)

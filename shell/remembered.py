@@ -6,7 +6,6 @@ import asyncio
 import contextlib
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
-from contextvars import ContextVar
 from weakref import WeakKeyDictionary
 
 from multidrop.base.errors import DriveError, TransportLost
@@ -19,6 +18,7 @@ from multidrop.drives.events import Conditioned, Sample, Unsolicited
 from multidrop.macros import Recorder
 from multidrop.shell.events import OnBus, Printed, SessionEvent
 from multidrop.shell.line_syntax import join_target
+from multidrop.shell.origin import Origin
 
 
 class KnownNames:
@@ -67,8 +67,6 @@ class KnownNames:
 
 KEPT = 1000
 """The number of lines kept."""
-_begun: ContextVar[int | None] = ContextVar("begun", default=None)
-"""The number of lines before the last line that this macro, script or front end sent to a drive."""
 
 
 class Lately:
@@ -88,14 +86,15 @@ class Lately:
             for line in event.event.lines:
                 self._add(line)
 
-    def begin(self) -> None:
+    def begin(self, origin: Origin) -> None:
         """Note that a line is sent to a drive: the next wait of its sender looks from here on."""
         self._typed = self._count
-        _begun.set(self._count)
+        if origin.last is not None:
+            origin.last.printed = self._count
 
-    async def finds(self, text: str, seconds: float) -> bool:
+    async def finds(self, origin: Origin, text: str, seconds: float) -> bool:
         """True if a line contains the text: since the sender's last line, or within a time, s."""
-        begun = _begun.get()
+        begun = origin.last.printed if origin.last is not None else None
         since = self._typed if begun is None else begun
         with contextlib.suppress(TimeoutError):
             async with asyncio.timeout(seconds):

@@ -15,8 +15,10 @@ from multidrop.dialects import Started
 from multidrop.drives.drive import Drive
 from multidrop.drives.port_journal import GLOBAL
 from multidrop.shell import at_rest
-from multidrop.shell.automation import Automation, Automations, Sent
+from multidrop.shell.automation import Automations
+from multidrop.shell.automation_record import Automation, Sent
 from multidrop.shell.events import FAILURES
+from multidrop.shell.origin import Origin
 
 
 @dataclass(frozen=True)
@@ -32,7 +34,14 @@ class _Before:
 
 @contextlib.asynccontextmanager
 async def sending(
-    automations: Automations, drive: Drive, text: str, *, starts: bool, only_ends: bool = False, parts: bool = False
+    automations: Automations,
+    origin: Origin,
+    drive: Drive,
+    text: str,
+    *,
+    starts: bool,
+    only_ends: bool = False,
+    parts: bool = False,
 ) -> AsyncIterator[None]:
     """Send a line in the body, and record what it can start; with an empty text anything.
 
@@ -40,14 +49,14 @@ async def sending(
 
     Raises what the body raises, Diagnostic where the line must not start the drive, Stopped.
     """
-    automation = automations.current
+    automation = origin.automation
     if automation is not None and not parts and _has_routine(drive) and drive not in automation.started:
         await at_rest.look_before(drive, text)
     what = drive.codec.started(text) if text else Started()
     stored, at = drive.stores, drive.link.stamp()
     before = {each: _before(automation, each) for each in drive.recipients}
     for each in before if starts else ():
-        automations.starts(each, what, only_ends=only_ends)
+        automations.starts(origin, each, what, only_ends=only_ends)
     try:
         yield
     except FAILURES as failure:

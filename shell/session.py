@@ -10,53 +10,41 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-import re
-from collections.abc import AsyncIterator, Iterator, Sequence
-from contextvars import ContextVar
+from collections.abc import Coroutine, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property, partial
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from multidrop.base import registry
 from multidrop.base.errors import Diagnostic, DriveError, Refused, Stopped
-from multidrop.base.on_demand import imported
+from multidrop.base.isolation import at_once
 from multidrop.drives.bus import Bus
 from multidrop.drives.drive import Drive
 from multidrop.drives.events import Restarted
-from multidrop.shell import motions
-from multidrop.shell.automation import AGREED, ENDING, Automations, only_ends
+from multidrop.shell import program_listing
+from multidrop.shell.at_session import AtSession
+from multidrop.shell.automation import ENDING, Automations
 from multidrop.shell.configuration import Settings
 from multidrop.shell.connect.opening import Opener, open_buses
-from multidrop.shell.events import FAILURES, By, Entered, Failed, OnBus, Printed, SessionEvent
-from multidrop.shell.line_syntax import (
-    EVERYONE,
-    DriveLine,
-    Place,
-    TypedLine,
-    VerbLine,
-    join_target,
-    parse,
-    split_target,
-)
+from multidrop.shell.events import FAILURES, By, Entered, Failed, OnBus, SessionEvent
+from multidrop.shell.line_path import LinePath
+from multidrop.shell.line_syntax import DriveLine, Place, TypedLine, VerbLine, parse, split_target
 from multidrop.shell.openings import Failed as OpeningFailed
 from multidrop.shell.openings import Openings
-from multidrop.shell.operations.table import find
-from multidrop.shell.playing import played_by
+from multidrop.shell.operations.table import find, load_others
+from multidrop.shell.operations.verb import Chosen, Verb
+from multidrop.shell.origin import PERSON, Origin
 from multidrop.shell.quitting import ENDING as QUITTING
 from multidrop.shell.quitting import EVEN_NOW, Unanswered
-from multidrop.shell.raw import RawLine, text_of
-from multidrop.shell.sending import sending
+from multidrop.shell.units import Units
 from multidrop.shell.waits import in_motion
-from multidrop.shell.workspace import LATCHED, Workspace
+from multidrop.shell.workspace import Workspace
 
 if TYPE_CHECKING:
-    from multidrop.shell.units import Units
+    from multidrop.macros import Macro
 
-_MAYBE_QUANTITY = re.compile(r"[{}]|\d ?[A-Za-z]\w*(?:/\w+)?(?![\w/])")
-"""Matches each line that may hold a number with a unit, and few others: most lines go without `units`."""
-_published: ContextVar[list[BaseException] | None] = ContextVar("published", default=None)
-"""The failures published in this task's outermost `run`."""
 BARE_WORDS = {"exit": "/quit", "quit": "/quit", "help": "/help", "?": "/help"}
-TRAVEL = "multidrop.shell.travel:ask"
-SIGHT = "multidrop.shell.program_listing:Sight"
 
 
 def bare(word: str) -> Diagnostic:
@@ -64,29 +52,16 @@ def bare(word: str) -> Diagnostic:
     return Diagnostic(f"not a command of a drive: '{word}'; nothing was sent", hint=f"{BARE_WORDS[word]} is the verb")
 
 
-CALL = "multidrop.shell.verbs.call:Call"
-BEGIN = "multidrop.shell.hooks:begin"
-"""One use of a verb; it knows this class, so this module has only its name."""
-
-
-def _units(session: Session) -> Units:
-    made: Units = imported("multidrop.shell.units:Units")(session)
-    return made
-
-
 def _forget_restarted(session: Session, event: SessionEvent) -> None:
     """Forget the program and the settings that were read of a drive that was restarted, or may have been."""
     if isinstance(event, OnBus) and isinstance(event.event, Restarted) and event.bus in session.buses:
         drive = session.buses[event.bus].drives.get(event.event.address)
         if drive is not None:
-            imported("multidrop.shell.program_listing:forget")(session, drive)
+            program_listing.forget(session, drive)
 
 
 class Session(Workspace):
     """Everything that is open, and the path of a command. Needs a running event loop, and belongs to its thread."""
-
-    units = cached_property(_units)
-    """The scales of axes, and quantities in lines. Few sessions need it."""
 
     def __init__(
         self,
@@ -107,12 +82,15 @@ class Session(Workspace):
         super().__init__(settings or Settings(), reconnect)
         self.automations = Automations(self)
         self.unanswered = Unanswered()
-        self.path = LinePath(self)
+        self.units = Units(self)
+        """The scales of axes, and quantities in lines."""
+        self.path = LinePath(self, self.automations, self.units)
+        self.verbs = VerbPath(self)
         self.openings = Openings(self, opener or partial(open_buses, state=self.settings.state), lazy, raw, tried)
         self._background: dict[asyncio.Task[Any], None] = {}
-        self.on_opened.append(lambda bus: self.units.opened(bus))
+        self.on_opened.append(self.units.opened)
         self.subscribe(partial(_forget_restarted, self), Restarted)
-        for text in imported(BEGIN)(self):
+        for text in begin(self):
             asyncio.get_running_loop().call_soon(partial(self.notify, text, warning=True))
 
     # Buses
@@ -155,17 +133,22 @@ class Session(Workspace):
 
     # The path of a command
 
-    async def run(self, line: str | TypedLine, by: By = By.OPERATOR, since: int | None = None) -> None:
+    async def run(self, line: str | TypedLine, origin: Origin | None = None, since: int | None = None) -> None:
         """Run one line, as typed or parsed before, and publish what it prints.
 
-        `since` is the value of `stops` when the line was typed; a line older than the last stop is refused with
-        Stopped. Raises DriveError, Diagnostic or TransportLost, after one Failed event.
+        `origin`: by default that of the session. `since` is the value of `stops` when the line was typed; a line older
+        than the last stop is refused with Stopped.
+
+        Raises DriveError, Diagnostic or TransportLost, after one Failed event.
         """
         if self.front.ready is not None:
             await self.front.ready()
         target, place = DriveLine(""), self.place
         typed = line if isinstance(line, str) else line.typed
-        with self.under_way(f"running {typed.strip()}"), _published_failures() as published:
+        origin = origin or self.origin
+        published = [] if origin.published is None else origin.published
+        origin, by = replace(origin, published=published), origin.by
+        with self.under_way(f"running {typed.strip()}"):
             try:
                 if since is not None and since != self.stops:
                     raise Stopped(f"a stop came after '{typed.strip()}' was typed; it was not sent")
@@ -173,15 +156,15 @@ class Session(Workspace):
                     raise Diagnostic(f"{QUITTING}, so '{typed.strip()}' was not sent")
                 parsed = _raw_line(self, line) or (parse(line) if isinstance(line, str) else line)
                 if isinstance(parsed, DriveLine):
-                    parsed = self.path.meant(parsed, by)
+                    parsed = self.verbs.meant(parsed, by)
                 if isinstance(parsed, DriveLine):
                     target = parsed
                     with self.unanswered.sending(typed):
-                        await self.path.text(parsed, by)
+                        await self.path.text(parsed, origin)
                 elif parsed is not None:
-                    await self.path.verb(parsed, by)
+                    await self.verbs.run(parsed, origin)
             except FAILURES as failure:
-                bus, address = _place_of(target, place)
+                bus, address = _place_of(origin, target, place)
                 if (
                     failure not in published
                 ):  # once, whatever lines (a macro's, the `/play` around it) it passes through
@@ -202,16 +185,18 @@ class Session(Workspace):
             return "/scan"
         return f"/bytes {raw.end.hex(' ').upper()}" if raw is not None and raw.end else ""
 
-    def start(self, line: str | TypedLine, by: By = By.OPERATOR, since: int | None = None) -> asyncio.Task[bool]:
+    def start(
+        self, line: str | TypedLine, origin: Origin | None = None, since: int | None = None
+    ) -> asyncio.Task[bool]:
         """Run one line in the background; the task returns whether it succeeded. A failure is published only.
 
-        `since` as for `run`; by default the line counts as typed now.
+        `origin` and `since` as for `run`; by default the line counts as typed now.
         """
         typed = self.stops if since is None else since
 
         async def succeeds() -> bool:
             try:
-                await self.run(line, by, typed)
+                await self.run(line, origin, typed)
             except FAILURES:
                 return False  # published as a Failed event
             return True
@@ -247,8 +232,102 @@ class Session(Workspace):
         self.changed()
 
 
-class LinePath:
-    """The way of one line of a session to its verb, to a drive, or to a port in raw mode."""
+def begin(session: Session) -> list[str]:
+    """Load the features by others, and let every feature begin in a session.
+
+    Return a warning for each that cannot be loaded or cannot begin; the others and the session go on.
+    """
+    warnings = load_others()
+    for feature in registry.features():
+        for each in registry.records((feature,), AtSession):
+            why: list[str] = []
+            with registry.Attempt(why):
+                at_once(each.begin)
+                each.begin(session)
+            warnings += [f"the feature {feature.name} cannot begin: {text}" for text in why]
+    return warnings
+
+
+@dataclass(frozen=True)
+class Call:
+    """One use of a verb: where it works, the text after its name, and its origin."""
+
+    session: Session
+    verb: Verb
+    rest: str
+    origin: Origin = PERSON
+    shown: str | Macro | None = None
+    """What a person was shown of the file that the line names; see `line_syntax.VerbLine`."""
+
+    @property
+    def by(self) -> By:
+        """Who has entered the line."""
+        return self.origin.by
+
+    @cached_property
+    def chosen(self) -> Chosen:
+        """The form of the line, and its values. Raises Diagnostic for words that are no arguments of the verb."""
+        return self.verb.parsed(self.rest)
+
+    @property
+    def changes(self) -> bool:
+        """Whether the line changes a drive, or lets it run. Raises Diagnostic as `chosen` does."""
+        return self.chosen.form.changes
+
+    @property
+    def immediate(self) -> bool:
+        """Whether it is done at once."""
+        return self.chosen.form.immediate
+
+    def work(self) -> Coroutine[Any, Any, None]:
+        """What the line does."""
+        return self.chosen.form.work(self, self.chosen.values)
+
+    def recorded(self) -> str | None:
+        """The line that a macro records; None: none."""
+        recorded = self.chosen.form.recorded
+        return recorded(self) if recorded is not None else None
+
+    def output_file(self, name: str) -> str:
+        """Return the path of a file to write. Raises Diagnostic for a macro's that leaves the current folder.
+
+        A macro may be another person's file: it must not overwrite files elsewhere.
+        """
+        if self.by is By.MACRO and not Path(name).resolve().is_relative_to(Path.cwd().resolve()):
+            hint = "name a file inside it, or type the line"
+            raise Diagnostic(f"{name} leaves the current folder, in which a macro writes", self.verb.name, hint)
+        return name
+
+    def warn_of_editor(self, file: str | Path) -> None:
+        """Warn where a text of a file that the line reads is in the editor of the screen, and not saved."""
+        unsaved = self.session.front.unsaved
+        if not isinstance(self.shown, str) and unsaved is not None and str(Path(file).absolute()) in unsaved():
+            text = f"{file}: its text in the editor is not saved; the file on the disk is used"
+            self.session.notify(text, warning=True)
+
+    def wrong(self, message: str = "") -> Diagnostic:
+        return self.verb.wrong(message)
+
+    def bus(self, name: str = "") -> Bus:
+        """Find an open bus by name or role; the selected one for an empty name. Raises Diagnostic."""
+        return self.session.bus(self.origin.played(name))
+
+    def drive(self, target: str = "") -> Drive:
+        """Find the drive of `ADDR` or `BUS:ADDR`; the selected drive for an empty target."""
+        bus, address = self.origin.target(target)
+        return self.session.drive(bus, address or None)
+
+    async def run(self, line: str) -> None:
+        """Run a line as a part of this one: what it starts is stopped with that. Raises as `Session.run` does."""
+        await self.session.run(line, self.origin)
+
+    def output(self, text: str, *, columns: bool = False) -> None:
+        """Publish a line of the result. `columns`: a screen breaks it between words."""
+        self.session.output(text, columns=columns, origin=self.origin)
+
+
+class VerbPath:
+    """The way of one line of a session to its verb."""
 
     def __init__(self, session: Session) -> None:
         self._session = session
@@ -267,182 +346,19 @@ class LinePath:
             return VerbLine(BARE_WORDS[word], "", parsed.typed)
         raise bare(word)
 
-    async def verb(self, parsed: VerbLine, by: By) -> None:
+    async def run(self, parsed: VerbLine, origin: Origin) -> None:
         """Run a verb, as a task that a stop ends."""
-        session = self._session
-        session.publish(Entered(session.now(), parsed.typed.strip(), by))
+        session, by = self._session, origin.by
+        session.publish(Entered(session.now(), parsed.typed.strip(), by), origin)
         verb = find(parsed.name)
-        call = imported(CALL)(session, verb, parsed.rest, by, parsed.shown)
-        self._allow(by)
+        call = Call(session, verb, parsed.rest, origin, parsed.shown)
+        session.path.allow(by)
         if call.changes:
-            await self._undoubted([*session.buses.values()], by)
+            await session.path.undoubted([*session.buses.values()], by)
         if by is not By.MACRO and (line := call.recorded()) is not None:
             session.recorder.record(line, session.now())
         work = call.work()
         await (work if call.immediate else session.tasks.run(work))
-
-    async def text(self, parsed: DriveLine, by: By) -> None:
-        """Send a text to its drive and publish what it prints; on a bus in raw mode send it with its terminator."""
-        session = self._session
-        bus = session.bus(parsed.bus)
-        if (raw := session.of(bus).raw) is not None:
-            return await self._raw_text(raw, parsed, by)
-        drive = session.drive(bus.name, parsed.address)
-        session.publish(Entered(session.now(), parsed.typed.strip(), by, bus.name, drive.address))
-        self._allow(by)
-        text, check, values, stops = parsed.text, None, "", drive.stops
-        if (session.doubted or session.of(bus).doubt) and not _only_reads(drive, text):
-            await self._undoubted([bus], by)
-        if session.scaled or _MAYBE_QUANTITY.search(text):
-            line = await session.units.line(drive, text)
-            text, check, values = line.text, line.check, line.values
-            drive.check_line(text)
-            await imported(TRAVEL)(session.units, drive, text, by)
-        drive.check_line(text)
-        await self.guard(drive, text, by)
-        if drive.stops != stops:
-            raise Stopped(f"a stop came before '{text.strip()}' was sent")
-        recorded, starts = None, drive.starts(text)
-        if by is not By.MACRO:
-            target = session.qualified_address(drive)
-            typed = f"@{target} {parsed.text}" if target else parsed.text
-            recorded = session.recorder.record(typed, session.now(), join_target(bus.name, drive.address), starts)
-        if session.recording:
-            session.changed()
-        session.addressed.add((bus.name, drive.address))
-        session.lately.begin()
-        before = drive.commands
-        if _changes_program(drive, text):
-            imported(SIGHT)(session, drive).changes()
-        try:
-            ends = only_ends(drive, text)
-            async with sending(session.automations, drive, text, starts=starts, only_ends=ends):
-                printed = await motions.send(session, drive, text, check)
-        except FAILURES as failure:
-            if recorded is not None:
-                recorded.came_back([f"failed: {failure}"])
-            raise
-        finally:
-            if values and drive.commands != before:
-                session.notify(f"{text.strip()}   {values}", bus=bus.name)
-        if recorded is not None:
-            recorded.came_back(printed)
-        if drive.address not in (*EVERYONE, *bus.drives):
-            bus.drives[drive.address] = drive  # it replied, so it exists: a stop and a wait must know it
-            session.changed()
-        for each in printed:
-            session.publish(Printed(session.now(), bus.name, drive.address, each, by))
-        if session.scaled:
-            await session.units.look(drive, text)
-
-    async def _raw_text(self, raw: RawLine, parsed: DriveLine, by: By) -> None:
-        session, name, typed = self._session, raw.bus.name, parsed.typed.strip()
-        if by is By.MACRO:
-            raise Diagnostic(f"{name} is raw: a macro's lines are for drives", typed, "/raw off finds them")
-        if parsed.address is not None:
-            hint = f"@{name}: TEXT sends text; /raw off finds the drives"
-            raise Diagnostic(f"{name} is raw: it has no address {parsed.address}", typed, hint)
-        session.publish(Entered(session.now(), typed, by, name))
-        self._allow(by)
-        await self._undoubted([raw.bus], by)
-        await self.guard(raw.bus.at(""), parsed.text, by)
-        starts = raw.bus.roster.family.codec.starts_motion(parsed.text)
-        await self.send_bytes(raw.bus, raw.encoded(parsed.text), by, starts)
-        if session.recording and by is By.OPERATOR:
-            session.notify("text in raw mode is not recorded", warning=True)
-
-    async def send_bytes(self, bus: Bus, data: bytes, by: By, starts: bool = True) -> None:
-        """Write bytes on a bus in raw mode: once, unchanged. Raises Diagnostic where it is not in raw mode.
-
-        `starts`: they can start motion or a program.
-        """
-        raw = self._session.of(bus).raw
-        if raw is None:
-            raise Diagnostic(f"{bus.name} is not in raw mode; nothing was sent", "", "/raw on begins it")
-        self._allow(by)
-        await self.agreed_to_write(bus.at(""), text_of(data), by)
-        if starts:
-            self._session.automations.starts(raw.everyone)
-        raw.send(data)
-
-    async def guard(self, drive: Drive, text: str, by: By = By.OPERATOR) -> None:
-        """Ask before a guarded line. Raises Diagnostic where it is not agreed to, and by a script or a macro."""
-        if drive.stores:
-            return
-        if drive.state.stranger and not _only_asks(drive, text):
-            await self.agreed_to_write(drive, text.strip(), by)
-        what = self._session.settings.guards.what(drive.family, text)
-        if what:
-            await self._session.questions.confirm(what, self._session.display_name(drive), by=by)
-
-    async def agreed_to_write(self, drive: Drive, what: str, by: By) -> None:
-        """Let only a person, or who agreed beforehand, write to a device that did not identify itself.
-
-        Raises Diagnostic for a script, a macro, and lines of a front end that cannot ask.
-        """
-        if drive.state.stranger and not (by is By.OPERATOR and self._session.front.ask is not None):
-            name = self._session.display_name(drive)
-            writes = f"'{what}' writes" if what else "it writes"
-            await self._session.questions.confirm(f"{writes}, and {drive.state.stranger}", name, by=by)
-
-    async def _undoubted(self, buses: Sequence[Bus], by: By) -> None:
-        """Ask once for each line that lacks names, units or guards. Raises Diagnostic where that is not agreed to.
-
-        Also raises it while the stop key is doubted.
-        """
-        if self._session.doubted:
-            raise Diagnostic(self._session.doubted, hint=f"press Ctrl+X once; {AGREED}")
-        stops = self._session.stops
-        for record in map(self._session.of, buses):
-            if record.doubt:
-                what = f"it is read only, as names, units or guards are not in force: {record.doubt}; go on anyway"
-                await self._session.questions.confirm(what, record.bus.name, by=by)
-                record.doubt = ""
-        if stops != self._session.stops:
-            raise Stopped("a stop came before the answer counted; nothing was sent")
-
-    @contextlib.asynccontextmanager
-    async def starting(self, drive: Drive, text: str = "", *, parts: bool = False) -> AsyncIterator[None]:
-        """Send in the body a line, or what can start anything in a drive. `parts`: it is several requests."""
-        if text and not drive.starts(text):
-            async with sending(self._session.automations, drive, text, starts=False, parts=parts):
-                yield
-            return
-        drive.check_start(text)
-        if self._session.scaled:
-            imported("multidrop.shell.travel:unchecked")(self._session.units, drive, text)
-        self._session.addressed.add((drive.link.name, drive.address))
-        if not text:  # a program may be among it
-            drive.motions.runs()
-        before = drive.commanded_at
-        async with sending(self._session.automations, drive, text, starts=True, parts=parts):
-            drive.starts_now()
-            noted = drive.commanded_at
-            try:
-                yield
-            except Refused as refusal:
-                if refusal.certain and not parts and drive.commanded_at == noted:
-                    drive.commanded_at = before
-                raise
-
-    def _allow(self, by: By) -> None:
-        if self._session.latched and by is not By.OPERATOR:
-            raise Stopped(LATCHED)
-
-
-def _only_asks(drive: Drive, text: str) -> bool:
-    return drive.family.only_reads(text)
-
-
-def _only_reads(drive: Drive, text: str) -> bool:
-    return not drive.stores and (drive.family.only_reads(text) or drive.family.only_ends(text))
-
-
-def _changes_program(drive: Drive, text: str) -> bool:
-    """Whether a line is stored in a program, begins or ends one, or erases all of them."""
-    programs = drive.family.programs
-    word = (text.split() or [""])[0].upper()
-    return programs is not None and bool(word) and (drive.programming or word in (programs.clearing, *programs.begins))
 
 
 def _raw_line(workspace: Workspace, line: str | TypedLine) -> DriveLine | None:
@@ -460,22 +376,8 @@ def _raw_line(workspace: Workspace, line: str | TypedLine) -> DriveLine | None:
     return DriveLine(typed.rstrip("\r\n"), typed=typed)
 
 
-def _place_of(target: DriveLine, selected: Place) -> Place:
+def _place_of(origin: Origin, target: DriveLine, selected: Place) -> Place:
     """The bus and the address that a line was for; `selected`: those that were selected when it was typed."""
-    bus = played_by(target.bus) or selected.bus
+    bus = origin.played(target.bus) or selected.bus
     plain = target.text and target.address is None and bus == selected.bus
     return Place(bus, selected.address if plain else target.address or "")
-
-
-@contextlib.contextmanager
-def _published_failures() -> Iterator[list[BaseException]]:
-    """The failures published so far in the outermost `run` of this task."""
-    found = _published.get()
-    if found is not None:
-        yield found
-        return
-    token = _published.set(found := [])
-    try:
-        yield found
-    finally:
-        _published.reset(token)

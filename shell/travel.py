@@ -6,21 +6,17 @@ once. A move back towards the travel is never asked about.
 
 from __future__ import annotations
 
-from contextvars import ContextVar
 from fractions import Fraction
 
 from multidrop.dialects.units import Field, Takes
 from multidrop.drives.drive import Drive, confirmed_motion
 from multidrop.shell.configuration import TRAVEL
-from multidrop.shell.events import By
 from multidrop.shell.line_syntax import EVERYONE
+from multidrop.shell.origin import Origin
 from multidrop.shell.units import Axis, Units
 
-BEYOND: ContextVar[bool] = ContextVar("beyond", default=False)
-"""The moves of this task may leave their travel."""
 
-
-async def ask(units: Units, drive: Drive, text: str, by: By) -> None:
+async def ask(units: Units, drive: Drive, text: str, origin: Origin) -> None:
     """Ask before a move that leaves the travel of its axis; say once where the end is not known."""
     if drive.stores or (drive.address in EVERYONE and not units.workspace.bus(drive.link.name).all_drives):
         return
@@ -35,7 +31,7 @@ async def ask(units: Units, drive: Drive, text: str, by: By) -> None:
                 _unchecked(units, each, name, axis, f"the end of '{text}' is not known")
         for field in fields:
             if field.axis in limited:
-                await _check(units, each, field, limited[field.axis], text, by)
+                await _check(units, each, field, limited[field.axis], text, origin)
 
 
 def unchecked(units: Units, drive: Drive, text: str) -> None:
@@ -57,7 +53,7 @@ def _unchecked(units: Units, drive: Drive, name: str, axis: Axis, why: str) -> N
         units.workspace.notify(told, bus=drive.link.name, warning=True)
 
 
-async def _check(units: Units, drive: Drive, field: Field, axis: Axis, text: str, by: By) -> None:
+async def _check(units: Units, drive: Drive, field: Field, axis: Axis, text: str, origin: Origin) -> None:
     name, travel = units.name(drive, field.axis), axis.scale.travel
     assert travel is not None
     takes = await units.target([drive], [field]) or field.takes
@@ -68,7 +64,7 @@ async def _check(units: Units, drive: Drive, field: Field, axis: Axis, text: str
     if not units.referenced(drive, field.axis):
         why = "its position is not referenced"
         if takes is Takes.PLACE:
-            return await _confirm(units, f"'{text}' may leave the travel: {why}", name, by)
+            return await _confirm(units, f"'{text}' may leave the travel: {why}", name, origin)
         return _unchecked(units, drive, field.axis, axis, why)
     motion = next((each for each in await confirmed_motion(drive) if each.axis == field.axis), None)
     at_rest = motion is not None and not motion.velocity
@@ -80,12 +76,12 @@ async def _check(units: Units, drive: Drive, field: Field, axis: Axis, text: str
     axis.told = False
     if _leaves(measure.exact(begin), measure.exact(end), travel):
         low, high = (axis.scale.shown(each) for each in travel)
-        await _confirm(units, f"'{text}' ends at {measure.shown(end)}, and the travel is {low} to {high}", name, by)
+        await _confirm(units, f"'{text}' ends at {measure.shown(end)}, and the travel is {low} to {high}", name, origin)
 
 
-async def _confirm(units: Units, what: str, name: str, by: By) -> None:
-    if not (BEYOND.get() or TRAVEL in units.workspace.settings.guards.off):
-        await units.workspace.questions.confirm(what, name, by=by, beyond=True)
+async def _confirm(units: Units, what: str, name: str, origin: Origin) -> None:
+    if not (origin.beyond or TRAVEL in units.workspace.settings.guards.off):
+        await units.workspace.questions.confirm(what, name, by=origin.by, beyond=True)
 
 
 def _leaves(begin: Fraction, end: Fraction, travel: tuple[Fraction, Fraction]) -> bool:

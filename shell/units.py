@@ -102,7 +102,7 @@ class Units:
         """Positions are shown in units where an axis has a scale."""
         self._axes: WeakKeyDictionary[Drive, dict[str, Axis]] = WeakKeyDictionary()
         workspace.subscribe(self._overhear, Unsolicited)
-        self.look = ScaleChecks(workspace).look
+        self._checks = ScaleChecks(workspace)
 
     def _overhear(self, event: SessionEvent) -> None:
         """Note the commands of others that show: an echo of another master's, or a program's print for a drive."""
@@ -120,6 +120,10 @@ class Units:
                     self.workspace.notify(f"{self.name(drive, '')}: {why}", bus=bus.name, warning=True)
 
     # Scales
+
+    async def look(self, drive: Drive, text: str = "") -> None:
+        """Read again what the scales of a drive rest on, after a line; see `ScaleChecks.look`."""
+        await self._checks.look(drive, text)
 
     @property
     def own(self) -> tuple[str, ...]:

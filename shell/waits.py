@@ -20,6 +20,7 @@ from multidrop.drives.bus import Bus
 from multidrop.drives.drive import REST, Check, Drive, Running, confirmed_motion
 from multidrop.shell.line_syntax import EVERYONE
 from multidrop.shell.motions import Watch, check_own
+from multidrop.shell.origin import Origin
 from multidrop.shell.stop_report import UNCONFIRMED, last_seen
 from multidrop.shell.workspace import Workspace
 
@@ -92,6 +93,7 @@ async def sleep(duration: float) -> None:
 
 async def wait(
     workspace: Workspace,
+    origin: Origin,
     limit: float,
     *,
     idle: bool,
@@ -106,7 +108,7 @@ async def wait(
     `limit` seconds, DriveError for a drive in program mode (it would store the question).
     """
     deadline = workspace.now() + limit
-    watch = Watch(workspace, _addressed(workspace) if drives is None else drives, ended)
+    watch = Watch(workspace, origin, _addressed(workspace) if drives is None else drives, ended)
     for drive in watch.drives:
         _check_asked(workspace, drive)
     await watch.begin()
@@ -167,7 +169,13 @@ def _check_asked(workspace: Workspace, drive: Drive) -> None:
 
 
 async def wait_value(
-    workspace: Workspace, drive: Drive, wanted: Condition, limit: float, units: Units | None, said: str = "/wait"
+    workspace: Workspace,
+    origin: Origin,
+    drive: Drive,
+    wanted: Condition,
+    limit: float,
+    units: Units | None,
+    said: str = "/wait",
 ) -> None:
     """Wait until a drive reports a value. Raises Timeout after `limit` seconds, Diagnostic for no such value.
 
@@ -181,7 +189,7 @@ async def wait_value(
     while not wanted.holds(seen := await _value(workspace, drive, line, check)):
         if workspace.now() >= deadline:
             raise Timeout(f"{said} {wanted.text}: {name} still reports {seen} after {limit:g} s")
-        await check_own(workspace)
+        await check_own(workspace, origin)
         await sleep(APART)
 
 
@@ -206,17 +214,19 @@ async def _value(workspace: Workspace, drive: Drive, line: str, check: Check | N
     return int(printed[0])
 
 
-async def wait_text(workspace: Workspace, text: str, limit: float) -> None:
+async def wait_text(workspace: Workspace, origin: Origin, text: str, limit: float) -> None:
     """Wait until a drive prints a text; what came since the line before counts.
 
     It ends early with MotionFailed once a motion of this automation has failed. Raises Timeout after `limit` seconds.
     """
-    if not await listened(workspace, partial(workspace.lately.finds, text), limit):
+    if not await listened(workspace, origin, partial(workspace.lately.finds, origin, text), limit):
         seen = ", ".join(f'"{line}"' for line in workspace.lately.last(SHOWN)) or "nothing"
         raise Timeout(f'/wait "{text}": not printed within {limit:g} s; seen {seen}')
 
 
-async def listened(workspace: Workspace, finds: Callable[[float], Awaitable[bool]], limit: float) -> bool:
+async def listened(
+    workspace: Workspace, origin: Origin, finds: Callable[[float], Awaitable[bool]], limit: float
+) -> bool:
     """Whether a text comes within `limit` seconds. `finds` waits for it for a time, s.
 
     Meanwhile the motions of this automation are judged, seldom: what a drive prints by itself can meet a question on
@@ -227,7 +237,7 @@ async def listened(workspace: Workspace, finds: Callable[[float], Awaitable[bool
         if workspace.now() >= deadline:
             return False
         with contextlib.suppress(NoAnswer):
-            await check_own(workspace)
+            await check_own(workspace, origin)
     return True
 
 

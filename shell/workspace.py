@@ -26,7 +26,7 @@ from multidrop.shell.configuration import Settings
 from multidrop.shell.connect.reconnect import Reconnections
 from multidrop.shell.events import Failed, Notified, OnBus, Printed, StateChanged
 from multidrop.shell.line_syntax import EVERYONE, Place, join_target
-from multidrop.shell.playing import Playing, played_by
+from multidrop.shell.playing import Playing
 from multidrop.shell.remembered import KnownNames, Lately, Observing
 from multidrop.shell.session_hooks import SessionHooks
 
@@ -209,8 +209,7 @@ class Workspace(Channel):
         return {bus.name: each.opened.floor for bus, each in self._open.items() if each.opened.floor is not None}
 
     def bus(self, name: str = "") -> Bus:
-        """Find an open bus by name or role; the selected one where no name is given. Raises Diagnostic."""
-        name = played_by(name)
+        """Find an open bus by name; the selected one where no name is given. Raises Diagnostic."""
         if not self.buses:
             raise Diagnostic("nothing is open", hint="/open URL opens a line of drives")
         found = self.buses.get(name or self.selected_bus)

@@ -24,6 +24,7 @@ from multidrop.macros.model import Step
 from multidrop.shell.batch.virtual_loop import VirtualLoop
 from multidrop.shell.configuration import Settings
 from multidrop.shell.events import Failed, OnBus
+from multidrop.shell.origin import PERSON
 from multidrop.shell.scripts.executor import play
 from multidrop.shell.session import Session
 from multidrop.simulator import cells
@@ -100,7 +101,7 @@ class LongRun:
         for number in range(10**9):
             at = f"tab{2 * number % TABS}:a"
             lines = [line if line.startswith("/") else f"@{at} {line}" for line in MACRO]
-            await play(self.session, Macro("soak", tuple(Step(0.1, line) for line in lines)), {})
+            await play(self.session, PERSON, Macro("soak", tuple(Step(0.1, line) for line in lines)), {})
             self.played += 1
 
     def _figures(self) -> dict[str, Any]:

@@ -230,7 +230,15 @@ class SocatEndpoint:
         self.name = session.name
         self._session = session
         self._lost = False
-        self.fileno, self.write, self.unsent = session.fileno, session.write, session.unsent
+
+    def fileno(self) -> int:
+        return self._session.fileno()
+
+    def write(self, data: bytes | memoryview) -> int:
+        return self._session.write(data)
+
+    def unsent(self) -> int:
+        return self._session.unsent()
 
     def read(self) -> bytes | None:
         return self._session.read(_READ) or None

@@ -9,7 +9,6 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
-from multidrop.base.on_demand import imported
 from multidrop.shell.state.backups import Drafts
 from multidrop.tui.text import ago
 
@@ -120,11 +119,24 @@ class Assist:
 
     async def prepare(self) -> None:
         """Import what the first typed letter needs, in a thread; the rest depends on the drive and is less."""
-        await asyncio.to_thread(imported, "multidrop.shell.prompt.complete:complete")
-        await asyncio.to_thread(imported, "multidrop.shell.verbs.work:ALL")
-        await asyncio.to_thread(lambda: [*imported("multidrop.shell.operations.table:VERBS")])
+        for load in (_load_completion, _load_work, _load_verbs):
+            await asyncio.to_thread(load)
         self.hint(ANY_LETTER)
         self.complete(ANY_LETTER)
+
+
+def _load_completion() -> None:
+    from multidrop.shell.prompt import complete  # noqa: F401
+
+
+def _load_work() -> None:
+    from multidrop.shell.verbs import work  # noqa: F401
+
+
+def _load_verbs() -> None:
+    from multidrop.shell.operations.table import VERBS
+
+    list(VERBS)
 
 
 def _ports(state: Path) -> list[StartEntry]:

@@ -8,9 +8,9 @@ from typing import Annotated, Any
 from multidrop.base.errors import Diagnostic
 from multidrop.base.feature import Feature
 from multidrop.drives.events import Restarted, Sample
+from multidrop.shell.at_session import AtSession
 from multidrop.shell.batch.runner import run
 from multidrop.shell.events import Entered
-from multidrop.shell.hooks import AtSession
 from multidrop.shell.operations.argument_types import Address, Url
 from multidrop.shell.operations.operation import Operation
 from multidrop.shell.operations.parameter import Argument
@@ -50,24 +50,24 @@ class Mileage:
             await asyncio.sleep(0.02)
         return drives
 
-    async def show(self, only: Any = None) -> None:
+    async def show(self, output: Any, only: Any = None) -> None:
         for drive in await self.again(only):
             for axis, steps in self.moved[drive.link.name, drive.address].items():
                 name, way = self.session.display_name(drive), distance(self.session, drive, axis, steps).lstrip("-")
-                self.session.output(f"{name}{axis and f'.{axis}'}: {steps} steps{way and f' ({way})'}")
+                output(f"{name}{axis and f'.{axis}'}: {steps} steps{way and f' ({way})'}")
 
     async def play(self, lines: tuple[str, ...]) -> None:
         for line in lines:
             await self.again()
             await self.session.run(line)
-        await self.show()
+        await self.show(self.session.output)
 
 
 async def show(call: Any, address: Address = "") -> None:
     drive = call.drive(address) if address else None
     if drive and drive.address not in call.session.buses[drive.link.name].drives:
         raise Diagnostic(f"no drive {address}", "/mileage", "/drives lists them")
-    await call.session.hooks.part(Mileage).show(drive)
+    await call.session.hooks.part(Mileage).show(call.output, drive)
 
 
 def play(url: Url, lines: tuple[Line, ...]) -> int:

@@ -18,16 +18,15 @@ from typing import Any
 from multidrop.base import new_file
 from multidrop.base.errors import Diagnostic, DriveError, NoAnswer, Refused, Stopped, TransportLost
 from multidrop.base.files import escaped_toml, text_of, toml_of
-from multidrop.base.on_demand import imported
 from multidrop.base.text import counted
 from multidrop.dialects.certifying import BYTES, FITS, MOVES, Certifying, Occupied, Question
 from multidrop.dialects.owed_settings import owed, restored
 from multidrop.drives.conversations import refuse_stranger
 from multidrop.drives.drive import Drive
 from multidrop.drives.events import Concluded, Transaction
+from multidrop.shell import travel
 from multidrop.shell.channel import running
-from multidrop.shell.events import By
-from multidrop.shell.session import TRAVEL, Session
+from multidrop.shell.session import Session
 from multidrop.shell.waits import wait
 
 HEAD = (
@@ -301,13 +300,15 @@ class Asking:
         """Send one line once, as a typed line is sent; return its answer as a text."""
         drive, session, table = self._drive, self._session, self._table
         if line == WAIT:
-            await wait(session, LONGEST_MOVE, idle=False, drives=[drive], ended=True)  # some of its moves are to fail
+            await wait(
+                session, session.origin, LONGEST_MOVE, idle=False, drives=[drive], ended=True
+            )  # some of its moves are to fail
             return DONE
         if line.startswith(SLEEP):
             await asyncio.sleep(float(line.removeprefix(SLEEP)))
             return DONE
         if question.does == MOVES and session.scaled:
-            await imported(TRAVEL)(session.units, drive, line, By.OPERATOR)
+            await travel.ask(session.units, drive, line, session.origin)
         taken: list[Transaction] = []
 
         def note(concluded: Concluded) -> None:
@@ -316,7 +317,9 @@ class Asking:
 
         leave = session.buses[drive.link.name].witnesses.add(note)
         try:
-            async with session.path.starting(drive, line) if drive.starts(line) else contextlib.nullcontext():
+            async with (
+                session.path.starting(session.origin, drive, line) if drive.starts(line) else contextlib.nullcontext()
+            ):
                 text = "; ".join(await self._sent(line)) or DONE
         except Refused as refusal:
             text = table.refused.format(code=refusal.code, text=taken[-1].reply.text if taken else "")

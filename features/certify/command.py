@@ -22,7 +22,7 @@ def run(url: str, drive: str, output: str, compare: str, agreed: bool) -> int:
         new_file.check(output, printed=True)
 
     async def work(session: Session) -> int:
-        [certified] = targets(session, drive)
+        [certified] = targets(session, session.origin, drive)
         if theirs is not None:
             return DIFFERS if await certificate.compare(session, certified, compare, theirs) else 0
         await certificate.certify(session, certified, output)

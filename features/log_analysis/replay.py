@@ -14,6 +14,7 @@ import contextlib
 import json
 import sys
 from collections.abc import AsyncIterator
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from multidrop.base.errors import Diagnostic, DriveError, Stopped
@@ -206,8 +207,9 @@ class Replay:
         may_move = drive in self._moving
         self._printed, failed = [], ""
         target = f"@{join_target(drive.link.name, drive.address)} " if drive is not None else ""
+        origin = replace(self._session.origin, by=By.SCRIPT)
         try:
-            await self._session.run(f"{target}{step.text}", By.SCRIPT)
+            await self._session.run(f"{target}{step.text}", origin)
         except Stopped:
             raise
         except (DriveError, Diagnostic) as failure:

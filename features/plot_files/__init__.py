@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
     from multidrop.api.telemetry import Samples
     from multidrop.shell.plots.batch import Batch
-    from multidrop.shell.verbs.call import Call
+    from multidrop.shell.session import Call
 
 VIEWERS = 9876
 """The port at which viewers of rerun connect by default."""

@@ -9,8 +9,8 @@ from multidrop.features.plot_files.plot import begin, write
 from multidrop.features.plot_files.request import DEFAULT, parse_rate, parse_target
 from multidrop.shell.plots.batch import Batch
 from multidrop.shell.plots.series import parse_series, read_first
+from multidrop.shell.session import Call
 from multidrop.shell.verbs import plotting
-from multidrop.shell.verbs.call import Call
 
 ENDINGS = (".rrd", ".csv", ".parquet")
 

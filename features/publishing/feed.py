@@ -16,7 +16,7 @@ from dataclasses import dataclass, field, replace
 from datetime import datetime
 from typing import Any
 
-from multidrop.base.on_demand import imported
+import multidrop
 from multidrop.base.text import counted, visible
 from multidrop.drives.bus import Bus
 from multidrop.drives.events import Unsolicited
@@ -186,7 +186,7 @@ def sensor(key: Key, value: Value, topic: str, available: tuple[str, ...], perio
         "availability": [{"topic": each, "value_template": AVAILABLE} for each in available],
         "availability_mode": "all",
         "device": {"identifiers": [f"multidrop {topic.rpartition('/')[0]}"], "name": drive, "model": product},
-        "origin": {"name": "multidrop", "sw_version": imported("multidrop:__version__")},
+        "origin": {"name": "multidrop", "sw_version": multidrop.__version__},
         **(numbers if key.what in MEASURED else {}),
         **({"unit_of_measurement": str(value.fields["unit"])} if quantity else {}),
     }
@@ -246,7 +246,7 @@ class Feed(Outlet):
     def _say_about(self) -> None:
         """Say which program publishes here, and the names of its lines."""
         self._named = {each.name: shown_name(each) for each in self._session.buses.values()}
-        about = {"version": imported("multidrop:__version__"), "host": socket.gethostname(), "lines": self._named}
+        about = {"version": multidrop.__version__, "host": socket.gethostname(), "lines": self._named}
         self._publisher.put(Message(self._topics.about, json.dumps(about), retain=True))
 
     def value(self, key: Key, value: Value) -> None:

@@ -13,8 +13,9 @@ from contextlib import suppress
 from datetime import UTC, datetime
 from typing import Any
 
+import multidrop
 from multidrop.base.errors import Diagnostic
-from multidrop.base.on_demand import imported, importing
+from multidrop.base.on_demand import importing
 from multidrop.features.publishing.feed import escape
 from multidrop.features.publishing.listening import Listening
 from multidrop.features.publishing.registry import Key, Outlet, Registry, Value
@@ -104,7 +105,7 @@ class UaServer(Outlet):
         await server.init()
         server.set_server_name("multidrop")
         await server.set_application_uri(NAMESPACE)
-        await server.set_build_info(NAMESPACE, "multidrop", "multidrop", imported("multidrop:__version__"), "", _now())
+        await server.set_build_info(NAMESPACE, "multidrop", "multidrop", multidrop.__version__, "", _now())
         server.set_endpoint(f"opc.tcp://{self.text.partition('://')[2]}/multidrop")
         server.set_security_policy([ua.SecurityPolicyType.NoSecurity], Reading())
         server.set_identity_tokens([ua.AnonymousIdentityToken])

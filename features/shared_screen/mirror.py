@@ -27,9 +27,10 @@ from multidrop.features.shared_screen.wire import Dropped, Garbled, Heard, Item,
 from multidrop.macros import MacroStore
 from multidrop.shell.configuration import Settings
 from multidrop.shell.connect.opening import Opened
-from multidrop.shell.events import By, Failed, OnBus, SessionEvent
+from multidrop.shell.events import Failed, OnBus, SessionEvent
 from multidrop.shell.line_syntax import Place, TypedLine
 from multidrop.shell.openings import Failed as OpeningFailed
+from multidrop.shell.origin import Origin
 from multidrop.shell.playing import Playing
 from multidrop.shell.session import Session
 from multidrop.shell.stop_report import Found, Tally
@@ -216,17 +217,17 @@ class Mirror(Session):
 
     # What is typed
 
-    async def run(self, line: str | TypedLine, by: By = By.OPERATOR, since: int | None = None) -> None:
+    async def run(self, line: str | TypedLine, origin: Origin | None = None, since: int | None = None) -> None:
         """Run a line that changes only what this screen shows, or stops. Raises Diagnostic for any other."""
         text = (line if isinstance(line, str) else line.typed).strip()
         word = text.partition(" ")[0].lower()
         if word == "/stop":
             self.stop(follows=False)
         elif word in OWN:
-            await super().run(line, by, since)
+            await super().run(line, origin, since)
         else:
             refused = Diagnostic(REFUSED, text)
-            self.publish(Failed(self.now(), str(refused), by=by))
+            self.publish(Failed(self.now(), str(refused), by=(origin or self.origin).by))
             raise refused
 
     async def open(self, url: str, name: str | None = None, *, raw: bool = False) -> list[Bus]:

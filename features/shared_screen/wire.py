@@ -17,7 +17,7 @@ from functools import cache
 from types import NoneType, UnionType
 from typing import Any, NamedTuple, get_args, get_origin, get_type_hints
 
-from multidrop.base.on_demand import imported
+import multidrop
 from multidrop.base.text import visible
 from multidrop.shell.secrets import without_secrets
 
@@ -60,8 +60,7 @@ class Item(NamedTuple):
 
 
 def own_version() -> str:
-    version: str = imported("multidrop:__version__")
-    return version
+    return multidrop.__version__
 
 
 def greeting() -> bytes:

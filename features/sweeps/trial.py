@@ -18,8 +18,8 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import NamedTuple
 
+import multidrop
 from multidrop.base.errors import Diagnostic
-from multidrop.base.on_demand import imported
 from multidrop.features.sweeps.variation import Drive, Key, Value
 from multidrop.shell.scripts.expression import (
     EQUAL,
@@ -327,5 +327,4 @@ def chunk(job: Job, cases: Sequence[Case]) -> list[Result]:
 
 
 def version() -> str:
-    found: str = imported("multidrop:__version__")
-    return found
+    return multidrop.__version__

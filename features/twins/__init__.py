@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING, Annotated
 
 from multidrop.base.feature import Feature
 from multidrop.base.text import whole
-from multidrop.shell.hooks import AtSession, Options, Predicting, Switch
+from multidrop.shell.at_session import AtSession
+from multidrop.shell.hooks import Options, Predicting, Switch
 from multidrop.shell.operations.argument_types import RAW, Address
 from multidrop.shell.operations.operation import Operation, typed
 from multidrop.shell.operations.parameter import Argument
 
 if TYPE_CHECKING:
-    from multidrop.shell.session import Session
-    from multidrop.shell.verbs.call import Call
+    from multidrop.shell.session import Call, Session
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -6,16 +6,16 @@ from collections.abc import Sequence
 
 from multidrop.base.errors import Diagnostic
 from multidrop.features.twins.twins import Twins
-from multidrop.shell.verbs.call import Call
+from multidrop.shell.session import Call
 
 
 def list_twins(call: Call) -> None:
     """Print a row for each twin."""
-    twins, workspace = call.session.hooks.part(Twins), call.session
+    twins = call.session.hooks.part(Twins)
     rows = list(twins.rows())
     for row in rows:
-        workspace.output(row, columns=True)
-    workspace.output(f"limit at rest: {twins.limit} steps" if rows else "no twin runs; /twin on begins one")
+        call.output(row, columns=True)
+    call.output(f"limit at rest: {twins.limit} steps" if rows else "no twin runs; /twin on begins one")
 
 
 async def on(call: Call, targets: Sequence[str]) -> None:

@@ -225,13 +225,22 @@ class Session(Fixed):
         return self._awaited._repr_html_()
 
 
-class Drive(DriveFacts):
+class _OfSession:
+    """A part of a session, in whose thread its calls are awaited."""
+
+    _session: Session
+
+    def _call(self, work: Callable[[], Coroutine[Any, Any, T]]) -> T:
+        __tracebackhide__ = True
+        return self._session._call(work)
+
+
+class Drive(_OfSession, DriveFacts):
     """A drive of a session. Steps are the drive's own units: motor steps, or counts with its encoder in use."""
 
     def __init__(self, session: Session, awaited: AsyncDrive) -> None:
         super().__init__(awaited._calls, awaited._drive, awaited.axis)
-        self._awaited, self._call = awaited, session._call
-        self._session = session
+        self._awaited, self._session = awaited, session
         self.programs = Programs(session, awaited.programs)
         self.parameters = Parameters(session, awaited.parameters)
 
@@ -274,22 +283,22 @@ class Drive(DriveFacts):
         return self._session.telemetry(self._target, rate=rate)
 
 
-class Programs(Fixed):
+class Programs(_OfSession, Fixed):
     """The program of one drive. Raises Inexpressible where its family has none."""
 
     def __init__(self, session: Session, awaited: AsyncPrograms) -> None:
-        self._awaited, self._call = awaited, session._call
+        self._awaited, self._session = awaited, session
 
     list = blocking(AsyncPrograms.list)
     upload = blocking(AsyncPrograms.upload)
     download = blocking(AsyncPrograms.download)
 
 
-class Parameters(Fixed):
+class Parameters(_OfSession, Fixed):
     """The settings of one drive. Raises Inexpressible where the host reads none of its family."""
 
     def __init__(self, session: Session, awaited: AsyncParameters) -> None:
-        self._awaited, self._call = awaited, session._call
+        self._awaited, self._session = awaited, session
 
     read = blocking(AsyncParameters.read)
     backup = blocking(AsyncParameters.backup)
@@ -297,12 +306,11 @@ class Parameters(Fixed):
     restore = blocking(AsyncParameters.restore)
 
 
-class Stream(Generic[T]):
+class Stream(_OfSession, Generic[T]):
     """What happens from now until `close`, the end of the session, or the loss of a line: iterate over it."""
 
     def __init__(self, session: Session, awaited: AsyncStream[T]) -> None:
-        self._stream, self._call = awaited, session._call
-        self._session = session
+        self._stream, self._session = awaited, session
 
     def __enter__(self: Self) -> Self:
         """Return it; the end of the block closes it."""

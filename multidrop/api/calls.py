@@ -9,8 +9,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 from collections.abc import Callable, Coroutine, Generator, Sequence
-from contextvars import Context, ContextVar, copy_context
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, TypeVar
 from weakref import WeakKeyDictionary, WeakSet
 
@@ -22,15 +21,14 @@ from multidrop.drives.conversations import refuse_stranger
 from multidrop.drives.drive import Drive
 from multidrop.shell import stop_report
 from multidrop.shell.automation import ENDING, outcome, settled
-from multidrop.shell.events import FAILURES, Output, Printed, SessionEvent
+from multidrop.shell.events import FAILURES, By
+from multidrop.shell.origin import Origin
 from multidrop.shell.session import Session
 from multidrop.transports import Unreachable
 
 T = TypeVar("T")
 S = TypeVar("S", bound="AsyncStream[Any]")
 CLOSED = ("the session is closed", "session", "connect(URL) opens one")
-_printed: ContextVar[list[str] | None] = ContextVar("printed", default=None)
-"""The lines that the current call has printed."""
 
 
 class Lost(TransportLost):
@@ -59,7 +57,6 @@ class Calls:
 
     def __init__(self) -> None:
         self._shell: Session | None = None
-        self._context = Context()
         self._holder: asyncio.Task[None] | None = None
         self._over = asyncio.Event()
         self._going = self._closing = False
@@ -92,7 +89,6 @@ class Calls:
     def open(self, shell: Session) -> None:
         """Take the session that the calls are for; `begin` follows."""
         self._shell, self._closing = shell, False
-        shell.subscribe(_collect, Printed, Output)
 
     def closing(self) -> bool:
         """Refuse further calls, as the session is being closed; return False where it was before."""
@@ -131,21 +127,23 @@ class Calls:
         """Begin an automation."""
         self._over.clear()
         begun = asyncio.get_running_loop().create_future()
-        self._holder = asyncio.get_running_loop().create_task(self._hold(begun), context=Context())
-        self._context = await begun
+        self._holder = asyncio.get_running_loop().create_task(self._hold(begun))
+        self.shell.origin = await begun
         self._going = True
 
-    async def _hold(self, begun: asyncio.Future[Context]) -> None:
-        async with self.shell.automations.run():
-            begun.set_result(copy_context())
+    async def _hold(self, begun: asyncio.Future[Origin]) -> None:
+        async with self.shell.automations.run(Origin(By.SCRIPT)) as origin:
+            begun.set_result(origin)
             try:
                 await self._over.wait()
             except asyncio.CancelledError:  # the loop ends, and cancels all tasks
                 self.shell.automations.interrupt()
                 raise
 
-    async def run(self, work: Callable[[], Coroutine[Any, Any, T]], printed: list[str] | None = None) -> T:
+    async def run(self, work: Callable[[Origin], Coroutine[Any, Any, T]], printed: list[str] | None = None) -> T:
         """Run a call as a part of the automation; `printed` gets the lines that it prints. A stop ends it.
+
+        `work` takes the origin of the lines of the call.
 
         Raises Stopped while an interruption ends the calls before, Diagnostic where the session is closed.
         """
@@ -155,9 +153,8 @@ class Calls:
             await self.returns.compared()
         if not self._going:
             raise Stopped("the session is being interrupted; nothing was sent")
-        context = self._context.copy()
-        context.run(_printed.set, printed)
-        task = asyncio.get_running_loop().create_task(self.shell.tasks.run(work()), context=context)
+        origin = replace(self.shell.origin, printed=printed)
+        task = asyncio.get_running_loop().create_task(self.shell.tasks.run(work(origin)))
         self._tasks.add(task)
         task.add_done_callback(self._tasks.discard)
         try:
@@ -197,13 +194,6 @@ class Calls:
         self._over.set()
         with contextlib.suppress(asyncio.CancelledError):
             await asyncio.wait([holder])
-
-
-def _collect(event: SessionEvent) -> None:
-    """Take what the current call prints: events are published in its context."""
-    lines = _printed.get()
-    if lines is not None and isinstance(event, Printed | Output):
-        lines.append(event.text)
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,6 @@ import operator
 import re
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import partial
 from typing import TYPE_CHECKING, NamedTuple, TypeVar
 
 from multidrop.api.calls import Calls, Stopping
@@ -25,11 +24,10 @@ from multidrop.dialects.values import Conditions
 from multidrop.dialects.values import Value as Fact
 from multidrop.drives.drive import still
 from multidrop.shell import stop_report, waits
-from multidrop.shell.events import By
 from multidrop.shell.line_syntax import join_target
+from multidrop.shell.origin import Origin
 from multidrop.shell.scripts.expression import Value, Word
 from multidrop.shell.scripts.questions import ask
-from multidrop.shell.travel import BEYOND
 from multidrop.shell.workspace import address_of
 
 if TYPE_CHECKING:
@@ -157,6 +155,10 @@ def _of_axis(drive: DriveFacts, axes: Sequence[A]) -> A:
     return found
 
 
+async def _homing_ended(calls: Calls, drive: Drive, axis: str) -> bool:
+    return await calls.run(lambda origin: drive.homing_ended(axis))
+
+
 class AsyncDrive(DriveFacts):
     """A drive of a session. Steps are the drive's own units: motor steps, or counts with its encoder in use."""
 
@@ -171,17 +173,15 @@ class AsyncDrive(DriveFacts):
     async def send(self, line: str) -> list[str]:
         """Send a line in the drive's own language; return the lines that it prints. Raises Refused, NoAnswer."""
         printed: list[str] = []
-        await self._calls.run(lambda: self._send(line), printed)
+        await self._calls.run(lambda origin: self._send(origin, line), printed)
         return printed
 
-    async def _send(self, *lines: str, beyond: bool = False) -> None:
+    async def _send(self, origin: Origin, *lines: str) -> None:
         shell = self._calls.shell
-        if beyond:
-            BEYOND.set(True)  # in the context of this call
         for line in filter(self._drive.starts, lines):  # before a setting that belongs to a refused move
             self._drive.check_start(line)
         for line in lines:
-            await shell.run(f"@{self._target} {line}", By.SCRIPT)
+            await shell.run(f"@{self._target} {line}", origin)
 
     async def read(self, name: str | int) -> Value:
         """Read the value of a word of the drive, such as `VM`; of a parameter by number or name.
@@ -194,7 +194,7 @@ class AsyncDrive(DriveFacts):
         shell = self._calls.shell
         if not line and not _WORD.fullmatch(name):
             raise Diagnostic(f"{name!r} is not a word of a drive", self.name, "valid: as in read('VM')")
-        return await self._calls.run(lambda: ask(shell, word, By.SCRIPT))
+        return await self._calls.run(lambda origin: ask(shell, origin, word))
 
     async def write(self, name: str | int, value: Value) -> None:
         """Give a word of the drive a value. Raises Refused; Diagnostic where its language has no such form."""
@@ -204,7 +204,7 @@ class AsyncDrive(DriveFacts):
         if line is None:
             raise Diagnostic(f"no line gives {name!r} a value", self.name, "send() takes any line of the drive")
         self._check_executes()
-        await self._calls.run(lambda: self._send(line))
+        await self._calls.run(lambda origin: self._send(origin, line))
 
     # Motion
 
@@ -235,7 +235,7 @@ class AsyncDrive(DriveFacts):
         async with self._calls.moves(drive):  # a mode and its move belong together
             kept = [name for name, (_, at) in drive.settings.items() if at == drive.commands]
             commands = drive.commands + len(lines)
-            await self._calls.run(lambda: self._send(*lines, beyond=beyond))
+            await self._calls.run(lambda origin: self._send(replace(origin, beyond=beyond), *lines))
             if drive.commands == commands and "=" not in "".join(lines):  # a move changes no setting
                 drive.settings |= {name: (drive.settings[name][0], commands) for name in kept}
 
@@ -246,9 +246,9 @@ class AsyncDrive(DriveFacts):
         seconds, DriveError where a homing has ended with an error.
         """
         drive, shell, timeout = self._drive, self._calls.shell, seconds(timeout, "wait")
-        await self._calls.run(lambda: waits.wait(shell, timeout, idle=idle, drives=[drive], said="wait"))
+        await self._calls.run(lambda origin: waits.wait(shell, origin, timeout, idle=idle, drives=[drive], said="wait"))
         for axis in [each for each in drive.homings if each not in drive.homed]:
-            well = await self._calls.run(partial(drive.homing_ended, axis))
+            well = await _homing_ended(self._calls, drive, axis)
             if not (well or self._drive.family.values.actions.no_error) and await self.error() is not None:
                 raise DriveError(f"{self.name}: the homing has ended with an error; read_error() reads and clears it")
         if self._calls.returns is not None:
@@ -264,7 +264,9 @@ class AsyncDrive(DriveFacts):
             raise Diagnostic(f"no condition {condition!r}", self.name, "valid: as in wait_for('I1=1')")
         wanted = replace(wanted, word=self._drive.family.values.actions.word(wanted.word, self.axis))
         units = shell.units if wanted.quantity else None
-        await self._calls.run(lambda: waits.wait_value(shell, self._drive, wanted, timeout, units, "wait_for"))
+        await self._calls.run(
+            lambda origin: waits.wait_value(shell, origin, self._drive, wanted, timeout, units, "wait_for")
+        )
 
     # Homing
 
@@ -297,15 +299,15 @@ class AsyncDrive(DriveFacts):
         drive, axis = self._drive, _first(self)
         if axis in drive.homings and axis not in drive.homed:
             self._check_executes()
-            if not await self._calls.run(lambda: still(drive)):
+            if not await self._calls.run(lambda origin: still(drive)):
                 return False
-            await self._calls.run(lambda: drive.homing_ended(axis))
+            await _homing_ended(self._calls, drive, axis)
         return drive.homed.get(axis, False) and not drive.state.unreferenced & {axis, ""}
 
     async def accept(self) -> None:
         """Take the position as right, as `/referenced` does: it counts again, and moves are sent again."""
         shell = self._calls.shell
-        await self._calls.run(lambda: shell.run(f"/referenced {self._target}".strip(), By.SCRIPT))
+        await self._calls.run(lambda origin: shell.run(f"/referenced {self._target}".strip(), origin))
 
     # Current, inputs and outputs, errors
 
@@ -316,7 +318,7 @@ class AsyncDrive(DriveFacts):
         if control.absent:
             raise Inexpressible(f"{self.name}: no {name}(): {control.absent}")
         self._check_executes()
-        await self._calls.run(lambda: self._send(*control.filled()))
+        await self._calls.run(lambda origin: self._send(origin, *control.filled()))
         if not on:
             text = f"{self.name}: {control.about}; a load that hangs may drop"
             self._calls.shell.notify(text, bus=self._drive.link.name, warning=True)
@@ -328,7 +330,9 @@ class AsyncDrive(DriveFacts):
     async def set_output(self, number: int, value: bool) -> None:
         """Switch an output on or off, by its number in the drive's language. Raises Refused where it has none."""
         self._check_executes()
-        await self._calls.run(lambda: self._send(self._drive.family.values.actions.output(number, bool(value))))
+        await self._calls.run(
+            lambda origin: self._send(origin, self._drive.family.values.actions.output(number, bool(value)))
+        )
 
     async def inputs(self) -> dict[int | str, bool]:
         """Read the inputs: True is active. By number, and by function where they have one: `home`, `lim+`, `lim-`."""
@@ -367,12 +371,12 @@ class AsyncDrive(DriveFacts):
                 text = self._drive.family.language.describe_error(int(code), self.product)[0]
             found = Fault(int(code), text)
         if found is not None and (clear := actions.clear(_first(self))):
-            await self._calls.run(lambda: self._send(clear))
+            await self._calls.run(lambda origin: self._send(origin, clear))
         return found
 
     async def _conditions(self, slow: bool = True) -> Conditions:
         self._check_executes()
-        return _of_axis(self, await self._calls.run(lambda: conditions(self._drive, slow)))
+        return _of_axis(self, await self._calls.run(lambda origin: conditions(self._drive, slow)))
 
     # Position and velocity
 
@@ -395,17 +399,17 @@ class AsyncDrive(DriveFacts):
     async def _in(self, what: str, unit: str) -> float:
         self._check_executes()
         units, axis = self._calls.shell.units, self.axis.lower()
-        return await self._calls.run(lambda: units.reading(self._drive, axis, what, unit))
+        return await self._calls.run(lambda origin: units.reading(self._drive, axis, what, unit))
 
     async def moving(self) -> bool:
         """Read whether it moves; at rest, two readings say so."""
         self._check_executes()
-        return not await self._calls.run(lambda: still(self._drive))
+        return not await self._calls.run(lambda origin: still(self._drive))
 
     async def motion(self) -> Motion:
         """Read position and velocity of its axis at one time."""
         self._check_executes()
-        found = _of_axis(self, await self._calls.run(self._drive.motion))
+        found = _of_axis(self, await self._calls.run(lambda origin: self._drive.motion()))
         self._axis_known = True
         return found
 

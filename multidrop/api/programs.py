@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Collection
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from multidrop.api.calls import Calls
 from multidrop.api.fixed import Fixed
 from multidrop.base import new_file
 from multidrop.shell import program_listing
+from multidrop.shell.events import By
 from multidrop.shell.operations.argument_types import Downloading, Restoring
+from multidrop.shell.origin import Origin
 from multidrop.shell.params import file as files
 from multidrop.shell.params.work import Difference, backup_text, differences, restore
 from multidrop.shell.programs import transfers
@@ -30,7 +33,7 @@ class AsyncPrograms(Fixed):
     async def list(self) -> Lines:
         """Read the program as a listing, with the remarks of its file where those are known."""
         shell = self._calls.shell
-        return await self._calls.run(lambda: program_listing.readable(shell, self._drive))
+        return await self._calls.run(lambda origin: program_listing.readable(shell, self._drive))
 
     async def upload(self, file: str = "", *, raw: bool = False) -> Lines:
         """Read the program as the lines of a file; write them to a new `file` if one is named.
@@ -40,7 +43,7 @@ class AsyncPrograms(Fixed):
         if file:
             new_file.check(file)
         shell = self._calls.shell
-        lines = await self._calls.run(lambda: program_listing.upload(shell, self._drive, raw))
+        lines = await self._calls.run(lambda origin: program_listing.upload(shell, self._drive, raw))
         if file:
             new_file.write(file, "".join(f"{line}\n" for line in lines))
         return lines
@@ -62,7 +65,12 @@ class AsyncPrograms(Fixed):
         """
         shell = self._calls.shell
         wanted = Downloading(save=save, run=run, only_changed=only_changed, no_verify=not verify)
-        await self._calls.run(lambda: transfers.download(shell, self._drive, file, wanted, text))
+
+        async def send(origin: Origin) -> None:
+            person = replace(origin, by=By.OPERATOR)  # a question is answered by what `connect` was given
+            await transfers.download(shell, person, self._drive, file, wanted, text)
+
+        await self._calls.run(send)
 
 
 class AsyncParameters(Fixed):
@@ -74,7 +82,7 @@ class AsyncParameters(Fixed):
     async def read(self) -> Readings:
         """Read every setting: `.values` by name, `.defaults`, and each with its unit in `.readings`."""
         shell = self._calls.shell
-        return await self._calls.run(lambda: files.read(shell, self._drive, "reading"))
+        return await self._calls.run(lambda origin: files.read(shell, self._drive, "reading"))
 
     async def backup(self, file: str) -> Readings:
         """Read every setting, and write them to a new file. Raises Diagnostic for a file that exists."""
@@ -112,5 +120,5 @@ class AsyncParameters(Fixed):
             other_product=other_product,
         )
         loaded = files.load(file)
-        await self._calls.run(lambda: restore(shell, self._drive, loaded, options), printed)
+        await self._calls.run(lambda origin: restore(shell, origin, self._drive, loaded, options), printed)
         return printed

@@ -6,7 +6,6 @@ import contextlib
 import logging
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import partial
 from math import inf
 from types import TracebackType
 from typing import TYPE_CHECKING, TypeVar
@@ -27,7 +26,7 @@ from multidrop.shell import stop_report, waits
 from multidrop.shell.automation import settled
 from multidrop.shell.channel import Front
 from multidrop.shell.configuration import load
-from multidrop.shell.events import By, Notified, SessionEvent
+from multidrop.shell.events import Notified, SessionEvent
 from multidrop.shell.session import Session as Shell
 
 if TYPE_CHECKING:
@@ -134,18 +133,24 @@ class AsyncSession(Fixed):
 
     async def add(self, /, *urls: str, **named: str) -> None:
         """Open further connections; those with a name become buses of that name. Moves nothing."""
-        await self._calls.run(lambda: self._shell.open_all(urls))
+        await self._calls.run(lambda origin: self._shell.open_all(urls))
         for name, url in named.items():
-            await self._calls.run(partial(self._shell.open, url, name))
+            await self._add_named(url, name)
         if (returns := self._calls.returns) is not None:
             for drive in self.drives:
                 with contextlib.suppress(DriveError):  # it is read again, or nothing is known of it
-                    await self._calls.run(partial(returns.note, drive._drive))
+                    await self._note(returns, drive._drive)
+
+    async def _add_named(self, url: str, name: str) -> None:
+        await self._calls.run(lambda origin: self._shell.open(url, name))
+
+    async def _note(self, returns: Returns, drive: Drive) -> None:
+        await self._calls.run(lambda origin: returns.note(drive))
 
     async def wait_back(self, timeout: float = waits.LIMIT) -> None:
         """Wait until every lost connection is back. Raises Timeout, and Lost where one is not tried again."""
         limit = seconds(timeout, "wait_back")
-        await self._calls.run(lambda: self._back(limit))
+        await self._calls.run(lambda origin: self._back(limit))
         if self._calls.returns is not None:
             await self._calls.returns.compared()
 
@@ -225,7 +230,7 @@ class AsyncSession(Fixed):
     async def send(self, line: str) -> list[str]:
         """Run a line as typed at the prompt (`PR P`, `@b MR 100`, `/drives`); return the lines that it prints."""
         printed: list[str] = []
-        await self._calls.run(lambda: self._shell.run(line, By.SCRIPT), printed)
+        await self._calls.run(lambda origin: self._shell.run(line, origin), printed)
         return printed
 
     async def run(self, file: str, /, **values: object) -> Run:
@@ -236,7 +241,7 @@ class AsyncSession(Fixed):
         texts = {name: text_of(value, f"{name} of {file}") for name, value in values.items()}
         script = read_script(file, texts, self._shell.macros)
         results: list[Result] = []
-        await self._calls.run(lambda: run_script(self._shell, script, results.append))
+        await self._calls.run(lambda origin: run_script(self._shell, origin, script, results.append))
         return Run(file, tuple(results))
 
     def telemetry(self, *addresses: str, rate: float = RATE) -> AsyncTelemetry:

@@ -66,7 +66,7 @@ def send(url: str, lines: Sequence[str], json: bool, agreeing: Agreeing) -> int:
     report = Report("send", as_json=True)
 
     async def body(session: Session) -> None:
-        await run_typed(session, lines, report.executed)
+        await run_typed(session, session.origin, lines, report.executed)
 
     return report.finish(opened(body, replies=False))
 
@@ -99,7 +99,7 @@ def run(file: str, opening: Opening, reporting: Reporting, agreeing: Agreeing) -
     async def body(session: Session) -> None:
         await report.watched(session, opening.on, opening.role)
         with report.noting():
-            await run_script(session, script, report.executed)
+            await run_script(session, session.origin, script, report.executed)
 
     tried = targets(each.text for each in lines_of(script.body))
     agreed, replies = agreeing.yes, not reporting.json

@@ -30,11 +30,10 @@ WRONG = 2
 """The exit code of a configuration that cannot be used as it is."""
 
 
-def ignore() -> None:
-    """Let the configuration file not count from now on, and say on standard error what is not in force."""
+def say_not_in_force() -> None:
+    """Say on standard error what of the configuration file is not in force with `--no-config`."""
     if text := not_in_force(configuration.load(lenient=True)):
         write(sys.stderr, f"--no-config: not in force: {text}")
-    places.ignore_configuration()
 
 
 def not_in_force(found: Settings) -> str:

@@ -28,7 +28,8 @@ from multidrop.drives.drive import Drive
 from multidrop.shell.batch.virtual_loop import VirtualLoop
 from multidrop.shell.configuration import Settings
 from multidrop.shell.connect import schemes
-from multidrop.shell.events import By, Failed, Notified, Output, Printed, SessionEvent
+from multidrop.shell.events import Failed, Notified, Output, Printed, SessionEvent
+from multidrop.shell.origin import Origin
 from multidrop.shell.session import Session
 from multidrop.simulator.cells import read
 from multidrop.simulator.families import family_of
@@ -228,6 +229,8 @@ class Opened:
     def __init__(self, desk: Desk, session: Session) -> None:
         self.desk, self.session = desk, session
         self.events = list[SessionEvent]()
+        self.last = ""
+        """The line of an automation that was run last."""
 
     def begin(self) -> None:
         """Forget what was told and written."""
@@ -254,9 +257,15 @@ class Opened:
         """What was written since the beginning."""
         return b"".join(self.wire.written)
 
-    async def run(self, line: str, by: By = By.OPERATOR) -> None:
+    async def run(self, line: str, origin: Origin | None = None) -> None:
         """Run a line for the first drive, or with an address of its own, or a verb."""
-        await self.session.run(self.desk.sample.to_first(line), by)
+        await self.session.run(self.desk.sample.to_first(line), origin)
+
+    async def automation(self, *lines: str) -> None:
+        """Run lines as one automation, as `send` and a script do."""
+        async with self.session.automations.run(self.session.origin) as origin:
+            for self.last in lines:
+                await self.run(self.last, origin)
 
     async def say(self, *lines: str) -> list[str]:
         """Run lines; return what they printed."""

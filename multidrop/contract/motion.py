@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import re
+from dataclasses import replace
 
 import pytest
 
@@ -65,14 +66,11 @@ class Motions(OfFamily):
         if (limit := self.sample.limit) is None:
             self.without("signs of how a motion ended")
         async with desk.again(self.sample.limited).session() as opened:
-            session, reads = opened.session, self.sample.reads
+            lines = (*self.sample.setup, self.sample.far, "/wait stopped", self.sample.reads.line)
             with pytest.raises(MotionFailed) as failure:
-                async with session.automations.run():
-                    for line in (*self.sample.setup, self.sample.far, "/wait stopped", reads.line):
-                        opened.events.clear()
-                        await opened.run(line)
+                await opened.automation(*lines)
             assert self.said(limit, str(failure.value)), failure.value
-            assert line == "/wait stopped" and failure.value.outcome == "limit"
+            assert opened.last == "/wait stopped" and failure.value.outcome == "limit"
             assert (failure.value.position, 0) == (await self.places(opened))[0]
 
     @in_virtual_time
@@ -122,9 +120,7 @@ class Motions(OfFamily):
     async def test_an_automation_that_ends_early_stops_what_it_moved(self, desk: Desk) -> None:
         async with desk.session() as opened:
             with pytest.raises(DriveError):
-                async with opened.session.automations.run():
-                    for line in (*self.sample.setup, self.sample.far, "/sleep 0.5", self.sample.refused.line):
-                        await opened.run(line)
+                await opened.automation(*self.sample.setup, self.sample.far, "/sleep 0.5", self.sample.refused.line)
             await asyncio.sleep(5.0)
             assert [velocity for _, velocity in await self.places(opened)] == [0] * len(desk.names)
 
@@ -133,9 +129,7 @@ class Motions(OfFamily):
         async with desk.session() as opened:
             await self.far(opened)
             with pytest.raises(Diagnostic):
-                async with opened.session.automations.run():
-                    for line in (self.sample.reads.line, "/use nowhere"):
-                        await opened.run(line)
+                await opened.automation(self.sample.reads.line, "/use nowhere")
             await asyncio.sleep(1.0)
             assert (await self.places(opened))[0][1] != 0
 
@@ -224,7 +218,7 @@ class Stopping(Motions):
             await opened.bus.stopped()
             await asyncio.sleep(3.0)
             with pytest.raises(Stopped):
-                await opened.run(self.sample.moves.line, By.MACRO)
+                await opened.run(self.sample.moves.line, replace(opened.session.origin, by=By.MACRO))
             assert await opened.say(self.sample.reads.line) == [self.sample.reads.printed]
             await opened.say(*self.sample.setup, self.sample.moves.line, "/wait stopped", "/resume")
             assert (await self.places(opened))[0] == (self.sample.moves.place, 0)

@@ -42,6 +42,7 @@ def play(name: str, opening: Opening, times: int | None, fast: bool, reporting: 
         with report.noting():
             await play_macro(
                 session,
+                session.origin,
                 macro,
                 values,
                 times=times,

@@ -19,6 +19,7 @@ from multidrop.shell.console import swallows
 from multidrop.shell.events import FAILURES, SessionEvent, StateChanged
 from multidrop.shell.exit_codes import INTERRUPTED, exit_code
 from multidrop.shell.log.writer import begin as begin_log
+from multidrop.shell.origin import LastLine, Origin
 from multidrop.shell.prompt.keyboard import on_signals, on_stop_key
 from multidrop.shell.prompt.terminal_input import asker
 from multidrop.shell.session import Session
@@ -157,7 +158,8 @@ class _Host:
         return code
 
     async def _whole(self, urls: Sequence[str], body: Body) -> int | None:
-        async with self._session.automations.run():
+        async with self._session.automations.run(Origin(last=LastLine())) as origin:
+            self._session.origin = origin
             await self._session.open_all(urls)
             return await body(self._session)
 

@@ -29,6 +29,7 @@ from multidrop.simulator.families import family_of
 if TYPE_CHECKING:
     from multidrop.dialects.values import Snapshot
     from multidrop.drives.drive import Drive
+    from multidrop.shell.origin import Origin
     from multidrop.shell.session import Session
     from multidrop.simulator.cell.spec import Cell, DriveSpec
     from multidrop.simulator.family import SimulatedFamily
@@ -56,15 +57,18 @@ def chosen(cell: Cell, file: str, drive: Drive, name: str, several: bool = False
     raise Diagnostic(what, file, hint)
 
 
-async def apply(session: Session, drive: Drive, file: str, spec: DriveSpec, wanted: Restoring) -> None:
+async def apply(session: Session, origin: Origin, drive: Drive, file: str, spec: DriveSpec, wanted: Restoring) -> None:
     """Put the state of a drive in a file onto a drive. Raises Diagnostic, DriveError or TransportLost."""
-    await _Replacement(session, drive, file, spec, wanted).run()
+    await _Replacement(session, origin, drive, file, spec, wanted).run()
 
 
 class _Replacement:
     """One apply: the drive, and what it is to become."""
 
-    def __init__(self, session: Session, drive: Drive, file: str, spec: DriveSpec, wanted: Restoring) -> None:
+    def __init__(
+        self, session: Session, origin: Origin, drive: Drive, file: str, spec: DriveSpec, wanted: Restoring
+    ) -> None:
+        self._origin = origin
         self._session, self._drive, self._file = session, drive, file
         self._spec, self._wanted = spec, wanted
         self._settings = _tables(spec).wanted(spec)
@@ -212,7 +216,8 @@ class _Replacement:
             clear = self._clearing and _tables(here).program(here).lines  # else an old program stays beside the new one
             lines = (*((self._clearing,) if clear else ()), *self._program.file)
             text, saved = "".join(f"{line}\n" for line in lines), Downloading(save=True)
-            await transfers.download(self._session, self._drive, f"{self._file}#{self._spec.name}", saved, text)
+            file = f"{self._file}#{self._spec.name}"
+            await transfers.download(self._session, self._origin, self._drive, file, saved, text)
             self._done.append("program")
         await self._change(communication=False)
         await self._save("settings and program")
@@ -227,7 +232,7 @@ class _Replacement:
         session.addressed.add((drive.link.name, drive.address))
         steps = self._plan(await read(session, drive, "apply"), communication)
         try:
-            await send(session, drive, steps, self._wanted, "apply", written)
+            await send(session, self._origin, drive, steps, self._wanted, "apply", written)
         finally:
             self._done += [change.text for change in written]
         return len(steps)

@@ -13,6 +13,7 @@ import json
 from collections.abc import Awaitable, Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 
 from multidrop.base import new_file
@@ -36,6 +37,7 @@ from multidrop.drives.drive import Drive
 from multidrop.shell.channel import running, transferring
 from multidrop.shell.line_syntax import split_target
 from multidrop.shell.operations.argument_types import Restoring
+from multidrop.shell.origin import Origin
 from multidrop.shell.params import file as files
 from multidrop.shell.session import Session
 from multidrop.shell.workspace import Workspace
@@ -49,14 +51,14 @@ OWN_NAME = frozenset({"DN"})
 """The setting that two drives on one line never share."""
 
 
-def targets(workspace: Workspace, target: str, having: str = "parameters") -> list[Drive]:
+def targets(workspace: Workspace, origin: Origin, target: str, having: str = "parameters") -> list[Drive]:
     """The drives of a target: one, several (`a,b`), or `all` that are open and whose family has these.
 
     Raises Diagnostic for an unknown one.
     """
     found: dict[Drive, None] = {}
     for name in target.split(","):
-        bus, address = split_target(name)
+        bus, address = origin.target(name)
         if address not in ALL:
             found[workspace.drive(bus, address or None)] = None
             continue
@@ -132,7 +134,7 @@ def backup_text(drive: Drive, found: Readings) -> str:
     return files.formatted(files.identity(drive.state, drive.family.values.parameters.language), found)
 
 
-async def backup(workspace: Workspace, name: str, target: str) -> None:
+async def backup(workspace: Workspace, origin: Origin, name: str, target: str) -> None:
     """Write the settings of drives to new files, or to standard output."""
 
     async def keep(drive: Drive) -> None:
@@ -140,26 +142,26 @@ async def backup(workspace: Workspace, name: str, target: str) -> None:
         make_place(own, target)
         new_file.check(own, printed=True)
         found, who = await files.read(workspace, drive, "backup"), workspace.display_name(drive)
-        new_file.write(own, backup_text(drive, found), workspace.output)
+        new_file.write(own, backup_text(drive, found), partial(workspace.output, origin=origin))
         workspace.notify(f"{who}: {counted(len(found.readings), 'setting')}{new_file.place(own)}")
         if found.unread:
             names = files.listed([name for name, _ in found.unread])
             workspace.notify(f"{who}: not read: {names}; [unread] in the file has the reasons", warning=True)
 
-    await each(workspace, targets(workspace, target), keep)
+    await each(workspace, targets(workspace, origin, target), keep)
 
 
-async def read(workspace: Workspace, target: str) -> None:
+async def read(workspace: Workspace, origin: Origin, target: str) -> None:
     """Read the settings of drives, and say how many there are; screens show them."""
 
     async def count(drive: Drive) -> None:
         found = await files.read(workspace, drive, "reading")
         workspace.notify(f"{workspace.display_name(drive)}: {counted(len(found.readings), 'setting')} read")
 
-    await each(workspace, targets(workspace, target), count)
+    await each(workspace, targets(workspace, origin, target), count)
 
 
-async def save(workspace: Workspace, target: str) -> None:
+async def save(workspace: Workspace, origin: Origin, target: str) -> None:
     """Have drives keep their present settings, after a question. Raises Diagnostic where it is not agreed to."""
 
     async def keep(drive: Drive) -> None:
@@ -168,11 +170,12 @@ async def save(workspace: Workspace, target: str) -> None:
         await transferring(drive, drive.family.values.parameters.save())
         workspace.notify(f"{who}: its settings are saved")
 
-    await each(workspace, targets(workspace, target), keep)
+    await each(workspace, targets(workspace, origin, target), keep)
 
 
 async def diff(
     workspace: Workspace,
+    origin: Origin,
     target: str,
     *,
     name: str = "",
@@ -207,15 +210,15 @@ async def diff(
         for setting, here, there in rows:
             if as_json:
                 own = {"drive": who} if several else {}
-                workspace.output(json.dumps({**own, "name": setting, "here": here, "there": there}))
+                workspace.output(json.dumps({**own, "name": setting, "here": here, "there": there}), origin=origin)
             else:
                 unit = f" {units[setting]}" if units.get(setting) else ""
                 values = f"here {files.shown(here)}, there {files.shown(there)}{unit}"
-                workspace.output(f"{f'{who}: ' if several else ''}{setting}: {values}")
+                workspace.output(f"{f'{who}: ' if several else ''}{setting}: {values}", origin=origin)
         if not rows and not as_json:
             workspace.notify(f"{who}: nothing differs")
 
-    await each(workspace, targets(workspace, target), compare)
+    await each(workspace, targets(workspace, origin, target), compare)
     return differs
 
 
@@ -261,7 +264,7 @@ class Wanted:
     """Those of `withheld` that the drive should have, and that could not be read."""
 
 
-async def restore(session: Session, drive: Drive, file: files.SettingsFile, options: Restoring) -> None:
+async def restore(session: Session, origin: Origin, drive: Drive, file: files.SettingsFile, options: Restoring) -> None:
     """Send what differs from a file. Raises Diagnostic or DriveError."""
     who, family = session.display_name(drive), drive.family.values.parameters
     if file.language and file.language != family.language:
@@ -280,7 +283,7 @@ async def restore(session: Session, drive: Drive, file: files.SettingsFile, opti
     others = {each.address for each in session.buses[drive.link.name].all_drives if each is not drive}
     if reason := family.conflict(plan, others - {""}):
         raise Diagnostic(f"{who}: {reason}; nothing was sent", file.path)
-    _show(session, who, plan, wanted)
+    _show(session, origin, who, plan, wanted)
     if not plan.changes:
         left = wanted.withheld or plan.withheld or plan.impossible
         session.notify(f"{who}: nothing {'else ' if left else ''}differs from {file.path}", outcome=True)
@@ -294,13 +297,19 @@ async def restore(session: Session, drive: Drive, file: files.SettingsFile, opti
     aside = {*wanted.withheld, *dict(plan.withheld), *dict(plan.impossible)}
     goal = {name: value for name, value in wanted.values.items() if name not in aside}
     with _accounted(session, who, plan) as written:
-        await send(session, drive, plan, options, "restore", written)
+        await send(session, origin, drive, plan, options, "restore", written)
         await _finish(session, drive, plan, goal, options)
     _check_complete(wanted, who)
 
 
 async def send(
-    session: Session, drive: Drive, plan: Plan, options: Restoring, what: str, written: list[Change]
+    session: Session,
+    origin: Origin,
+    drive: Drive,
+    plan: Plan,
+    options: Restoring,
+    what: str,
+    written: list[Change],
 ) -> None:
     """Send the steps, and note each that is done.
 
@@ -310,7 +319,7 @@ async def send(
     with running(session, f"{session.display_name(drive)}: {what}") as progress:
         for number, change in enumerate(plan, 1):
             named = change.name in options.named
-            async with session.path.starting(drive, change.text) if named else contextlib.nullcontext():
+            async with session.path.starting(origin, drive, change.text) if named else contextlib.nullcontext():
                 await transferring(drive, drive.family.perform(change.text))
             written.append(change)
             progress(number, len(plan))
@@ -342,11 +351,11 @@ def _values(present: Readings, file: files.SettingsFile, options: Restoring, who
     return wanted
 
 
-def _show(workspace: Workspace, who: str, plan: Plan, wanted: Wanted) -> None:
+def _show(workspace: Workspace, origin: Origin, who: str, plan: Plan, wanted: Wanted) -> None:
     """Print the steps, and say which settings are left alone."""
     for change in plan:
         before = "" if change.before is None else f" (was {files.shown(change.before)})"
-        workspace.output(f"{who}: {change.text}{before}{', for a while' if change.temporary else ''}")
+        workspace.output(f"{who}: {change.text}{before}{', for a while' if change.temporary else ''}", origin=origin)
     for remark in plan.remarks:
         workspace.notify(f"{who}: {remark}", warning=True)
     for name, reason in plan.withheld:
@@ -422,7 +431,12 @@ async def _finish(
 
 
 async def restore_each(
-    session: Session, name: str, target: str, options: Restoring, ready: files.SettingsFile | None = None
+    session: Session,
+    origin: Origin,
+    name: str,
+    target: str,
+    options: Restoring,
+    ready: files.SettingsFile | None = None,
 ) -> None:
     """Restore drives from their files; every file is read before the first step.
 
@@ -430,7 +444,7 @@ async def restore_each(
 
     Raises Diagnostic where the file for one of several drives names another drive, or none.
     """
-    drives = targets(session, target)
+    drives = targets(session, origin, target)
     loaded = {drive: ready or files.load(file_of(session, drive, name, target)) for drive in drives}
     for drive, file in loaded.items() if is_several(target) else ():
         if file.name != (drive.state.name or drive.address):
@@ -439,6 +453,6 @@ async def restore_each(
             raise Diagnostic(f"names {whose}, and is to be restored to {who}; nothing was sent", file.path, hint)
 
     async def put(drive: Drive) -> None:
-        await restore(session, drive, loaded[drive], options)
+        await restore(session, origin, drive, loaded[drive], options)
 
     await each(session, drives, put)

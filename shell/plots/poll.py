@@ -73,12 +73,12 @@ async def _poll(session: Session, asked: Polling) -> None:
 def _wanted(session: Session, asked: Polling) -> list[tuple[Drive, str]]:
     """Each value: a word of each drive, or of the one that precedes its dot. Raises Diagnostic; sends nothing."""
     found: dict[tuple[Drive, str], None] = {}
-    drives = targets(session, asked.drives, "values")
+    drives = targets(session, session.origin, asked.drives, "values")
     for name in asked.names:
         target, _, word = name.rpartition(".")
         if not word:
             raise Diagnostic(f"no value in {name!r}", hint="valid: NAME or ADDR.NAME, as P, b.VM, press:b.I1")
-        for drive in targets(session, target, "values") if target else drives:
+        for drive in targets(session, session.origin, target, "values") if target else drives:
             found[drive, drive.family.values.check(word)] = None
     return list(found)
 

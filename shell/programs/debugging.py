@@ -18,6 +18,7 @@ from multidrop.dialects.program_files import Stored
 from multidrop.drives.drive import Drive
 from multidrop.drives.events import Lost, Restarted
 from multidrop.shell.events import OnBus, Phase, SessionEvent
+from multidrop.shell.origin import Origin
 from multidrop.shell.program_listing import Listing, Sight
 from multidrop.shell.session import Session
 
@@ -73,46 +74,46 @@ class Debugger:
 
     # Starting
 
-    async def trace(self, place: str) -> None:
+    async def trace(self, origin: Origin, place: str) -> None:
         """Run a program, and show its lines until it ends or comes to its break point."""
         others = [each.address for each in self._session.bus(self._drive.link.name).all_drives]
         annotators = self._session.of(self._session.buses[self._drive.link.name]).annotators
         annotators.append(self._annotated)
         try:
-            await self._start(place, others, self._debugging.trace)
-            await self._follow()
+            await self._start(origin, place, others, self._debugging.trace)
+            await self._follow(origin)
         finally:
             annotators.remove(self._annotated)
 
-    async def begin(self, place: str) -> None:
+    async def begin(self, origin: Origin, place: str) -> None:
         """Start a program that waits before each line."""
-        await self._start(place, None, self._debugging.begin)
+        await self._start(origin, place, None, self._debugging.begin)
         self.break_point, self._waits = "", True
         self._sight.breaks("")
         first = self._debugging.address(self._listing.rows, self._place)
         for row in self._listing.around(first):
-            self._session.output(row)
+            self._session.output(row, origin=origin)
         self._sight.seen(first, Phase.BEFORE)
         self.say(f"waits before the first line of {self._place}: {WAYS}")
 
-    async def _start(self, place: str, neighbours: Neighbours | None, start: Start) -> None:
+    async def _start(self, origin: Origin, place: str, neighbours: Neighbours | None, start: Start) -> None:
         """Start a program, once it is known that it can be started."""
         await self._read_listing()
         place = place.upper() or self._debugging.entry(self._listing.rows)
         await self._run(self._debugging.idle(place, neighbours))
         self._place, self._last = place, None
         self._last_at = self._free_at = self._session.now()
-        async with self._session.path.starting(self._drive, parts=True):
+        async with self._session.path.starting(origin, self._drive, parts=True):
             await self._run(start(place))
 
-    async def step(self) -> None:
+    async def step(self, origin: Origin) -> None:
         """Execute one line; show it, and the watched values that it changed."""
         if self._debugging.no_step:
             name = self._session.display_name(self._drive)
             raise Inexpressible(f"{name}: {self._debugging.no_step}; nothing was sent")
         await self._check_waits()
         await self._read_listing()
-        async with self._session.path.starting(self._drive, parts=True):
+        async with self._session.path.starting(origin, self._drive, parts=True):
             self._waits = True
             stepped = await self._run(self._debugging.step(self._listing.rows))
         self._executed(stepped.row, stepped.hold)
@@ -120,7 +121,7 @@ class Debugger:
         try:
             changed = await self._changed()
         finally:  # the line was executed, whatever becomes of the values
-            self._session.output(self._listing.shown(stepped.row) + changed)
+            self._session.output(self._listing.shown(stepped.row) + changed, origin=origin)
             self._sight.seen(stepped.row.at, Phase.AFTER)
         if not (await self._look()).runs:
             self.say("the program has ended")
@@ -133,10 +134,10 @@ class Debugger:
             raise Refused(f"{name}: '{self._last.text}' holds for another {left:.1f} s; no key was sent")
         await self._run(self._debugging.waits(self._place, self._last))
 
-    async def go_on(self) -> None:
+    async def go_on(self, origin: Origin) -> None:
         """Let the program run on at normal speed."""
         await self._check_waits()
-        async with self._session.path.starting(self._drive, parts=True):
+        async with self._session.path.starting(origin, self._drive, parts=True):
             await self._run(self._debugging.go_on(self._place))
         self._waits = False
         self._sight.seen(None)
@@ -145,25 +146,25 @@ class Debugger:
 
     # Following
 
-    async def _follow(self) -> None:
+    async def _follow(self, origin: Origin) -> None:
         while True:
             await asyncio.sleep(PERIOD)
             look = await self._look()
             if look.address is not None and (row := self._listing.row(look.address)) != self._last:
-                self._session.output(self._listing.shown(row))
+                self._session.output(self._listing.shown(row), origin=origin)
                 self._last = row
                 self._sight.seen(row.at)
             if not look.runs:
                 return self.say(f"the program has ended{await self._changed()}")
             if look.paused:
-                return await self._show_waiting(look.address)
+                return await self._show_waiting(origin, look.address)
             quiet = self._session.now() - max(self._last_at, self._free_at)
             if not self.break_point or self._last is None or quiet < QUIET:
                 continue  # a quiet trace without a hold may wait at its break point
             procedure = self._debugging.broken(self._listing.rows, self._last, self.break_point)
             address: int | None = await self._run(procedure)
             if address is not None:
-                return await self._show_waiting(address)
+                return await self._show_waiting(origin, address)
             if LONG_QUIET <= quiet < LONG_QUIET + 2 * PERIOD:
                 where = f"it holds, or waits at {self.break_point}"
                 self.say(f"no line since '{self._last.text}': {where}; /break now makes sure")
@@ -176,11 +177,11 @@ class Debugger:
             self._sight.seen(None)
         return look
 
-    async def _show_waiting(self, address: int | None) -> None:
+    async def _show_waiting(self, origin: Origin, address: int | None) -> None:
         """Show the place of a program that waits: the listing around its next line, and the watched values."""
         self._waits = True
         for row in self._listing.around(address):
-            self._session.output(row)
+            self._session.output(row, origin=origin)
         self._sight.seen(address, Phase.BEFORE)
         where = f" at the break point {self.break_point}" if self.break_point and address is not None else ""
         self.say(f"the program waits{where}: {WAYS}{await self._changed()}")
@@ -215,16 +216,16 @@ class Debugger:
         self._sight.breaks("")
         self.say("no break point")
 
-    async def break_now(self) -> None:
+    async def break_now(self, origin: Origin) -> None:
         """Break the running program where it is."""
         await self._read_listing()
         await self._run(self._debugging.break_now(self._place))
         self._last, self._free_at = MAYBE_HELD, float("-inf")
-        await self._show_waiting((await self._look()).address)
+        await self._show_waiting(origin, (await self._look()).address)
 
     # Watched variables
 
-    async def watch(self, names: Sequence[str]) -> None:
+    async def watch(self, origin: Origin, names: Sequence[str]) -> None:
         """Watch variables from now on, and show their values."""
         upper = tuple(dict.fromkeys(name.upper() for name in names))
         self._debugging.names(upper)
@@ -233,7 +234,7 @@ class Debugger:
             shown = await self._changed()
             missing = [name for name in upper if name not in self._values]
             absent = f"   not there now: {', '.join(missing)}" if missing else ""
-            self._session.output((shown + absent).strip())
+            self._session.output((shown + absent).strip(), origin=origin)
 
     async def _changed(self) -> str:
         """Read what is watched; return the values that changed, as a person reads them, with blanks before."""

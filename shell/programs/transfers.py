@@ -24,6 +24,7 @@ from multidrop.shell import motions
 from multidrop.shell.channel import running, transferring
 from multidrop.shell.events import By, Printed
 from multidrop.shell.operations.argument_types import Downloading
+from multidrop.shell.origin import Origin
 from multidrop.shell.program_listing import Sight, check_one, read
 from multidrop.shell.session import Session
 from multidrop.shell.state.backups import Copy, Sources, write_backup
@@ -92,11 +93,11 @@ def in_words(file: str, found: Difference, drive: str) -> str:
 
 async def download(
     session: Session,
+    origin: Origin,
     drive: Drive,
     file: str,
     wanted: Downloading = PLAIN,
     text: str | None = None,
-    by: By = By.OPERATOR,
     *,
     later: bool = False,
 ) -> None:
@@ -114,21 +115,23 @@ async def download(
     _under_way.add(drive)
     try:
         made = _Download(session, drive, file, wanted, later)
-        await made.agree(lines, by)
-        async with session.automations.run(f"the download of {file}"):
-            await made.run(text, lines)
+        await made.agree(lines, origin.by)
+        async with session.automations.run(origin, f"the download of {file}") as own:
+            await made.run(own, text, lines)
     finally:
         _under_way.discard(drive)
 
 
-async def start(session: Session, drive: Drive, file: str, wanted: Downloading, text: str | None) -> None:
+async def start(
+    session: Session, origin: Origin, drive: Drive, file: str, wanted: Downloading, text: str | None
+) -> None:
     """Execute the program of a download whose start was left for `later`. `text`: what was downloaded.
 
     Raises the drive's failures.
     """
     _, lines = await checked(session, drive, file, text)
-    async with session.automations.run(f"the start of {file}"):
-        await _Download(session, drive, file, wanted).start(drive.programs.start(lines, wanted.run))
+    async with session.automations.run(origin, f"the start of {file}") as own:
+        await _Download(session, drive, file, wanted).start(own, drive.programs.start(lines, wanted.run))
 
 
 class _Download:
@@ -143,7 +146,7 @@ class _Download:
     def _programs(self) -> Programs:
         return self._drive.programs
 
-    async def run(self, text: str, lines: Sequence[SourceLine]) -> None:
+    async def run(self, origin: Origin, text: str, lines: Sequence[SourceLine]) -> None:
         """Do all of it. Raises Diagnostic for an unknown label to run."""
         programs, wanted, start = self._programs, self._wanted, ""
         if wanted.run:
@@ -167,7 +170,7 @@ class _Download:
                 if wanted.save:
                     await self._save(())
                 if start:
-                    await self.start(start)
+                    await self.start(origin, start)
                 return
         backup = await self._back_up(lines, held)
         port = self._session.of(self._session.buses[self._drive.link.name]).port
@@ -175,7 +178,7 @@ class _Download:
             with marked(self._session.settings.state, port, self._drive.address, self._file, backup):
                 if ends_program:
                     await self._end_program()
-                sent = await self._send(lines, held)
+                sent = await self._send(origin, lines, held)
                 await self._save(lines)
                 if programs.size(lines) and not wanted.no_verify:
                     await self._verify(text, lines, sent, held)
@@ -183,7 +186,7 @@ class _Download:
             self._say(f"what was in it before is in {backup}", warning=True)
             raise
         if start:
-            await self.start(start)
+            await self.start(origin, start)
 
     def _say(self, text: str, warning: bool = False) -> None:
         self._session.notify(f"{self._name}: {text}", bus=self._drive.link.name, warning=warning, outcome=True)
@@ -242,12 +245,12 @@ class _Download:
                 )
             await asyncio.sleep(APART)
 
-    async def _send(self, lines: Sequence[SourceLine], held: Held) -> Sequence[SourceLine]:
+    async def _send(self, origin: Origin, lines: Sequence[SourceLine], held: Held) -> Sequence[SourceLine]:
         """Send the file; a refusal names its line."""
         drive, workspace = self._drive, self._session
         workspace.addressed.add((drive.link.name, drive.address))
         moves = any(drive.codec.starts_motion(line.text) for line in self._programs.executed(lines))
-        begins = workspace.path.starting(drive, parts=True) if moves else contextlib.nullcontext()
+        begins = workspace.path.starting(origin, drive, parts=True) if moves else contextlib.nullcontext()
         if self._programs.size(lines) and drive.family.debugging is not None:
             Sight(workspace, drive).changes()
         try:
@@ -299,10 +302,10 @@ class _Download:
             at = workspace.wall(workspace.now()).isoformat(" ", "seconds")
             Sources(workspace.settings.state).keep(held, Copy(self._file, text, at))
 
-    async def start(self, line: str) -> None:
+    async def start(self, origin: Origin, line: str) -> None:
         drive, workspace = self._drive, self._session
-        async with workspace.path.starting(drive, line):
-            printed = await motions.send(workspace, drive, line)
+        async with workspace.path.starting(origin, drive, line):
+            printed = await motions.send(workspace, origin, drive, line)
         for text in printed:
-            workspace.publish(Printed(workspace.now(), drive.link.name, drive.address, text))
+            workspace.publish(Printed(workspace.now(), drive.link.name, drive.address, text), origin)
         self._say(f"started ({line})")

@@ -32,6 +32,7 @@ if sys.platform == "win32":
 else:
     import fcntl
 
+from multidrop.shell.origin import LastLine, Origin
 from multidrop.shell.quitting import ENDING
 from multidrop.shell.session import BARE_WORDS, Session
 
@@ -222,6 +223,7 @@ class LineQueue:
 
     def __init__(self, session: Session) -> None:
         self._session = session
+        self._origin = Origin(last=LastLine())
         self._waiting: asyncio.Queue[tuple[int, Line]] = asyncio.Queue()
         """Lines with their numbers."""
         self._entered_lines = 0
@@ -306,7 +308,7 @@ class LineQueue:
                 continue
             self.running = line.text
             try:
-                await self._session.run(line.sent, since=line.since)
+                await self._session.run(line.sent, self._origin, since=line.since)
             except FAILURES:
                 if line.since == self._session.stops:  # else the waiting lines were typed after the stop of this one
                     self._held = f"'{self.running.strip()}' failed"

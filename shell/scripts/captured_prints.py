@@ -6,17 +6,16 @@ import asyncio
 import contextlib
 from collections import deque
 from collections.abc import Iterator
-from contextvars import ContextVar
+from dataclasses import replace
 from itertools import islice
 
 from multidrop.drives.events import Unsolicited
 from multidrop.shell.channel import Channel
 from multidrop.shell.events import Entered, OnBus, Output, Printed, SessionEvent
+from multidrop.shell.origin import LastLine, Origin
 
 KEPT = 10_000
 """The number of lines kept."""
-_current: ContextVar[Hearing | None] = ContextVar("hearing", default=None)
-"""The hearing of the script whose task publishes an event."""
 
 
 class Hearing:
@@ -33,15 +32,23 @@ class Hearing:
         """Bus and address of the line under way; empty for a verb."""
 
     def take(self, event: SessionEvent) -> None:
-        """Take a session's event. What other lines print that run meanwhile is not the script's."""
-        mine = _current.get() is self
-        if isinstance(event, Entered) and self.target is None and mine:
-            self.target = (event.bus, event.address)
-        elif isinstance(event, Printed | Output) and mine:
-            self._add(event.text, not self._own)
-        elif isinstance(event, OnBus) and isinstance(event.event, Unsolicited):
+        """Take what drives print by themselves."""
+        if isinstance(event, OnBus) and isinstance(event.event, Unsolicited):
             for line in event.event.lines:
                 self._add(line, True)
+
+    def take_own(self, event: SessionEvent) -> None:
+        """Take what a line of the script enters or prints. What other lines print meanwhile is not the script's."""
+        if isinstance(event, Entered) and self.target is None:
+            self.target = (event.bus, event.address)
+        elif isinstance(event, Printed | Output):
+            self._add(event.text, not self._own)
+
+    def of(self, origin: Origin) -> Origin:
+        """The origin of the script's lines, which are heard here."""
+        return replace(
+            origin, heard=self.take_own, last=LastLine(origin.last.printed if origin.last is not None else None)
+        )
 
     def begin(self, afresh: bool) -> None:
         """Note the beginning of a line; `afresh`: it is not a verb of scripts; `/expect` looks from here on."""
@@ -79,10 +86,8 @@ class Hearing:
 @contextlib.contextmanager
 def hearing(channel: Channel) -> Iterator[Hearing]:
     heard = Hearing()
-    leave = channel.subscribe(heard.take, Entered, Printed, Output, Unsolicited)
-    token = _current.set(heard)
+    leave = channel.subscribe(heard.take, Unsolicited)
     try:
         yield heard
     finally:
-        _current.reset(token)
         leave()

@@ -11,9 +11,9 @@ async def compare(use: Use, text: str) -> None:
     """Compare two values now. Raises CheckFailed where that does not hold."""
     heard, tree = use.heard, use.comparison(text)
     for word in (each for each in unknowns(tree) if isinstance(each, Word)):
-        drive = drive_of(use.session, word, use.place)
+        drive = drive_of(use.session, use.origin, word, use.place)
         heard.target = heard.target or (drive.link.name, drive.address)
-    measured, checks = await converted(use.session, tree, use.place)
+    measured, checks = await converted(use.session, use.origin, tree, use.place)
     assert isinstance(measured, Comparison)
     tree, found = measured, await use.known(measured, checks)
     if evaluate(tree, found):

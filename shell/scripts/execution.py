@@ -17,10 +17,11 @@ from multidrop.base.text import counted
 from multidrop.macros import checked_values, fill
 from multidrop.shell import waits
 from multidrop.shell.events import FAILURES, By, Failed
-from multidrop.shell.motions import OUTCOME, check_own
+from multidrop.shell.motions import check_own
 from multidrop.shell.operations.operation import Kind, Scripted
 from multidrop.shell.operations.table import script_verb
-from multidrop.shell.playing import Playing, StepProgress, cast
+from multidrop.shell.origin import Origin
+from multidrop.shell.playing import Playing, StepProgress
 from multidrop.shell.scripts import words
 from multidrop.shell.scripts.captured_prints import Hearing
 from multidrop.shell.scripts.model import (
@@ -77,7 +78,7 @@ class Frame:
 
     values: Values | None
     """None: lines are executed as typed."""
-    by: By
+    origin: Origin
     place: Place | None = None
     """The selection of a macro; None: lines go to what is selected as they run."""
     pace: Pace | None = None
@@ -96,7 +97,6 @@ class Unfinished:
 
     played: MacroScript
     frame: Frame
-    roles: Mapping[str, str]
     playing: Playing
 
 
@@ -130,14 +130,14 @@ class Execution:
         self._heard = heard
         self._executed = executed
 
-    def check_verified(self) -> None:
-        """Raise CheckFailed at the end where a `/verify` did not hold."""
+    def check_verified(self, origin: Origin) -> None:
+        """Raise CheckFailed at the end where a `/verify` did not hold. `origin`: that of the line that ran it."""
         if not self.failed:
             return
         places = list(dict.fromkeys(self.failed))
         more = f" and {counted(len(places) - SHOWN, 'other place')}" if len(places) > SHOWN else ""
         times = "a /verify" if len(self.failed) == 1 else f"{len(self.failed)} times a /verify"
-        self.session.automations.leave()  # it has come to its end: what moves goes on, as after a good one
+        self.session.automations.leave(origin)  # it has come to its end: what moves goes on, as after a good one
         raise CheckFailed(f"{times} did not hold: {', '.join(places[:SHOWN])}{more}; the rest was done")
 
     @property
@@ -147,6 +147,7 @@ class Execution:
 
     async def play(
         self,
+        origin: Origin,
         played: MacroScript,
         values: Values,
         times: int | None,
@@ -154,11 +155,15 @@ class Execution:
         roles: Mapping[str, str],
         caller: Place | None = None,
     ) -> Playing:
-        """Play a macro: one round, several, or until it is ended. `caller`: the selection of the calling macro."""
+        """Play a macro: one round, several, or until it is ended.
+
+        `origin`: that of the line that plays it. `caller`: the selection of the calling macro.
+        """
         workspace, macro = self.session, played.macro
         playing = Playing(macro.name, len(macro.steps), times, macro.key)
-        frame = Frame(values, By.MACRO, Place(workspace, caller), Pace(workspace.now, fast), playing)
-        with cast(roles), self._listed(playing):
+        origin = replace(origin.cast(roles), by=By.MACRO)
+        frame = Frame(values, origin, Place(workspace, origin, caller), Pace(workspace.now, fast), playing)
+        with self._listed(playing):
             try:
                 while times is None or playing.rounds < times:
                     await asyncio.sleep(0)  # a round that sends nothing must not delay a stop
@@ -167,7 +172,7 @@ class Execution:
                         break
                     playing.rounds += 1
             except (*FAILURES, asyncio.CancelledError) as failure:
-                self.unfinished.append(Unfinished(played, frame, roles, playing))
+                self.unfinished.append(Unfinished(played, frame, playing))
                 if playing.ended and isinstance(failure, asyncio.CancelledError) and workspace.stops == self.stops:
                     raise Stopped(f"macro {macro.name} was ended by /play stop") from None
                 raise
@@ -227,19 +232,19 @@ class Execution:
         """Whether a loop has another round; one that waits for a motion which has failed ends with that failure."""
         goes_on: bool = await self._own(line, frame, self._done)
         if goes_on and not self.is_over:
-            await self._own(line, frame, lambda text, frame: check_own(self.session))
+            await self._own(line, frame, lambda text, frame: check_own(self.session, frame.origin))
         return goes_on
 
     async def _play(self, node: CallMacro, frame: Frame) -> None:
         async def values(text: str, frame: Frame) -> tuple[Values, Mapping[str, str]]:
             call = words.macro_call(text)
             given, roles = call.divided(node.played.macro)
-            return checked_values(node.played.macro, given), bind(self.session, node.played.macro, roles)
+            return checked_values(node.played.macro, given), bind(self.session, frame.origin, node.played.macro, roles)
 
         given, roles = await self._own(node.line, frame, values)
         with _noted(node.line):
             fast = node.fast or (frame.pace is not None and frame.pace.fast)
-            await self.play(node.played, given, node.times, fast, roles, frame.place)
+            await self.play(frame.origin, node.played, given, node.times, fast, roles, frame.place)
 
     async def _step(self, line: ScriptLine, frame: Frame) -> None:
         if script_verb(line.word) is None:
@@ -256,12 +261,12 @@ class Execution:
     async def line(self, line: ScriptLine, frame: Frame) -> None:
         """Execute an ordinary line, with values filled in if there are any."""
         outcome: list[str] = []
-        OUTCOME.set(outcome)
+        origin = replace(frame.origin, outcome=outcome)
         with self._reporting(line, frame, afresh=True) as reported:
             if frame.values is not None:
                 reported.sent = fill(line.text, frame.values)
             place = frame.place
-            await self.session.run(place.pinned(reported.sent) if place else reported.sent, frame.by)
+            await self.session.run(place.pinned(reported.sent) if place else reported.sent, origin)
             if place is not None:
                 place.passed(reported.sent)
             frame.names.update((words.OUTCOME, word) for word in outcome)
@@ -278,7 +283,7 @@ class Execution:
             if counts:
                 workspace.notify(f"{line.where}: {text}")  # for the session log; only what can be replayed is `Entered`
             try:
-                if workspace.latched and frame.by is not By.OPERATOR:
+                if workspace.latched and frame.origin.by is not By.OPERATOR:
                     raise Stopped(LATCHED)
                 return await work(text, frame)
             except FAILURES as failure:
@@ -320,7 +325,7 @@ class Execution:
         """Do what a verb of scripts does; return what that returns."""
         found = chosen(text)
         return await found.form.done(
-            Use(self.session, self._heard, frame.names, frame.place, frame.by, found.form.name, text), found.values
+            Use(self.session, self._heard, frame.names, frame.place, frame.origin, found.form.name, text), found.values
         )
 
     async def _given(self, text: str, frame: Frame) -> Values:

@@ -17,9 +17,10 @@ from multidrop.base.text import counted
 from multidrop.drives.drive import Drive
 from multidrop.drives.events import Lost
 from multidrop.macros import Macro
-from multidrop.shell.automation import Claim, outcome, settled
+from multidrop.shell.automation import outcome, settled
+from multidrop.shell.automation_record import Claim
 from multidrop.shell.events import FAILURES, By, OnBus, SessionEvent
-from multidrop.shell.playing import NO_ROLES, cast
+from multidrop.shell.origin import NO_ROLES, Origin
 from multidrop.shell.quitting import say_unsent
 from multidrop.shell.scripts.captured_prints import hearing
 from multidrop.shell.scripts.execution import CUT, Execution, Frame, Unfinished
@@ -76,19 +77,21 @@ async def ended_by_loss(execution: Execution, buses: Collection[str]) -> AsyncIt
             timer.cancel()
 
 
-async def run_script(session: Session, script: Script, executed: Executed = lambda result: None) -> None:
-    """Execute a script. `executed` gets the result of each line. Raises the first failure."""
-    own = script_claims(session, script)
+async def run_script(
+    session: Session, origin: Origin, script: Script, executed: Executed = lambda result: None
+) -> None:
+    """Execute a script for a line or a program. `executed` gets the result of each line. Raises the first failure."""
+    own = script_claims(session, origin, script)
     await _agreed(session, own, By.SCRIPT)
     with hearing(session) as heard:
         execution = Execution(session, heard, executed)
         async with (
-            session.automations.run(f"script {script.file}", own),
+            session.automations.run(heard.of(origin), f"script {script.file}", own) as running,
             ended_by_loss(execution, {link.name for link, _ in own}),
-            ending(execution, lambda end: None),
+            ending(execution, running, lambda end: None),
         ):
-            await execution.block(script.body, Frame(dict(script.values), By.SCRIPT))
-    execution.check_verified()
+            await execution.block(script.body, Frame(dict(script.values), replace(running, by=By.SCRIPT)))
+    execution.check_verified(origin)
 
 
 async def _agreed(session: Session, own: Collection[Claim], by: By) -> None:
@@ -97,12 +100,12 @@ async def _agreed(session: Session, own: Collection[Claim], by: By) -> None:
         await session.path.agreed_to_write(session.bus(link.name).at(address), "", by)
 
 
-async def run_typed(session: Session, lines: Sequence[str], executed: Executed) -> None:
+async def run_typed(session: Session, origin: Origin, lines: Sequence[str], executed: Executed) -> None:
     """Execute typed lines in turn, without values and verbs of scripts. Raises the first failure."""
     with hearing(session) as heard:
-        execution = Execution(session, heard, executed)
+        execution, frame = Execution(session, heard, executed), Frame(None, replace(heard.of(origin), by=By.OPERATOR))
         for count, text in enumerate(lines, 1):
-            await execution.line(ScriptLine("", count, text), Frame(None, By.OPERATOR))
+            await execution.line(ScriptLine("", count, text), frame)
             if session.quitting:
                 say_unsent(session, lines[count:])
                 return
@@ -110,6 +113,7 @@ async def run_typed(session: Session, lines: Sequence[str], executed: Executed) 
 
 async def play(
     session: Session,
+    origin: Origin,
     macro: Macro,
     values: Mapping[str, str],
     *,
@@ -131,24 +135,24 @@ async def play(
     played = checked or read_macro(macro, values, session.macros)
     if session.latched:
         raise Stopped(LATCHED)
-    roles = bind(session, macro, roles)
+    roles = bind(session, origin, macro, roles)
     name, begun = macro.name, session.now()
-    own = macro_claims(session, played, roles)
+    own = macro_claims(session, origin, played, roles)
     await _agreed(session, own, By.MACRO)
     claimed = sorted({link.name for link, _ in own})  # a set of links has another order in each run
     state, ports = session.settings.state, {bus: session.of(session.buses[bus]).port for bus in claimed}
     with hearing(session) as heard, crash_marks.playing(state, ports.values(), name, session.wall(begun)):
         execution = Execution(session, heard, executed)
         async with (
-            session.automations.run(f"macro {name}", own),
+            session.automations.run(heard.of(origin), f"macro {name}", own) as running,
             ended_by_loss(execution, ports),
-            ending(execution, ended),
+            ending(execution, running, ended),
         ):
-            playing = await execution.play(played, dict(played.values), times, fast, roles)
+            playing = await execution.play(running, played, dict(played.values), times, fast, roles)
     rounds = counted(playing.rounds, "round") + ", ended by /quit" * session.quitting
     session.notify(f"macro {name}: {rounds} played in {session.now() - begun:.1f} s", outcome=True)
     ended(Ending(name, playing.rounds))
-    execution.check_verified()
+    execution.check_verified(origin)
 
 
 SHOWN = 3
@@ -156,8 +160,8 @@ SHOWN = 3
 
 
 @contextlib.asynccontextmanager
-async def ending(execution: Execution, ended: Ended) -> AsyncIterator[None]:
-    """Take care of the macros that the body leaves unfinished, and report them.
+async def ending(execution: Execution, origin: Origin, ended: Ended) -> AsyncIterator[None]:
+    """Take care of the macros that the body leaves unfinished, and report them. `origin`: with their automation.
 
     Raises what the body raises; Stopped with the place where a stop of everything cancelled it.
     """
@@ -166,7 +170,7 @@ async def ending(execution: Execution, ended: Ended) -> AsyncIterator[None]:
     except (*FAILURES, asyncio.CancelledError) as failure:
         if not execution.unfinished:
             raise
-        aftermath = _Aftermath(execution)
+        aftermath = _Aftermath(execution, origin)
         await aftermath.run(ended)
         if aftermath.stopped and isinstance(failure, asyncio.CancelledError):
             raise Stopped(f"{aftermath.at}: stopped before it was done") from None
@@ -174,15 +178,15 @@ async def ending(execution: Execution, ended: Ended) -> AsyncIterator[None]:
 
 
 class _Aftermath:
-    def __init__(self, execution: Execution) -> None:
-        self._execution = execution
+    def __init__(self, execution: Execution, origin: Origin) -> None:
+        self._execution, self._origin = execution, origin
         self._session = execution.session
         self._left = list(execution.unfinished)
         """The macros whose `on_early_end` lines are not executed yet, the innermost first."""
 
     async def run(self, ended: Ended) -> None:
         """Stop, report, execute `on_early_end`, read where the drives stand. A stop of everything cuts it short."""
-        halts = await self._session.automations.end()
+        halts = await self._session.automations.end(self._origin)
         self._execution.is_over = True
         found: tuple[Standing, ...] = ()
         try:
@@ -264,7 +268,7 @@ class _Aftermath:
             else f"on_early_end of macro {macro.name} would start it, and on_early_end_moves is false"
         )
         frame = replace(each.frame, values=dict(each.frame.names), pace=None)
-        with cast(each.roles), automations.still(why):
+        with automations.still(self._origin, why):
             for node in each.played.on_early_end:
                 try:
                     await self._execution.block([node], frame)
@@ -274,9 +278,9 @@ class _Aftermath:
                     failed = True
                     self._warn(f"{node.line.where}: {failure}")
         if not failed:
-            automations.leave()
+            automations.leave(self._origin)
             return
-        for text in outcome(self._session, await automations.end()):
+        for text in outcome(self._session, await automations.end(self._origin)):
             self._warn(text)
 
 

@@ -7,10 +7,11 @@ from collections.abc import Iterator, Mapping, Sequence
 from multidrop.base.errors import Diagnostic, Inexpressible, NoAnswer
 from multidrop.drives.drive import Drive
 from multidrop.macros import Macro, fill, value_names
-from multidrop.shell.automation import Claim, only_ends
+from multidrop.shell.automation import only_ends
+from multidrop.shell.automation_record import Claim
 from multidrop.shell.line_syntax import DriveLine, parse
 from multidrop.shell.macro_arguments import check_bus, only_bus, unbound
-from multidrop.shell.playing import NO_ROLES, cast, played_by
+from multidrop.shell.origin import NO_ROLES, Origin
 from multidrop.shell.scripts.model import CallFile, CallMacro, If, MacroScript, Node, Repeat, Script, ScriptLine
 from multidrop.shell.scripts.reading import UNKNOWN
 from multidrop.shell.scripts.words import macro_call
@@ -32,15 +33,15 @@ class Values(dict[str, str]):
         return True
 
 
-def bind(workspace: Workspace, macro: Macro, given: Mapping[str, str]) -> dict[str, str]:
+def bind(workspace: Workspace, origin: Origin, macro: Macro, given: Mapping[str, str]) -> dict[str, str]:
     """The bus of each role: the given one, that of the macro that plays this one, or one that needs no question.
 
-    Raises Diagnostic where a role has none.
+    `origin`: that of the line that plays it. Raises Diagnostic where a role has none.
     """
     bound = {}
     for role in macro.roles:
-        ambient = played_by(role)
-        bus = given.get(role) or (ambient if ambient in workspace.buses else only_bus(workspace, macro, role))
+        outer = origin.played(role)
+        bus = given.get(role) or (outer if outer in workspace.buses else only_bus(workspace, macro, role))
         if not bus:
             raise unbound(workspace, macro, role)
         check_bus(workspace, macro, role, bus)
@@ -48,21 +49,20 @@ def bind(workspace: Workspace, macro: Macro, given: Mapping[str, str]) -> dict[s
     return bound
 
 
-def macro_claims(workspace: Workspace, played: MacroScript, roles: Mapping[str, str]) -> set[Claim]:
+def macro_claims(workspace: Workspace, origin: Origin, played: MacroScript, roles: Mapping[str, str]) -> set[Claim]:
     """The drives that a macro moves, as far as its lines show it.
 
     Raises Diagnostic for a line of a bus that is not open, for a role without a bus in what it calls, and for an
     `on_early_end` line that may not move.
     """
     planning = _Planning(workspace)
-    with cast(roles):
-        return {(drive.link, drive.address) for _, drive in planning.macro(played)}
+    return {(drive.link, drive.address) for _, drive in planning.macro(played, origin.cast(roles))}
 
 
-def script_claims(workspace: Workspace, script: Script) -> set[Claim]:
+def script_claims(workspace: Workspace, origin: Origin, script: Script) -> set[Claim]:
     """The drives that a script moves, as far as its lines show it. Raises Diagnostic as `macro_claims` does."""
     planning = _Planning(workspace)
-    return {(drive.link, drive.address) for _, drive in planning.block(script.body, Values(script.values))}
+    return {(drive.link, drive.address) for _, drive in planning.block(script.body, Values(script.values), origin)}
 
 
 class _Planning:
@@ -75,41 +75,40 @@ class _Planning:
         self._raw = False
         """The lines so far leave raw mode on: it takes any text."""
 
-    def macro(self, played: MacroScript) -> Iterator[tuple[ScriptLine, Drive]]:
+    def macro(self, played: MacroScript, origin: Origin) -> Iterator[tuple[ScriptLine, Drive]]:
         """The lines of a macro that can start a drive, each with that drive; then those of its end."""
         values = Values(played.values)
-        yield from self.block(played.body, values)
-        for line, drive in self.block(played.on_early_end, values):
+        yield from self.block(played.body, values, origin)
+        for line, drive in self.block(played.on_early_end, values, origin):
             if not (played.macro.on_early_end_moves or only_ends(drive, _text_of(line, values))):
                 hint = "on_early_end_moves = true in its file lets it"
                 raise Diagnostic(f"{drive.shown}: {line.text} can start motion", line.where, hint)
             yield line, drive
 
-    def block(self, body: Sequence[Node], values: Values) -> Iterator[tuple[ScriptLine, Drive]]:
+    def block(self, body: Sequence[Node], values: Values, origin: Origin) -> Iterator[tuple[ScriptLine, Drive]]:
         """The lines of a block that can start a drive, each with that drive."""
         for node in body:
             if isinstance(node, If | Repeat):
-                yield from self.block(node.body, values)
-                yield from self.block(node.otherwise if isinstance(node, If) else (), values)
+                yield from self.block(node.body, values, origin)
+                yield from self.block(node.otherwise if isinstance(node, If) else (), values, origin)
             elif isinstance(node, CallFile):
-                yield from self.block(node.script.body, Values(node.script.values))
+                yield from self.block(node.script.body, Values(node.script.values), origin)
             elif isinstance(node, CallMacro):
                 given = macro_call(fill(node.line.text, values)).divided(node.played.macro)[1]
-                with cast(self._bound(node, given)):
-                    yield from self.macro(node.played)
-            elif (drive := self._started(node.line, values)) is not None:
+                yield from self.macro(node.played, origin.cast(self._bound(origin, node, given)))
+            elif (drive := self._started(origin, node.line, values)) is not None:
                 yield node.line, drive
 
-    def _bound(self, node: CallMacro, given: Mapping[str, str]) -> Mapping[str, str]:
+    def _bound(self, origin: Origin, node: CallMacro, given: Mapping[str, str]) -> Mapping[str, str]:
         """The roles of a called macro; a bus that a line opens is bound later."""
         try:
-            return bind(self._workspace, node.played.macro, given)
+            return bind(self._workspace, origin, node.played.macro, given)
         except Diagnostic as problem:
             if self._opens:
                 return NO_ROLES
             raise Diagnostic(str(problem), node.line.where) from None
 
-    def _started(self, line: ScriptLine, values: Values) -> Drive | None:
+    def _started(self, origin: Origin, line: ScriptLine, values: Values) -> Drive | None:
         """The drive that a line can start; None: it starts none, or it is not known yet.
 
         Raises Diagnostic for a line that its drive never gets.
@@ -124,7 +123,7 @@ class _Planning:
         if not isinstance(parsed, DriveLine) or not (parsed.bus or parsed.address or self._selected):
             return None
         try:
-            drive = self._workspace.drive(parsed.bus, parsed.address)
+            drive = self._workspace.drive(origin.played(parsed.bus), parsed.address)
         except NoAnswer:
             return None
         except Diagnostic as problem:

@@ -9,9 +9,8 @@ from typing import TYPE_CHECKING
 from multidrop.base.errors import Diagnostic, DriveError
 from multidrop.base.text import counted
 from multidrop.drives.drive import Check, Drive
-from multidrop.shell.events import By
 from multidrop.shell.line_syntax import join_target, pinned, split_target
-from multidrop.shell.playing import played_by
+from multidrop.shell.origin import Origin
 from multidrop.shell.scripts.expression import (
     Binary,
     Comparison,
@@ -35,9 +34,9 @@ if TYPE_CHECKING:
 class Place:
     """The selection of one macro, which no other selection changes."""
 
-    def __init__(self, workspace: Workspace, caller: Place | None = None) -> None:
-        """Take the selection of the macro that calls this one, else the present one."""
-        self._workspace = workspace
+    def __init__(self, workspace: Workspace, origin: Origin, caller: Place | None = None) -> None:
+        """Take the selection of the macro that calls this one, else the present one. `origin`: that of its lines."""
+        self._workspace, self._origin = workspace, origin
         self._at: tuple[str, str] = workspace.place if caller is None else caller._at
 
     def pinned(self, line: str) -> str:
@@ -51,7 +50,7 @@ class Place:
 
     def _is_address(self, word: str) -> bool:
         """True if a word is the address of a drive on the macro's bus, and neither a bus nor a role."""
-        return ":" not in word and played_by(word) not in self._workspace.buses
+        return ":" not in word and self._origin.played(word) not in self._workspace.buses
 
     def target(self, target: str) -> str:
         """The target of a question, with what the macro's selection adds."""
@@ -70,14 +69,16 @@ Checks = dict[Word, "Compared"]
 """The questions with whose values quantities are compared."""
 
 
-async def converted(session: Session, tree: Expression, place: Place | None = None) -> tuple[Expression, Checks]:
+async def converted(
+    session: Session, origin: Origin, tree: Expression, place: Place | None = None
+) -> tuple[Expression, Checks]:
     """The expression with numbers of the drive in place of quantities. Raises Diagnostic."""
     if isinstance(tree, Unary):
-        operand, checks = await converted(session, tree.operand, place)
+        operand, checks = await converted(session, origin, tree.operand, place)
         return replace(tree, operand=operand), checks
     if isinstance(tree, Binary):
-        left, checks = await converted(session, tree.left, place)
-        right, more = await converted(session, tree.right, place)
+        left, checks = await converted(session, origin, tree.left, place)
+        right, more = await converted(session, origin, tree.right, place)
         return replace(tree, left=left, right=right), checks | more
     if not isinstance(tree, Comparison):
         return tree, {}
@@ -86,7 +87,7 @@ async def converted(session: Session, tree: Expression, place: Place | None = No
     for part in ("left", "right", "within"):
         each = getattr(tree, part)
         if isinstance(each, Measured) and word is not None:
-            drive = drive_of(session, word, place)
+            drive = drive_of(session, origin, word, place)
             question, within = _question(session, drive, word), part == "within"
             checks[word] = compared = await session.units.condition(drive, question, each.text, within)
             found = replace(found, **{part: Constant(compared.number)})  # type: ignore[arg-type]
@@ -94,7 +95,12 @@ async def converted(session: Session, tree: Expression, place: Place | None = No
 
 
 async def known(
-    session: Session, tree: Expression, values: Mapping[str, str], by: By, place: Place | None, checks: Checks
+    session: Session,
+    origin: Origin,
+    tree: Expression,
+    values: Mapping[str, str],
+    place: Place | None,
+    checks: Checks,
 ) -> dict[Name | Word, Value]:
     """Find the value of each name and word of an expression; each word is read once.
 
@@ -106,21 +112,23 @@ async def known(
             if isinstance(each, Name):
                 found[each] = value_of(values[each.name])
             else:
-                found[each] = await ask(session, each, by, place, checks[each].check if each in checks else None)
+                found[each] = await ask(session, origin, each, place, checks[each].check if each in checks else None)
     return found
 
 
-def drive_of(workspace: Workspace, word: Word, place: Place | None = None) -> Drive:
+def drive_of(workspace: Workspace, origin: Origin, word: Word, place: Place | None = None) -> Drive:
     """Find the drive that a word asks. Raises Diagnostic or NoAnswer."""
-    bus, address = split_target(place.target(word.target) if place is not None else word.target)
+    bus, address = origin.target(place.target(word.target) if place is not None else word.target)
     return workspace.drive(bus, address or None)
 
 
-async def ask(session: Session, word: Word, by: By, place: Place | None = None, check: Check | None = None) -> Value:
+async def ask(
+    session: Session, origin: Origin, word: Word, place: Place | None = None, check: Check | None = None
+) -> Value:
     """Read the value of a word. Raises Diagnostic, DriveError or TransportLost."""
-    drive = drive_of(session, word, place)
+    drive = drive_of(session, origin, word, place)
     line = _question(session, drive, word)
-    await session.path.guard(drive, line, by)
+    await session.path.guard(drive, line, origin.by)
     printed = await drive.send(line, check)
     if len(printed) != 1:
         raise DriveError(

@@ -6,10 +6,10 @@ from collections.abc import Mapping, MutableMapping
 from dataclasses import dataclass
 
 from multidrop.base.errors import DriveError
-from multidrop.shell.events import By
 from multidrop.shell.line_syntax import VerbLine, parse
 from multidrop.shell.operations.table import script_verbs
 from multidrop.shell.operations.verb import Chosen
+from multidrop.shell.origin import Origin
 from multidrop.shell.scripts import words
 from multidrop.shell.scripts.captured_prints import Hearing
 from multidrop.shell.scripts.expression import Comparison, Expression, Name, Value, Word, evaluate
@@ -51,7 +51,7 @@ class Use:
     """The names of `/set`, with their values."""
     place: Place | None
     """The selection of a macro."""
-    by: By
+    origin: Origin
     word: str
     text: str
     """The whole line."""
@@ -63,12 +63,12 @@ class Use:
     async def value(self, text: str) -> Value:
         """The value of an expression, once its words were read from their drives. Raises Diagnostic."""
         tree = words.expression(self.word, text, self.names)
-        tree, checks = await converted(self.session, tree, self.place)
+        tree, checks = await converted(self.session, self.origin, tree, self.place)
         return evaluate(tree, await self.known(tree, checks))
 
     async def known(self, tree: Expression, checks: Checks) -> Mapping[Name | Word, Value]:
         """The values of the names and words of an expression."""
-        return await known(self.session, tree, self.names, self.by, self.place, checks)
+        return await known(self.session, self.origin, tree, self.names, self.place, checks)
 
 
 def chosen(text: str) -> Chosen:

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Annotated
 
 from multidrop.base.errors import Diagnostic, Inexpressible, NoAnswer
-from multidrop.shell.line_syntax import split_target
 from multidrop.shell.operations import conditions
 from multidrop.shell.operations.argument_types import Address, BusName, UrlForm
 from multidrop.shell.operations.operation import Operation
@@ -14,7 +13,7 @@ from multidrop.shell.operations.parameter import Argument, Listed
 
 if TYPE_CHECKING:
     from multidrop.drives.drive import Drive
-    from multidrop.shell.verbs.call import Call
+    from multidrop.shell.session import Call
 
 GROUP = "Lines and drives"
 NewBusName = Annotated[str, Argument(metavar="NAME")]
@@ -38,7 +37,7 @@ def urls() -> Sequence[str]:
 
 
 async def close(call: Call, name: BusName) -> None:
-    bus, session = call.session.bus(name), call.session
+    bus, session = call.bus(name), call.session
     selected = session.selected_bus == bus.name
     if selected:  # what follows was written for this bus, and never goes to another one
         session.selected_bus, session.deselected = "", True
@@ -53,7 +52,7 @@ async def close(call: Call, name: BusName) -> None:
 
 def use(call: Call, target: Selected) -> None:
     workspace = call.session
-    bus, address = split_target(target)
+    bus, address = call.origin.target(target)
     if not bus and target in workspace.buses:
         selected = workspace.buses.get(workspace.selected_bus)
         if not selected or all(target not in (drive.address, drive.label) for drive in selected.drives.values()):
@@ -72,14 +71,14 @@ def drives(call: Call) -> None:
         raise Diagnostic("nothing is open", "/drives", "/open URL opens a line of drives")
     for bus in workspace.buses.values():
         if not bus.drives:
-            workspace.output(f"  {bus.name}: no drive has replied")
+            call.output(f"  {bus.name}: no drive has replied")
         for drive in bus.drives.values():
             mark = "*" if drive is workspace.selected else " "
             mode = " (in program mode)" if drive.programming else ""
             mode += " (position not referenced)" if drive.state.unreferenced else ""
             mode += " (not identified)" if drive.state.stranger else ""
             words = (mark, workspace.display_name(drive), drive.label, model(drive))
-            workspace.output(" ".join(word for word in words if word) + mode)
+            call.output(" ".join(word for word in words if word) + mode)
 
 
 async def scan(call: Call, bus_name: BusName = "") -> None:
@@ -88,14 +87,14 @@ async def scan(call: Call, bus_name: BusName = "") -> None:
     from multidrop.shell.openings import model
 
     workspace = call.session
-    bus = workspace.bus(bus_name)
+    bus = call.bus(bus_name)
     if call.by is By.OPERATOR and workspace.openings.searches(bus):
         return await workspace.openings.search(bus)
     found = await scanning.extend(workspace, bus)
     if found and workspace.of(bus).selected is None:
         workspace.identified(bus)
     for address in found:
-        workspace.output(f"{bus.name}: {address} {model(bus.drives[address])}")
+        call.output(f"{bus.name}: {address} {model(bus.drives[address])}")
     if not found:
         workspace.notify(f"{bus.name}: no other drive replies", outcome=True)
 
@@ -116,7 +115,7 @@ async def status(call: Call, address: Address = "") -> None:
     if not drive.family.offers("status"):
         raise Inexpressible(f"{call.session.display_name(drive)}: drives of this family do not report their state")
     for line in await drive.run(drive.family.status()):
-        call.session.output(line)
+        call.output(line)
     await _show_in_units(call, drive)
 
 
@@ -133,21 +132,21 @@ async def _show_in_units(call: Call, drive: Drive) -> None:
         if place:
             lost = "" if units.referenced(drive, each.axis) else ", not referenced"
             shown = ", ".join(filter(None, (part.strip(" ()") for part in (place, speed))))
-            call.session.output(f"{each.axis} in units: {shown}{lost}".lstrip())
+            call.output(f"{each.axis} in units: {shown}{lost}".lstrip())
 
 
 def rename(call: Call, name: NewBusName, bus: BusName = "") -> None:
-    call.session.rename_bus(call.session.bus(bus), name)
+    call.session.rename_bus(call.bus(bus), name)
 
 
 def tab(call: Call, where: Side, bus: BusName = "") -> None:
-    call.session.move_bus(call.session.bus(bus), 1 if where == "right" else -1)
+    call.session.move_bus(call.bus(bus), 1 if where == "right" else -1)
 
 
 def keep(call: Call, name: NewBusName, bus: BusName = "") -> None:
     from multidrop.shell import configuration
 
-    url = call.session.openings.url_of(call.session.bus(bus))
+    url = call.session.openings.url_of(call.bus(bus))
     path = configuration.save(name, url)
     call.session.notify(f"{path}: connection {name} is saved: {url}", outcome=True)
 

@@ -10,7 +10,7 @@ from multidrop.base.errors import Diagnostic
 
 if TYPE_CHECKING:
     from multidrop.macros import MacroStore
-    from multidrop.shell.verbs.call import Call
+    from multidrop.shell.session import Call
 
 
 class Macros:
@@ -33,11 +33,11 @@ class Macros:
         self.call.session.notify(line, warning=True)
 
     def output(self, line: str) -> None:
-        self.call.session.output(line)
+        self.call.output(line)
 
     def row(self, line: str) -> None:
         """Print a line of a table."""
-        self.call.session.output(line, columns=True)
+        self.call.output(line, columns=True)
 
     def written(self, file: str) -> str:
         """The path of a file to write. Raises Diagnostic for one that a macro may not write."""

@@ -20,7 +20,7 @@ from multidrop.shell.operations.parameter import Argument, Listed
 from multidrop.shell.verbs.macro_places import AtTerminal, Macros, at_terminal, changing
 
 if TYPE_CHECKING:
-    from multidrop.shell.verbs.call import Call
+    from multidrop.shell.session import Call
 
 GROUP = "Macros"
 NewName = Annotated[str, Argument("the other name", metavar="NAME")]
@@ -181,7 +181,7 @@ async def play(call: Call, macro: MacroName, *values: NamedValue, times: Rounds 
         what = f"macro {macro} has changed on the disk since it was shown here; nothing was sent"
         raise Diagnostic(what, str(workspace.macros.path(macro)), "look at it; play it again to play it as it is now")
     given, roles = await settled(workspace, loaded, dict(values))
-    await executor.play(workspace, loaded, given, times=times, fast=fast, roles=roles)
+    await executor.play(workspace, call.origin, loaded, given, times=times, fast=fast, roles=roles)
 
 
 def stop_playing(call: Call, macro: MacroName = "") -> None:
@@ -211,7 +211,7 @@ def play_opened(
 
 
 def recording(call: Call) -> None:
-    call.session.output(f"recording: {call.session.recording or 'nothing'}")
+    call.output(f"recording: {call.session.recording or 'nothing'}")
 
 
 def record(call: Call, macro: MacroName, *, replace: Replace = False) -> None:

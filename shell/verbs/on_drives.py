@@ -14,14 +14,13 @@ from multidrop.shell.operations.argument_types import Address, Drives, DrivesOfF
 
 if TYPE_CHECKING:
     from multidrop.drives.drive import Drive
-    from multidrop.shell.events import By
-    from multidrop.shell.session import Session
-    from multidrop.shell.verbs.call import Call
+    from multidrop.shell.origin import Origin
+    from multidrop.shell.session import Call, Session
 
-Work = Callable[["Session"], Awaitable["int | None"]]
-"""What is done in a session; it returns the exit code of a good end, where that is not 0."""
+Work = Callable[["Session", "Origin"], Awaitable["int | None"]]
+"""What is done in a session for a line or a command; it returns the exit code of a good end, where that is not 0."""
 R_co = TypeVar("R_co", covariant=True)
-OnEach = Callable[["Session", "Drive"], Awaitable[None]]
+OnEach = Callable[["Session", "Origin", "Drive"], Awaitable[None]]
 
 
 class OnDrives(ABC, Generic[R_co]):
@@ -29,13 +28,6 @@ class OnDrives(ABC, Generic[R_co]):
 
     def __init__(self, target: str) -> None:
         self.target = target
-
-    @property
-    def by(self) -> By:
-        """Who asks for it."""
-        from multidrop.shell.events import By
-
-        return By.OPERATOR
 
     @property
     def several(self) -> bool:
@@ -50,10 +42,11 @@ class OnDrives(ABC, Generic[R_co]):
     def each(self, work: OnEach, having: str = "programs", *, unsolicited: bool = True) -> R_co:
         """Do the work for each drive; see `run`. `having`: what a family of one of `all` must have."""
 
-        async def whole(session: Session) -> None:
+        async def whole(session: Session, origin: Origin) -> None:
             from multidrop.shell.params.work import each, targets
 
-            await each(session, targets(session, self.target, having), lambda drive: work(session, drive))
+            drives = targets(session, origin, self.target, having)
+            await each(session, drives, lambda drive: work(session, origin, drive))
 
         return self.run(whole, unsolicited=unsolicited)
 
@@ -79,14 +72,9 @@ class OfCall(OnDrives[Awaitable["int | None"]]):
         super().__init__(target)
         self.call = call
 
-    @property
-    def by(self) -> By:
-        """Who has entered the line."""
-        return self.call.by
-
     def run(self, work: Work, *, unsolicited: bool = False) -> Awaitable[int | None]:
         """Do the work in the session of the line."""
-        return work(self.call.session)
+        return work(self.call.session, self.call.origin)
 
     def program_text(self, file: str) -> str | None:
         """The text that a person was shown; see `Call.shown`."""
@@ -113,7 +101,11 @@ class OfUrl(OnDrives[int]):
         from multidrop.shell.batch import runner
 
         tried = [*self.target.split(","), *self.also]
-        return runner.run([self.url], work, agreed=self.agreed, unsolicited=unsolicited, tried=tried)
+
+        def body(session: Session) -> Awaitable[int | None]:
+            return work(session, session.origin)
+
+        return runner.run([self.url], body, agreed=self.agreed, unsolicited=unsolicited, tried=tried)
 
     def program_text(self, file: str) -> str:
         """The text, read once: each drive gets what was checked before anything is opened."""

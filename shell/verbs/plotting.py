@@ -11,18 +11,18 @@ from multidrop.shell.events import By
 from multidrop.shell.plots.series import parse_series, read_first
 
 if TYPE_CHECKING:
-    from multidrop.shell.session import Session
-    from multidrop.shell.verbs.call import Call
+    from multidrop.shell.session import Call, Session
 
 
-def say(session: Session) -> None:
+def say(call: Call) -> None:
     """Say what is plotted."""
+    session = call.session
     for each in session.plots:
-        session.output(f"plotting to {each.where}, {each.rate}")
+        call.output(f"plotting to {each.where}, {each.rate}")
     if session.plotted:
-        session.output(f"plotting on the screen: {' '.join(each.text for each in session.plotted)}")
+        call.output(f"plotting on the screen: {' '.join(each.text for each in session.plotted)}")
     elif not session.plots:
-        session.output("plotting: nothing")
+        call.output("plotting: nothing")
 
 
 async def end(session: Session) -> None:
@@ -40,7 +40,7 @@ async def plot(call: Call, texts: Sequence[str]) -> None:
     """Show a plot on the screen, while other plots go on; without texts, say what is plotted."""
     session = call.session
     if not texts:
-        return say(session)
+        return say(call)
     if any("://" in text for text in texts):
         plot_targets.needed()
     screen = session.front.screen

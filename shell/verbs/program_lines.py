@@ -18,7 +18,7 @@ from multidrop.shell.line_syntax import split_target
 from multidrop.shell.programs import debugging
 from multidrop.shell.programs.checking import examine
 from multidrop.shell.programs.debugging import LEFT, Debugger
-from multidrop.shell.verbs.call import Call
+from multidrop.shell.session import Call
 from multidrop.simulator.declared import simulated
 from multidrop.simulator.families import PROGRAMS
 
@@ -40,7 +40,7 @@ async def check(call: Call, file: str, personality: str) -> None:
     if not checked.right:
         count = len(errors(checked.problems))
         raise Inexpressible(f"{file}: {counted(count, 'error')} for {product}")
-    call.session.output(f"{file}: {checked.facts}")
+    call.output(f"{file}: {checked.facts}")
 
 
 # The listing
@@ -73,7 +73,7 @@ async def list_program(call: Call, words: Sequence[str]) -> None:
     if file and lines:
         return program_listing.save_new(call.session, drive, file, lines)
     for line in lines:
-        call.session.output(line)
+        call.output(line)
 
 
 # The debugger
@@ -83,7 +83,7 @@ def at_drive(call: Call, words: Sequence[str]) -> tuple[str, Sequence[str]]:
     """The target, and the other words. A drive's name goes before a label's."""
     words = [word for word in words if word]
     bus, address = split_target(words[0] if words else "")
-    known = call.session.bus(bus).drives if words and ":" not in words[0] else {}
+    known = call.bus(bus).drives if words and ":" not in words[0] else {}
     if words and (":" in words[0] or address in known or any(drive.label == address for drive in known.values())):
         return words[0], words[1:]
     return "", words
@@ -105,20 +105,20 @@ def _parts(call: Call, words: Sequence[str], low: int, high: float) -> tuple[Deb
 
 async def trace(call: Call, words: Sequence[str]) -> None:
     debugger, others = _parts(call, words, 0, 1)
-    await debugger.trace("".join(others))
+    await debugger.trace(call.origin, "".join(others))
 
 
 async def step(call: Call, words: Sequence[str]) -> None:
     debugger, others = _parts(call, words, 0, 1)
     if others:
-        await debugger.begin(others[0])
+        await debugger.begin(call.origin, others[0])
     else:
-        await debugger.step()
+        await debugger.step(call.origin)
 
 
 async def continue_(call: Call, words: Sequence[str]) -> None:
     debugger, _ = _parts(call, words, 0, 0)
-    await debugger.go_on()
+    await debugger.go_on(call.origin)
 
 
 async def break_(call: Call, words: Sequence[str]) -> None:
@@ -131,11 +131,11 @@ async def break_(call: Call, words: Sequence[str]) -> None:
         case ["off"]:
             await debugger.break_off()
         case ["now"]:
-            await debugger.break_now()
+            await debugger.break_now(call.origin)
         case [place, *passes]:
             await debugger.break_at(place, debugging.passes_of(passes[0]) if passes else 1)
 
 
 async def watch(call: Call, words: Sequence[str]) -> None:
     debugger, others = _parts(call, words, 1, inf)
-    await debugger.watch([] if others == ["off"] else others)
+    await debugger.watch(call.origin, [] if others == ["off"] else others)

@@ -29,7 +29,7 @@ from multidrop.shell.verbs.on_drives import (
 )
 
 if TYPE_CHECKING:
-    from multidrop.shell.verbs.call import Call
+    from multidrop.shell.session import Call
 
 GROUP = "Programs of drives"
 Personality = Annotated[str, Argument(metavar="PERSONALITY", listed=(Listed.PERSONALITY,))]

@@ -10,6 +10,7 @@ from multidrop.base.new_file import STANDARD_OUTPUT
 from multidrop.drives.drive import Drive
 from multidrop.shell import program_listing
 from multidrop.shell.operations.argument_types import Downloading
+from multidrop.shell.origin import Origin
 from multidrop.shell.params.work import each, file_of, make_place, targets
 from multidrop.shell.programs import transfers
 from multidrop.shell.session import Session
@@ -23,7 +24,7 @@ DIFFERS = 1
 def list_programs(drives: OfUrl, as_json: bool) -> int:
     """Print the program of each drive; with several the name of its drive is before each line."""
 
-    async def show(session: Session, drive: Drive) -> None:
+    async def show(session: Session, origin: Origin, drive: Drive) -> None:
         name = session.display_name(drive)
         if as_json:
             held = await program_listing.read(session, drive, "list")
@@ -31,13 +32,13 @@ def list_programs(drives: OfUrl, as_json: bool) -> int:
             if not held.lines:
                 program_listing.say_none(session, drive)
             for at, text in held.lines:
-                session.output(json.dumps({"drive": address_of(session, drive), "at": at, "text": text}))
+                session.output(json.dumps({"drive": address_of(session, drive), "at": at, "text": text}), origin=origin)
             return
         lines = await program_listing.readable(session, drive)
         if not lines:
             program_listing.say_none(session, drive)
         for line in lines:
-            session.output(f"{name}: {line}" if drives.several else line)
+            session.output(f"{name}: {line}" if drives.several else line, origin=origin)
 
     return drives.each(show, unsolicited=not as_json)
 
@@ -46,7 +47,7 @@ def diff(file: str, drives: OfUrl, as_json: bool) -> int:
     """Print the lines that differ; the exit code says whether any does."""
     text, differ = drives.program_text(file), False
 
-    async def compare(session: Session, drive: Drive) -> None:
+    async def compare(session: Session, origin: Origin, drive: Drive) -> None:
         nonlocal differ
         name, found = session.display_name(drive), await transfers.differences(session, drive, file, text)
         for row in found:
@@ -57,7 +58,7 @@ def diff(file: str, drives: OfUrl, as_json: bool) -> int:
                 "at": row.at,
                 "there": row.there,
             }
-            session.output(json.dumps(facts) if as_json else transfers.in_words(file, row, name))
+            session.output(json.dumps(facts) if as_json else transfers.in_words(file, row, name), origin=origin)
         differ = differ or bool(found)
         if not found:
             session.notify(f"{name} holds {file}", outcome=True)
@@ -69,7 +70,7 @@ def upload(drives: OnDrives[R_co], file: str, raw: bool) -> R_co:
     """Save the program to a new file that can be downloaded again; several to a folder."""
     drives.new_file(file)
 
-    async def save(session: Session, drive: Drive) -> None:
+    async def save(session: Session, origin: Origin, drive: Drive) -> None:
         lines = await program_listing.upload(session, drive, raw)
         own = file_of(session, drive, file, drives.target, drive.program_files.endings[0])
         make_place(own, drives.target)
@@ -82,15 +83,15 @@ def download(drives: OnDrives[R_co], file: str, wanted: Downloading) -> R_co:
     """Send a program file to each drive; see `OnDrives.run`. Every one gets the text that was checked at first."""
     text, later = drives.program_text(file), drives.several
 
-    async def put(session: Session) -> None:
-        found = targets(session, drives.target, "programs")
+    async def put(session: Session, origin: Origin) -> None:
+        found = targets(session, origin, drives.target, "programs")
         kept = await asyncio.to_thread(program_text_of, file) if text is None and later else text
 
         async def send(drive: Drive) -> None:
-            await transfers.download(session, drive, file, wanted, kept, drives.by, later=later)
+            await transfers.download(session, origin, drive, file, wanted, kept, later=later)
 
         await each(session, found, send)
         if later and wanted.run:
-            await each(session, found, lambda drive: transfers.start(session, drive, file, wanted, kept))
+            await each(session, found, lambda drive: transfers.start(session, origin, drive, file, wanted, kept))
 
     return drives.run(put, unsolicited=True)

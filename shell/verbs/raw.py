@@ -15,7 +15,7 @@ from multidrop.shell.operations.parameter import Argument
 if TYPE_CHECKING:
     from multidrop.shell import raw
     from multidrop.shell.raw import RawLine
-    from multidrop.shell.verbs.call import Call
+    from multidrop.shell.session import Call
 
 GROUP = "Bytes"
 BREAK = 250
@@ -160,7 +160,7 @@ async def send_bytes(call: Call, text: Bytes) -> None:
     line, data = in_raw_mode(call), parse_bytes(text)
     if not data:
         raise call.wrong()
-    await call.session.path.send_bytes(line.bus, data, call.by)
+    await call.session.path.send_bytes(line.bus, data, call.origin)
 
 
 OPERATIONS = (

@@ -6,17 +6,15 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from multidrop.base.errors import Inexpressible
-from multidrop.base.on_demand import imported
 from multidrop.dialects import Procedure
 from multidrop.dialects.families import FAMILIES, dialects
 from multidrop.dialects.family import Registers
 from multidrop.drives.drive import Drive
-from multidrop.shell import motions
+from multidrop.shell import motions, travel
 from multidrop.shell.operations.arguments import Accessed
-from multidrop.shell.session import TRAVEL
 
 if TYPE_CHECKING:
-    from multidrop.shell.verbs.call import Call
+    from multidrop.shell.session import Call
 
 
 def _registered(call: Call) -> tuple[Drive, Registers]:
@@ -32,7 +30,7 @@ def _registered(call: Call) -> tuple[Drive, Registers]:
 
 async def _show(call: Call, drive: Drive, talk: Procedure[tuple[str, ...]]) -> None:
     for line in await drive.run(talk, typed=True):
-        call.session.output(line)
+        call.output(line)
 
 
 async def _write(
@@ -43,10 +41,10 @@ async def _write(
     """
     session = call.session
     await session.path.agreed_to_write(drive, f"{call.verb.name} {call.rest.strip()}", call.by)
-    async with session.path.starting(drive, writes):
-        printed = await motions.perform(session, drive, lines, talk)
+    async with session.path.starting(call.origin, drive, writes):
+        printed = await motions.perform(session, call.origin, drive, lines, talk)
     for line in printed:
-        session.output(line)
+        call.output(line)
 
 
 async def register(call: Call, wanted: Accessed) -> None:
@@ -59,7 +57,7 @@ async def register(call: Call, wanted: Accessed) -> None:
     lines = registers.lines(address, values)
     for line in lines:
         if call.session.scaled:
-            await imported(TRAVEL)(call.session.units, drive, line, call.by)
+            await travel.ask(call.session.units, drive, line, call.origin)
         await call.session.path.guard(drive, line, call.by)
     known = len(lines) == len(values) and len([line for line in lines if drive.starts(line)]) < 2
     writes = next(filter(drive.starts, lines), lines[0]) if known else ""

@@ -5,6 +5,7 @@ from __future__ import annotations
 from multidrop.base.errors import Diagnostic
 from multidrop.shell import configuration
 from multidrop.shell.operations.argument_types import Restoring
+from multidrop.shell.origin import Origin
 from multidrop.shell.params import replacement
 from multidrop.shell.params.work import each, targets
 from multidrop.shell.session import Session
@@ -21,14 +22,14 @@ def apply_each(drives: OfUrl, file: str, source: str, wanted: Restoring) -> int:
         raise Diagnostic(f"--from {source} is for one drive", "snapshot apply", "--drive names one")
     cell = cells.load(file, configuration.load().allowed)
 
-    async def put(session: Session) -> None:
+    async def put(session: Session, origin: Origin) -> None:
         there = [drive for bus in session.buses.values() for drive in bus.drives.values()]
         if not drives.target and len(there) > 1:
             names = ", ".join(session.display_name(drive) for drive in there)
             raise Diagnostic("several drives have replied", hint=f"--drive names one of {names}")
-        found = targets(session, drives.target)
+        found = targets(session, origin, drives.target)
         # All are found in the file before the first one is written to.
         specs = {drive: replacement.chosen(cell, file, drive, source, drives.several) for drive in found}
-        await each(session, found, lambda drive: replacement.apply(session, drive, file, specs[drive], wanted))
+        await each(session, found, lambda drive: replacement.apply(session, origin, drive, file, specs[drive], wanted))
 
     return drives.run(put, unsolicited=True)

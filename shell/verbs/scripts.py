@@ -53,7 +53,7 @@ def check_set(checking: Checking, name: Name, expression: Expression) -> None:
 
 
 def print_(use: Use, text: Text = "") -> None:
-    use.session.output(text)
+    use.session.output(text, origin=use.origin)
 
 
 # Blocks
@@ -108,7 +108,7 @@ async def expect(use: Use, text: Wanted, seconds: Seconds = LISTENS) -> None:
     from multidrop.shell.scripts.use import CheckFailed
 
     heard = use.heard
-    if not await waits.listened(use.session, partial(heard.finds, text), seconds):
+    if not await waits.listened(use.session, use.origin, partial(heard.finds, text), seconds):
         seen = ", ".join(map(quoted, heard.last(SHOWN))) or "nothing"
         raise CheckFailed(f'{use.text}: wanted "{text}" within {seconds:g} s, seen {seen}')
 

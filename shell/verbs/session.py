@@ -13,7 +13,7 @@ from multidrop.shell.roles import EVERYTHING, TIMES, Filter
 
 if TYPE_CHECKING:
     from multidrop.shell.roles import Transcripts
-    from multidrop.shell.verbs.call import Call
+    from multidrop.shell.session import Call
 
 STOPS, SCREEN = "Stop and end", "The session and its screen"
 Word = Annotated[str, Argument(metavar="WORD|NUMBER", listed=(Listed.WORD,))]
@@ -51,7 +51,7 @@ def help_(call: Call, word: Word = "") -> None:
         call.session.front.page(lines)
         return
     for line in lines:
-        call.session.output(line, columns=True)
+        call.output(line, columns=True)
 
 
 def stop(call: Call) -> None:
@@ -91,7 +91,7 @@ def log(call: Call, place: LogPlace = "") -> None:
 
     workspace = call.session
     if not place:
-        workspace.output(f"log: {workspace.log.path if workspace.log else 'off'}")
+        call.output(f"log: {workspace.log.path if workspace.log else 'off'}")
         return
     path = call.output_file(place)
     if path == STANDARD_OUTPUT:

@@ -27,8 +27,8 @@ from multidrop.shell.verbs.on_drives import (
 )
 
 if TYPE_CHECKING:
-    from multidrop.shell.session import Session
-    from multidrop.shell.verbs.call import Call
+    from multidrop.shell.origin import Origin
+    from multidrop.shell.session import Call, Session
 
 GROUP = "Settings and values"
 NewFile = Annotated[str, Argument("the new file; -: standard output", metavar="FILE", listed=(Listed.FILE,))]
@@ -83,38 +83,38 @@ def params_recorded(call: Call) -> str:
 async def read(drives: OfCall) -> None:
     from multidrop.shell.params import work
 
-    await work.read(drives.call.session, drives.target)
+    await work.read(drives.call.session, drives.call.origin, drives.target)
 
 
 async def save(drives: OfCall) -> None:
     from multidrop.shell.params import work
 
-    await work.save(drives.call.session, drives.target)
+    await work.save(drives.call.session, drives.call.origin, drives.target)
 
 
 def backup(drives: OnDrives[R_co], file: NewFile) -> R_co:
     from multidrop.shell.params import work
 
     drives.new_file(file)
-    return drives.run(lambda session: work.backup(session, file, drives.target))
+    return drives.run(lambda session, origin: work.backup(session, origin, file, drives.target))
 
 
 async def diff(drives: OfCall, file: Backup) -> None:
     from multidrop.shell.params import work
 
-    await work.diff(drives.call.session, drives.target, name=file)
+    await work.diff(drives.call.session, drives.call.origin, drives.target, name=file)
 
 
 async def diff_against(drives: OfCall, *, against: With) -> None:
     from multidrop.shell.params import work
 
-    await work.diff(drives.call.session, drives.target, other=drives.call.drive(against))
+    await work.diff(drives.call.session, drives.call.origin, drives.target, other=drives.call.drive(against))
 
 
 async def diff_defaults(drives: OfCall, *, defaults: Defaults) -> None:
     from multidrop.shell.params import work
 
-    await work.diff(drives.call.session, drives.target)
+    await work.diff(drives.call.session, drives.call.origin, drives.target)
 
 
 def diff_of_url(
@@ -139,14 +139,14 @@ def diff_of_url(
     drives = OfUrl(url, drive, also=("" if against else other,))
     loaded = files.load(file) if file and not drives.several else None
 
-    async def compare(session: Session) -> int:
+    async def compare(session: Session, origin: Origin) -> int:
         there = None
         if against or other:
             bus, address = split_target(other)
             if against and against != url:
                 bus = (await session.open(against))[0].name
             there = session.drive(bus, address or None)
-        differs = await work.diff(session, drive, name=file, other=there, as_json=json, loaded=loaded)
+        differs = await work.diff(session, origin, drive, name=file, other=there, as_json=json, loaded=loaded)
         return DIFFERS if differs else 0
 
     return drives.run(compare)
@@ -158,7 +158,7 @@ def restore(drives: OnDrives[R_co], file: Backup, *, how: Restoring) -> R_co:
     from multidrop.shell.params import work
 
     loaded = None if drives.several else files.load(file)
-    return drives.run(lambda session: work.restore_each(session, file, drives.target, how, loaded))
+    return drives.run(lambda session, origin: work.restore_each(session, origin, file, drives.target, how, loaded))
 
 
 # Snapshots

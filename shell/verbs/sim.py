@@ -16,7 +16,7 @@ from multidrop.shell.operations.parameter import Argument, Listed
 from multidrop.simulator import MEANINGS, table
 
 if TYPE_CHECKING:
-    from multidrop.shell.verbs.call import Call
+    from multidrop.shell.session import Call
     from multidrop.simulator.serving.running import RunningFloor
 
 DriveName = Annotated[str, Argument(metavar="DRIVE", listed=(Listed.SIMULATED_DRIVE,))]

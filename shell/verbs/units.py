@@ -11,7 +11,7 @@ from multidrop.shell.operations.parameter import Argument, Listed
 
 if TYPE_CHECKING:
     from multidrop.drives.drive import Drive
-    from multidrop.shell.verbs.call import Call
+    from multidrop.shell.session import Call
 
 
 GROUP = "Lines and drives"
@@ -29,7 +29,7 @@ def list_(call: Call) -> None:
         (drive, axis) for bus in session.buses.values() for drive in bus.drives.values() for axis in _axes(call, drive)
     ]
     for drive, axis in found:
-        session.output(_described(call, drive, axis))
+        call.output(_described(call, drive, axis))
     if not found:
         session.notify("no axis has a scale: /units ADDR 5 mm/turn gives it one", outcome=True)
 
@@ -42,7 +42,7 @@ def show(call: Call, shown: Shown) -> None:
 async def here(call: Call, target: MaybeAxis, number: Number, unit: Unit) -> None:
     drive, axis = _meant(call, target)
     await call.session.units.here(drive, axis, f"{number} {unit}")
-    call.session.output(_described(call, drive, axis))
+    call.output(_described(call, drive, axis))
 
 
 async def confirm(call: Call, target: Axis) -> None:
@@ -50,13 +50,13 @@ async def confirm(call: Call, target: Axis) -> None:
     if axis not in _axes(call, drive):
         raise Diagnostic(f"{target} has no scale", "/units", f"/units {target} 5 mm/turn gives it one")
     await call.session.units.confirm(drive)
-    call.session.output(_described(call, drive, axis))
+    call.output(_described(call, drive, axis))
 
 
 async def give(call: Call, target: MaybeAxis, number: Number, unit: PerTurn) -> None:
     drive, axis = _meant(call, target)
     await _give(call, drive, axis, f"{number} {unit}")
-    call.session.output(_described(call, drive, axis))
+    call.output(_described(call, drive, axis))
 
 
 async def _give(call: Call, drive: Drive, axis: str, text: str) -> None:

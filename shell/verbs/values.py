@@ -9,7 +9,7 @@ from multidrop.shell.operations.operation import Operation, typed
 from multidrop.shell.operations.parameter import Argument, Listed
 
 if TYPE_CHECKING:
-    from multidrop.shell.verbs.call import Call
+    from multidrop.shell.session import Call
 
 GROUP = "Settings and values"
 Plotted = Annotated[str, Argument(metavar="ADDR", listed=(Listed.DRIVE,))]

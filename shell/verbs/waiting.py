@@ -10,7 +10,7 @@ from multidrop.shell.operations.operation import Operation, typed
 from multidrop.shell.operations.parameter import Argument, Listed
 
 if TYPE_CHECKING:
-    from multidrop.shell.verbs.call import Call
+    from multidrop.shell.session import Call
     from multidrop.shell.waits import Condition
 
 GROUP = "Waits"
@@ -83,15 +83,14 @@ async def sleep(call: Call, seconds: Seconds) -> None:
 async def wait(call: Call, state: Rest, seconds: Seconds | None = None) -> None:
     from multidrop.dialects.motions import Outcome
     from multidrop.shell import waits
-    from multidrop.shell.motions import OUTCOME
 
     limit = waits.LIMIT if seconds is None else seconds
-    watch = await waits.wait(call.session, limit, idle=state == "idle", ended=state == "ended")
+    watch = await waits.wait(call.session, call.origin, limit, idle=state == "idle", ended=state == "ended")
     if state != "ended":
         return
     ending = watch.worst
     outcome = Outcome.REACHED if ending is None else ending[1].outcome
-    if (asked := OUTCOME.get()) is not None:
+    if (asked := call.origin.outcome) is not None:
         asked[:] = [outcome.value]
     told = "" if ending is None else f" ({ending[1].described(call.session.display_name(ending[0]))})"
     call.session.notify(f"outcome: {outcome.value}{told}", outcome=True)
@@ -102,13 +101,15 @@ async def wait_value(call: Call, wanted: Value) -> None:
 
     value, limit = wanted.value, waits.LIMIT if wanted.seconds is None else wanted.seconds
     drive, units = call.drive(value.target), call.session.units if value.quantity else None
-    await waits.wait_value(call.session, drive, value, limit, units)
+    await waits.wait_value(call.session, call.origin, drive, value, limit, units)
 
 
 async def wait_text(call: Call, wanted: Text) -> None:
     from multidrop.shell import waits
 
-    await waits.wait_text(call.session, wanted.text, waits.LIMIT if wanted.seconds is None else wanted.seconds)
+    await waits.wait_text(
+        call.session, call.origin, wanted.text, waits.LIMIT if wanted.seconds is None else wanted.seconds
+    )
 
 
 def with_drive(call: Call) -> str:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import importlib.metadata
 import os
 from collections.abc import Iterator
-from contextvars import copy_context
 from functools import cache
 from pathlib import Path
 from types import SimpleNamespace
@@ -65,9 +64,8 @@ def test_a_file_in_the_folder_is_a_feature(own: Path) -> None:
 
 def test_without_the_configuration_a_persons_own_files_are_not_loaded(own: Path) -> None:
     write(own, "clamp")
-    context = copy_context()
-    context.run(places.ignore_configuration)
-    context.run(registry.load_others)
+    with places.without_configuration():
+        registry.load_others()
     assert registry.warnings() == [] and registry.by_others() == []
 
 

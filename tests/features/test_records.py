@@ -10,8 +10,9 @@ from multidrop.api.notebooks import Pictures
 from multidrop.base import registry
 from multidrop.base.registry import IN_WHEEL
 from multidrop.dialects.families import Dialect
+from multidrop.shell.at_session import AtSession
 from multidrop.shell.connect.scheme import NoLine, Scheme
-from multidrop.shell.hooks import AtSession, Options, Predicting, Switch
+from multidrop.shell.hooks import Options, Predicting, Switch
 from multidrop.shell.operations.operation import Operation
 from multidrop.shell.operations.table import VERBS, core
 from multidrop.shell.plot_targets import PlotTargets

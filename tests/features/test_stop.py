@@ -20,8 +20,9 @@ from multidrop.base.feature import Feature
 from multidrop.base.registry import Entry
 from multidrop.cli import parse
 from multidrop.drives.events import Changed
+from multidrop.shell.at_session import AtSession
 from multidrop.shell.configuration import Settings
-from multidrop.shell.hooks import Added, AtSession, Options
+from multidrop.shell.hooks import Added, Options
 from multidrop.shell.operations.operation import Operation
 from multidrop.shell.session import Session
 from multidrop.simulator.cells import load

@@ -124,7 +124,7 @@ def test_a_download_compares_and_does_nothing_more_unless_that_is_asked_for(
 ) -> None:
     asked = list[Any]()
 
-    async def download(shell: object, drive: object, file: str, how: Any, text: str | None) -> None:
+    async def download(shell: object, origin: object, drive: object, file: str, how: Any, text: str | None) -> None:
         asked.append((file, (not how.no_verify, how.save, how.only_changed, how.run), text))
 
     async def work(session: Any) -> None:

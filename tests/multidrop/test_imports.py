@@ -26,7 +26,6 @@ NO_LINE = HEAVY | LOOP | HOSTS | SIMULATORS | {"serial"}
 MCODE = {"multidrop.families.lexium.host.mcode.family"}
 OTHERS = HOSTS - MCODE - {"multidrop.drives.bus", "multidrop.shell.session"}
 VERBS = {
-    "multidrop.shell.verbs.call",
     "multidrop.shell.plots",
     "multidrop.shell.programs.transfers",
     "secrets",

@@ -341,3 +341,11 @@ def test_questions_and_the_travel_are_answered_by_options(run: Run, tmp_path: Pa
     refused = run(move, "--yes", on="press")
     assert refused.returncode == 2 and "the travel is 0 mm to 100 mm" in refused.stderr
     assert "--beyond" in refused.stderr and run(move, "--beyond", on="press").returncode == 0
+
+
+def test_with_no_config_the_session_of_a_program_reads_no_configuration(run: Run, tmp_path: Path) -> None:
+    (tmp_path / "conf").mkdir(exist_ok=True)
+    (tmp_path / "conf" / "multidrop.toml").write_text("wrong")
+    assert run("print(a.read('P'))").returncode == 2
+    done = run("print(a.read('P'))", "--no-config")
+    assert (done.returncode, done.stdout) == (0, "0\n")

@@ -127,7 +127,7 @@ class AnyOrder(RuleBasedStateMachine):
     @rule(drive=DRIVES)
     def macro(self, drive):
         lines = (f"@{drive} MR {next(self.numbers)}", "/wait stopped 5", f"@{drive} PR P")
-        self.run(play(self.session, Macro("m", tuple(Step(0.05, line) for line in lines)), {}))
+        self.run(play(self.session, self.session.origin, Macro("m", tuple(Step(0.05, line) for line in lines)), {}))
 
     @rule(wait=st.floats(0.0, 0.1))
     def stop_amid_a_line(self, wait):

@@ -18,6 +18,7 @@ from multidrop.drives.events import Sample
 from multidrop.drives.stopping import Fate
 from multidrop.shell.at_rest import at_rest_after_error, excused
 from multidrop.shell.events import OnBus
+from multidrop.shell.origin import PERSON
 from multidrop.shell.waits import standings, wait
 from tests.support.cell_session import CellSession, bus, party
 
@@ -98,7 +99,7 @@ async def test_a_lost_reading_is_no_rest(family, lost, tmp_path, monkeypatch):
                 await shop.session.run(line)
             assert now() < ENDS
         Moving(monkeypatch, family, lost=[lost])
-        watch = await wait(shop.session, 20, idle=False, ended=True)  # asks again
+        watch = await wait(shop.session, PERSON, 20, idle=False, ended=True)  # asks again
         assert now() >= ENDS and Outcome.UNKNOWN not in [each.outcome for each in watch.endings[drive]]
 
 
@@ -106,7 +107,7 @@ async def test_a_lost_reading_is_no_rest(family, lost, tmp_path, monkeypatch):
 async def test_after_three_lost_readings_the_end_is_not_known(family, tmp_path, monkeypatch):
     async with CellSession(tmp_path, bus("press", party("a"))) as shop:
         Moving(monkeypatch, family, lost=range(100))
-        watch = await wait(shop.session, 20, idle=False, ended=True)
+        watch = await wait(shop.session, PERSON, 20, idle=False, ended=True)
         assert asyncio.get_running_loop().time() < ENDS
         assert [each.outcome for each in watch.endings[shop.session.selected]] == [Outcome.UNKNOWN]
 

@@ -1,6 +1,7 @@
 """Automation that ends early stops what it started, that alone, and says so: on simulated lines, in virtual time."""
 
 import asyncio
+from dataclasses import replace
 
 import pytest
 
@@ -10,6 +11,7 @@ from multidrop.shell.events import By
 from multidrop.shell.prompt.terminal_input import run_lines
 from multidrop.shell.scripts import model
 from multidrop.shell.scripts.executor import run_script
+from tests.support.automated import automated
 from tests.support.cell_session import ETHERNET, CellSession, bus, party, pmx
 
 pytestmark = pytest.mark.virtual
@@ -33,14 +35,14 @@ GO = {
 
 async def script(session, *lines):
     """As `multidrop run` does it."""
-    async with session.automations.run():
+    async with automated(session):
         body = [model.Step(model.ScriptLine("s", number, line)) for number, line in enumerate(lines, 1)]
-        await run_script(session, model.Script("s", body, {}))
+        await run_script(session, session.origin, model.Script("s", body, {}))
 
 
 async def sent(session, *lines):
     """As `multidrop send` and a piped shell do it."""
-    async with session.automations.run():
+    async with automated(session):
         await run_lines(session, lines)
 
 
@@ -80,7 +82,7 @@ async def test_whatever_ends_it_early_stops_what_it_started_and_nothing_else(run
         assert [text for text in shop.warned() if text.startswith("stopped ")] == [
             "stopped press:a, gantry:c, eth, stages:00 X: velocity 0 was read from all 4",
         ]
-        await shop.session.run("@gantry:c SL 100", By.SCRIPT)
+        await shop.session.run("@gantry:c SL 100", replace(shop.session.origin, by=By.SCRIPT))
 
 
 async def test_what_it_starts_behind_a_stop_and_a_resume_is_stopped_too(shop):
@@ -156,7 +158,7 @@ async def test_a_program_that_ends_only_after_its_motion_stops_no_other_drive(tm
 
 async def test_what_could_not_be_reached_is_named(shop):
     with pytest.raises(TransportLost):
-        async with shop.session.automations.run():
+        async with automated(shop.session):
             await run_lines(shop.session, [GO["press:a"], GO["gantry:c"], "/sleep 1"])
             shop.world("/sim unplug press")
             await asyncio.sleep(1.0)
@@ -235,8 +237,8 @@ async def test_a_cancelled_automation_stops_what_it_started_alone_before_its_can
 
 async def test_an_automation_that_is_left_in_any_way_stops_what_it_started(shop):
     async def started():
-        async with shop.session.automations.run("the test"):
-            async with shop.session.automations.run("a part of it"):
+        async with automated(shop.session, "the test"):
+            async with automated(shop.session, "a part of it"):
                 await shop.session.run(GO["press:a"])
             yield
 
@@ -246,7 +248,7 @@ async def test_an_automation_that_is_left_in_any_way_stops_what_it_started(shop)
     await asyncio.sleep(2.0)
     assert shop.moving() == set()
     with pytest.raises(Out):
-        async with shop.session.automations.run():
+        async with automated(shop.session):
             await shop.session.run(GO["press:b"])
             raise Out
     assert shop.moving() == set()
@@ -280,14 +282,14 @@ async def test_an_interruption_stops_what_every_automation_started(shop):
 
 
 async def test_what_is_started_again_after_an_interruption_is_stopped_by_the_next_one(shop):
-    async with shop.session.automations.run():
+    async with automated(shop.session):
         for _ in range(2):
             await shop.session.run(GO["press:a"])
             assert shop.moving() == {"press:a"}
             shop.session.interrupt()
             await asyncio.sleep(2.0)
             assert shop.moving() == set()
-        shop.session.automations.leave()
+        shop.session.automations.leave(shop.session.origin)
 
 
 async def test_an_operators_lines_go_on_beside_a_macro_that_fails(shop):

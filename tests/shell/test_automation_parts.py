@@ -11,7 +11,9 @@ import pytest
 
 from multidrop.base.errors import Diagnostic, DriveError
 from multidrop.dialects import Started
-from multidrop.shell.automation import Automation, Sent, is_automation, outcome, sequence
+from multidrop.shell.automation import Automation, Sent, outcome
+from multidrop.shell.origin import PERSON
+from tests.support.automated import automated
 from tests.support.cell_session import CellSession, bus, party
 
 pytestmark = pytest.mark.virtual
@@ -64,9 +66,9 @@ async def run_beside(shop, line, name="macro shuttle", claims=()):
     begun = asyncio.Event()
 
     async def work():
-        async with shop.session.automations.run(name, claims):
+        async with shop.session.automations.run(PERSON, name, claims) as origin:
             if line:
-                await shop.session.run(line)
+                await shop.session.run(line, origin)
             begun.set()
             await asyncio.sleep(1000)
 
@@ -85,72 +87,71 @@ async def end(task):
 async def test_a_drive_that_another_automation_moves_gets_nothing(shop, name, who, line, where):
     task = await run_beside(shop, "@press:a SL 1000", name)
     shop.events.clear()
-    async with shop.session.automations.run():
+    async with automated(shop.session):
         says = await refused(shop, line)
         assert says == f"{where}: {who} moves it, so nothing was sent; wait for its end, or stop it (/play stop)"
         assert b"MR" not in shop.written("press")
         await shop.session.run("@press:b MR 7")
         await shop.session.run("@press:a PR P")
     await end(task)
-    async with shop.session.automations.run():
+    async with automated(shop.session):
         await shop.session.run("@press:a MR 7")
 
 
 async def test_a_claimed_drive_is_refused_before_the_other_automation_has_moved_it(shop):
     claim = (shop.session.buses["press"].link, "a")
     task = await run_beside(shop, "", claims=[claim])
-    async with shop.session.automations.run():
+    async with automated(shop.session):
         assert "macro shuttle moves it" in await refused(shop, "@press:a MR 7")
     with pytest.raises(Diagnostic, match="macro shuttle moves it"):
-        async with shop.session.automations.run("macro second", [claim]):
+        async with automated(shop.session, "macro second", [claim]):
             raise AssertionError("it began")
     await end(task)
-    async with shop.session.automations.run("macro second", [claim]):
+    async with automated(shop.session, "macro second", [claim]):
         pass
 
 
 async def test_a_part_adds_its_claims_and_its_name_only_as_long_as_it_runs(shop):
     claim = (shop.session.buses["press"].link, "a")
-    automations = shop.session.automations
-    async with automations.run():
-        current = automations.current
-        async with automations.run("macro part", [claim]):
-            assert automations.current is current
+    async with automated(shop.session):
+        current = shop.session.origin.automation
+        async with automated(shop.session, "macro part", [claim]):
+            assert shop.session.origin.automation is current
             assert (current.name, current.claims) == ("macro part", frozenset({claim}))
-            async with automations.run("macro within"):
+            async with automated(shop.session, "macro within"):
                 assert (current.name, current.claims) == ("macro part", frozenset({claim}))
         assert (current.name, current.claims) == ("", frozenset())
-    assert automations.current is None
+    assert shop.session.origin.automation is None
 
 
-async def test_who_sends_the_lines_of_a_task(shop):
-    assert sequence(shop.session) is shop.session and not is_automation()
-    async with shop.session.automations.run():
-        assert sequence(shop.session) is shop.session.automations.current and is_automation()
-    assert not is_automation()
+async def test_who_sends_the_lines(shop):
+    assert PERSON.sequence(shop.session) is shop.session
+    async with automated(shop.session) as origin:
+        assert origin.sequence(shop.session) is origin.automation is not None
+    assert shop.session.origin is PERSON
 
 
 async def test_while_it_must_be_still_it_starts_nothing_but_may_end_motion_and_ask(shop):
     automations = shop.session.automations
-    async with automations.run():
-        with automations.still("its inputs are read"):
-            with automations.still("and again"):
+    async with automated(shop.session):
+        with automations.still(shop.session.origin, "its inputs are read"):
+            with automations.still(shop.session.origin, "and again"):
                 assert await refused(shop, "@press:a MR 7") == "a: and again"
             assert await refused(shop, "@press:a MR 7") == "a: its inputs are read"
             await shop.session.run("@press:a SL 0")
             await shop.session.run("@press:a PR P")
-        assert automations.current.started == {}
+        assert shop.session.origin.automation.started == {}
         await shop.session.run("@press:a MR 7")
-        assert list(automations.current.started) == [at(shop, "press", "a")]
-    with automations.still("a person is not held back"):
+        assert list(shop.session.origin.automation.started) == [at(shop, "press", "a")]
+    with automations.still(shop.session.origin, "a person is not held back"):
         await shop.session.run("@press:a MR 7")
 
 
 async def test_what_it_leaves_goes_on_after_its_failure(shop):
     with pytest.raises(RuntimeError):
-        async with shop.session.automations.run():
+        async with automated(shop.session):
             await shop.session.run("@press:a SL 1000")
-            shop.session.automations.leave()
+            shop.session.automations.leave(shop.session.origin)
             await shop.session.run("@press:b SL 1000")
             raise RuntimeError
     assert shop.moving() == {"press:a"}
@@ -158,27 +159,28 @@ async def test_what_it_leaves_goes_on_after_its_failure(shop):
         "stopped press:b: velocity 0 was read from press:b",
         "program ended, if one was running: press:b",
     ]
-    shop.session.automations.leave()
+    shop.session.automations.leave(shop.session.origin)
 
 
 async def test_an_end_in_between_stops_what_was_started_and_what_comes_after_is_new(shop):
     automations = shop.session.automations
-    assert await automations.end() == []
-    async with automations.run():
+    assert await automations.end(shop.session.origin) == []
+    async with automated(shop.session):
         await shop.session.run("@press:a SL 1000")
-        halts = await automations.end()
+        halts = await automations.end(shop.session.origin)
         assert [[each.address for each in halt.drives] for halt in halts] == [["a"]]
-        assert (automations.current.started, automations.current.stopped, automations.current.halts) == ({}, {}, [])
+        own = shop.session.origin.automation
+        assert (own.started, own.stopped, own.halts) == ({}, {}, [])
         await shop.session.run("@gantry:c SL 1000")
-        assert await automations.end() != halts
+        assert await automations.end(shop.session.origin) != halts
     await asyncio.sleep(1)
     assert shop.moving() == set()
 
 
 async def test_a_line_that_was_refused_started_nothing(shop):
     automations = shop.session.automations
-    async with automations.run():
-        current, drive = automations.current, at(shop, "press", "a")
+    async with automated(shop.session):
+        current, drive = shop.session.origin.automation, at(shop, "press", "a")
         first = Sent(1.0, Started())
         current.started[drive] = first
         automations.restores(current, drive, None)
@@ -230,7 +232,7 @@ async def test_an_end_that_comes_soon_is_not_said(shop):
 
 async def test_a_drive_that_was_read_at_rest_since_gets_no_stop(shop):
     with pytest.raises(DriveError):
-        async with shop.session.automations.run():
+        async with automated(shop.session):
             await shop.session.run("@press:a MR 7")
             await shop.session.run("/wait stopped")
             await shop.session.run("@gantry:c SL 1000")
@@ -243,7 +245,7 @@ async def test_a_drive_that_was_read_at_rest_since_gets_no_stop(shop):
 
 async def test_a_drive_that_moves_again_by_another_hand_gets_its_stop(shop):
     with pytest.raises(DriveError):
-        async with shop.session.automations.run():
+        async with automated(shop.session):
             await shop.session.run("@press:a MR 7")
             await shop.session.run("/wait stopped")
             shop.device("press:a").execute("SL 1000", shop.floor.now())
@@ -253,11 +255,11 @@ async def test_a_drive_that_moves_again_by_another_hand_gets_its_stop(shop):
 
 
 async def test_a_bus_that_was_closed_is_named_with_its_stop_that_was_not_sent(shop):
-    async with shop.session.automations.run():
+    async with automated(shop.session):
         await shop.session.run("@gantry:c SL 1000")
         link, drive = shop.session.buses["gantry"].link, at(shop, "gantry", "c")
         await shop.session.run("/close gantry")
-        halts = await shop.session.automations.end()
+        halts = await shop.session.automations.end(shop.session.origin)
     (halt,) = halts
     assert (halt.link, halt.number, halt.whole, halt.drives, halt.data) == (link, 0, False, (drive,), b"")
     assert (halt.trouble, list(halt.started)) == (["closed"], [drive])

@@ -1,7 +1,6 @@
 """The configuration: read as a whole; a connection saved in it, where remarks stay and nothing is replaced."""
 
 import json
-from contextvars import copy_context
 from pathlib import Path
 
 import pytest
@@ -127,14 +126,11 @@ def test_any_file_is_read_or_told(lines):
 def test_no_config_reads_nothing(folder):
     (folder / "multidrop.toml").write_text(WRONG + KEPT)
 
-    def ignored():
-        places.ignore_configuration()
+    with places.without_configuration():
         assert configuration.load() == configuration.Settings()
         with pytest.raises(Diagnostic, match="a connection kept exists already"):
             configuration.save("kept", "sim:")
         assert (folder / "multidrop.toml").read_text() == WRONG + KEPT
-
-    copy_context().run(ignored)
 
 
 def test_a_file_that_cannot_be_read_is_named(folder):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+from dataclasses import replace
 
 import pytest
 
@@ -134,9 +135,9 @@ async def test_nothing_is_sent_however_the_line_comes(tmp_path) -> None:
         for line in ("MA 200,000", "@a MA 200 000", "@b MR -200,000,1", "@* SL 200,000", "@stages:00 X200,000"):
             for by in (By.OPERATOR, By.SCRIPT):
                 with pytest.raises(Inexpressible, match="nothing was sent"):
-                    await shop.session.run(line, by)
+                    await shop.session.run(line, replace(shop.session.origin, by=by))
         with pytest.raises(Diagnostic, match="write 200000"):
-            await play(shop.session, Macro("go", (Step(0.0, "@a MA 200,000"),)), {})
+            await play(shop.session, shop.session.origin, Macro("go", (Step(0.0, "@a MA 200,000"),)), {})
         await asyncio.sleep(1.0)
         assert b"200" not in shop.written("press") + shop.written("stages") and not shop.moving()
         await shop.session.run("@a MA 200,1")
@@ -159,9 +160,9 @@ async def test_a_line_that_no_drive_gets_is_found_before_the_script_moves_anythi
     async with CellSession(tmp_path, bus("press", party("a")), bus("stages", pmx("00")), bus("lab", MODULE)) as shop:
         script = read_script(str(tmp_path / "s.txt"), {"FAR": "200,000"} if "{" in wrong else {})
         with pytest.raises(Diagnostic, match=r"s.txt:3: .*nothing was sent"):
-            await run_script(shop.session, script)
+            await run_script(shop.session, shop.session.origin, script)
         macro = Macro("go", (Step(0.0, "@a MR 51200"), Step(0.0, wrong)))
         with pytest.raises(Diagnostic, match="go, step 2: "):
-            await play(shop.session, macro, {"FAR": "200,000"} if "{" in wrong else {})
+            await play(shop.session, shop.session.origin, macro, {"FAR": "200,000"} if "{" in wrong else {})
         await asyncio.sleep(1.0)
         assert b"MR 51200" not in shop.written("press")

@@ -2,6 +2,7 @@
 
 import asyncio
 from contextlib import asynccontextmanager
+from dataclasses import replace
 
 import pytest
 
@@ -85,12 +86,12 @@ async def test_a_stop_while_it_asks_is_sent_and_the_line_is_not(shop):
 async def test_a_script_and_a_macro_ask_nobody(shop):
     person = Person(shop, True)
     with pytest.raises(Diagnostic, match="a script cannot ask, nothing was sent; --yes agrees beforehand"):
-        await shop.session.run("@a CP", By.SCRIPT)
+        await shop.session.run("@a CP", replace(shop.session.origin, by=By.SCRIPT))
     with pytest.raises(Diagnostic, match="a macro cannot ask"):
-        await play(shop.session, Macro("wipe", (Step(0.0, "@a CP"),)), {})
+        await play(shop.session, shop.session.origin, Macro("wipe", (Step(0.0, "@a CP"),)), {})
     assert person.asked == [] and silent(shop)
     shop.session.questions.agreed = True
-    await shop.session.run("@a CP", By.SCRIPT)
+    await shop.session.run("@a CP", replace(shop.session.origin, by=By.SCRIPT))
     assert b"CP" in shop.written("press") and person.asked == []
 
 
@@ -210,7 +211,7 @@ async def test_neither_a_macro_nor_a_script_can_agree_to_it(tmp_path):
     async with doubted(tmp_path) as shop:
         Person(shop, True)
         with pytest.raises(Diagnostic, match="a macro cannot ask, nothing was sent"):
-            await shop.session.run("@a VM=5000", By.MACRO)
+            await shop.session.run("@a VM=5000", replace(shop.session.origin, by=By.MACRO))
         assert silent(shop)
 
 

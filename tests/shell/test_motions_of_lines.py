@@ -12,8 +12,9 @@ import pytest
 
 from multidrop.base.errors import DriveError, NoAnswer, Refused
 from multidrop.drives.drive import confirmed_motion
-from multidrop.shell.motions import perform, sequence
+from multidrop.shell.motions import perform
 from multidrop.shell.waits import in_motion
+from tests.support.automated import automated
 from tests.support.cases import for_each
 from tests.support.cell_session import CellSession, bus, party, pmx
 from tests.support.outcomes import failed, sent
@@ -102,12 +103,12 @@ async def test_a_stop_that_may_have_been_executed_counts_as_one_of_this_sequence
         yield
 
     drive = shop.session.drive("press", "a")
-    async with shop.session.automations.run():
+    async with automated(shop.session):
         await shop.session.run("@press:a MA 90000")
         with pytest.raises(Refused):
-            await perform(shop.session, drive, ["SL 0"], work())
-        assert [each.stopped for each in drive.motions.open_of(sequence(shop.session))] == stopped
-        shop.session.automations.leave()
+            await perform(shop.session, shop.session.origin, drive, ["SL 0"], work())
+        assert [each.stopped for each in drive.motions.open_of(shop.session.origin.sequence(shop.session))] == stopped
+        shop.session.automations.leave(shop.session.origin)
 
 
 # What is in motion
@@ -224,7 +225,7 @@ async def test_after_its_limit_a_wait_for_a_value_has_asked_once_more_than_it_sl
 
 async def test_of_an_outcome_that_was_judged_before_the_next_wait_says_the_same(tmp_path: Path) -> None:
     async with CellSession(tmp_path, bus("press", party("a", **SLOW), baud=0)) as shop:
-        async with shop.session.automations.run():
+        async with automated(shop.session):
             await shop.session.run("MA 3000")
             await shop.session.run("/wait stopped")
             await shop.session.run("/wait ended")

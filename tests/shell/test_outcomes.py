@@ -273,7 +273,7 @@ async def ran(session: Session, folder: Path, *lines: str) -> list[str]:
     file.write_text("\n".join(lines) + "\n")
     script = read_script(str(file), {})
     session.events.clear()  # type: ignore[attr-defined]
-    await run_script(session, script)
+    await run_script(session, session.origin, script)
     return [each.text for each in session.events if isinstance(each, Output)]  # type: ignore[attr-defined]
 
 

@@ -2,6 +2,7 @@ r"""Raw mode: a person's own bytes out, every byte in with its time, and nobody 
 
 import asyncio
 from contextlib import asynccontextmanager
+from dataclasses import replace
 from types import SimpleNamespace
 from unittest import mock
 
@@ -16,6 +17,7 @@ from multidrop.shell.events import By, Bytes
 from multidrop.shell.raw import Form, hex_of, parse_bytes, text_of
 from multidrop.shell.scripts.executor import play
 from multidrop.shell.session import Session
+from tests.support.automated import automated
 from tests.support.cell_session import CellSession, bus, moves, party, pmx
 
 pytestmark = pytest.mark.virtual
@@ -162,7 +164,7 @@ async def test_a_macro_never_sends_its_lines_as_bytes(tmp_path):
     async with opened(tmp_path, party("a"), party("b"), query="?drives=a,b") as shop:
         for line in ("MR 5", "@a MR 5", "@line:a MR 5"):
             with pytest.raises(Diagnostic, match="line is raw: a macro's lines are for drives; |has no address"):
-                await play(shop.session, Macro("go", (Step(0.0, line),)), {})
+                await play(shop.session, shop.session.origin, Macro("go", (Step(0.0, line),)), {})
         assert shop.written("line") == b""
 
 
@@ -206,8 +208,8 @@ async def test_where_no_drive_replies_the_line_stays_raw(tmp_path):
 
 async def test_automation_in_raw_mode_stops_the_line_when_it_ends_early(shop):
     with pytest.raises(Diagnostic):
-        async with shop.session.automations.run():
-            await shop.session.run("SL 20000", By.SCRIPT)
+        async with automated(shop.session):
+            await shop.session.run("SL 20000", replace(shop.session.origin, by=By.SCRIPT))
             await asyncio.sleep(0.5)
             raise Diagnostic("failed")
     device = shop.device("line:!")
@@ -215,8 +217,8 @@ async def test_automation_in_raw_mode_stops_the_line_when_it_ends_early(shop):
     assert not moves(device, device.now)
     shop.events.clear()
     with pytest.raises(Diagnostic):
-        async with shop.session.automations.run():
-            await shop.session.run("PR P", By.SCRIPT)
+        async with automated(shop.session):
+            await shop.session.run("PR P", replace(shop.session.origin, by=By.SCRIPT))
             raise Diagnostic("failed")
     assert shop.written("line") == b"PR P\r"  # a print starts nothing
 

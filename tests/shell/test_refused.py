@@ -1,6 +1,7 @@
 """An early end stops what its automation started and nothing else: a refused line has started nothing."""
 
 import asyncio
+from dataclasses import replace
 
 import pytest
 
@@ -10,6 +11,7 @@ from multidrop.drives.stop_readings import read_activity
 from multidrop.drives.stopping import Fate
 from multidrop.shell.events import By
 from multidrop.shell.prompt.terminal_input import run_lines
+from tests.support.automated import automated
 from tests.support.cell_session import ETHERNET, CellSession, bus, drive, party, pmx
 
 pytestmark = pytest.mark.virtual
@@ -22,7 +24,7 @@ ROUTINE = ("PG 1", "LB OO", "SL 30000", "RT", "E", "PG", "OE OO")
 
 
 async def sent(session, *lines):
-    async with session.automations.run():
+    async with automated(session):
         await run_lines(session, lines)
 
 
@@ -161,7 +163,7 @@ async def test_a_line_without_a_reply_may_have_started_its_drive_which_is_stoppe
                 receive(line, data, now)
 
         with pytest.raises(NoAnswer, match="not known whether"):
-            async with shop.session.automations.run():
+            async with automated(shop.session):
                 with monkeypatch.context() as lost:
                     lost.setattr(line, "receive", lossy)
                     await shop.session.run("@press:a SL 50001")
@@ -215,7 +217,7 @@ async def test_a_drive_at_rest_that_may_move_again_is_stopped(lines, tmp_path):
 async def test_a_loss_during_a_setting_raises_no_alarm(tmp_path):
     async with CellSession(tmp_path, press()) as shop:
         with pytest.raises(TransportLost):
-            async with shop.session.automations.run():
+            async with automated(shop.session):
                 line, line_text = asyncio.create_task(shop.session.run("@press:a VM=700000")), b"VM=700000"
                 while line_text not in shop.written("press"):
                     await asyncio.sleep(0.001)
@@ -228,7 +230,7 @@ async def test_a_loss_during_a_setting_raises_no_alarm(tmp_path):
 async def test_a_loss_during_a_start_raises_the_alarm(tmp_path):
     async with CellSession(tmp_path, press()) as shop:
         with pytest.raises(TransportLost):
-            async with shop.session.automations.run():
+            async with automated(shop.session):
                 line, line_text = asyncio.create_task(shop.session.run("@press:a SL 700")), b"SL 700"
                 while line_text not in shop.written("press"):
                     await asyncio.sleep(0.001)
@@ -250,7 +252,7 @@ RETURNS = {
 async def test_the_stop_that_a_loss_kept_from_a_drive_is_sent_once_the_line_is_back(cell, lines, stop, tmp_path):
     async with CellSession(tmp_path, cell, reconnect=True) as shop:
         with pytest.raises((TransportLost, DriveError)):
-            async with shop.session.automations.run():
+            async with automated(shop.session):
                 for line in lines:
                     await shop.session.run(line)
                 await asyncio.sleep(0.5)
@@ -336,7 +338,7 @@ async def test_a_single_stop_is_confirmed_by_two_readings_of_rest_in_a_row(lines
 
     monkeypatch.setattr(stopping, "read_activity", read)
     floor = bus("slide", drive("TMCM")), bus("stages", pmx("00"))
-    async with CellSession(tmp_path, *floor) as shop, shop.session.automations.run():
+    async with CellSession(tmp_path, *floor) as shop, automated(shop.session):
         for line in (*lines, "/sleep 1"):
             await shop.session.run(line)
         shop.session.interrupt()
@@ -351,7 +353,7 @@ async def test_a_single_stop_is_confirmed_by_two_readings_of_rest_in_a_row(lines
             seen.add(fate)
             await asyncio.sleep(0.01)
         assert Fate.STANDING in seen and (Fate.MOVING in seen) is (len(lines) > 1)
-        shop.session.automations.leave()
+        shop.session.automations.leave(shop.session.origin)
 
 
 @pytest.mark.parametrize("lines", [("SR0=1", "JY+"), ("JY+", "SR0=1")])
@@ -419,5 +421,5 @@ async def test_the_stop_of_a_person_is_what_it_was(tmp_path):
     async with CellSession(tmp_path, press(), bus("stages", pmx("00"), pmx("01"))) as shop:
         await typed(shop.session, "@press:a SL 50000", "@stages:00 JX+")
         shop.events.clear()
-        await shop.session.run("/stop", By.OPERATOR)
+        await shop.session.run("/stop", replace(shop.session.origin, by=By.OPERATOR))
         assert (shop.written("press"), shop.written("stages")) == (b"\x1b", b"@00ABORT\r")

@@ -11,6 +11,7 @@ from multidrop.base.errors import Differs, Inexpressible, NoAnswer, Refused, Sto
 from multidrop.drives.drive import Drive
 from multidrop.shell.sending import sending
 from multidrop.shell.session import Session
+from tests.support.automated import automated
 from tests.support.cell_session import bus, party, pmx, session_on
 
 pytestmark = pytest.mark.virtual
@@ -29,7 +30,7 @@ async def session(tmp_path: Path) -> AsyncIterator[Session]:
 
 
 def started(session: Session) -> set[str]:
-    automation = session.automations.current
+    automation = session.origin.automation
     assert automation is not None
     return {each.address for each in automation.started}
 
@@ -58,41 +59,41 @@ async def test_a_line_that_failed_counts_if_it_may_have_been_executed(
     session: Session, failure: Exception, sent: bool, parts: bool, counts: bool
 ) -> None:
     drive = session.drive("press", "a")
-    async with session.automations.run():
+    async with automated(session):
         with pytest.raises(type(failure)):
-            async with sending(session.automations, drive, "MR 5", starts=True, parts=parts):
+            async with sending(session.automations, session.origin, drive, "MR 5", starts=True, parts=parts):
                 assert started(session) == {"a"}
                 drive.commands += sent
                 raise failure
         assert started(session) == ({"a"} if counts else set())
-        session.automations.leave()
+        session.automations.leave(session.origin)
 
 
 async def test_a_refused_line_leaves_what_was_started_before_it(session: Session) -> None:
     drive, automations = session.drive("press", "a"), session.automations
-    async with automations.run():
-        async with sending(automations, drive, "MR 5", starts=True):
+    async with automated(session):
+        async with sending(automations, session.origin, drive, "MR 5", starts=True):
             pass
-        assert automations.current is not None
-        before = automations.current.started[drive]
+        assert session.origin.automation is not None
+        before = session.origin.automation.started[drive]
         with pytest.raises(Refused):
-            async with sending(automations, drive, "EX G9", starts=True):
-                assert automations.current.started[drive].what.program
+            async with sending(automations, session.origin, drive, "EX G9", starts=True):
+                assert session.origin.automation.started[drive].what.program
                 raise REFUSAL
-        assert automations.current.started == {drive: before} and not before.what.program
-        automations.leave()
+        assert session.origin.automation.started == {drive: before} and not before.what.program
+        automations.leave(session.origin)
 
 
 async def test_an_unsent_line_to_all_leaves_what_another_line_has_commanded_meanwhile(session: Session) -> None:
     every, other = session.drive("stages", "*"), session.drive("stages", "01")
-    async with session.automations.run():
+    async with automated(session):
         with pytest.raises(NoAnswer):
-            async with sending(session.automations, every, "X5", starts=True):
+            async with sending(session.automations, session.origin, every, "X5", starts=True):
                 assert started(session) == {"00", "01"}
                 other.commanded_at = session.now()
                 raise SILENCE
         assert started(session) == {"01"}
-        session.automations.leave()
+        session.automations.leave(session.origin)
 
 
 async def test_a_line_that_was_executed_as_program_mode_had_ended_counts(
@@ -100,15 +101,15 @@ async def test_a_line_that_was_executed_as_program_mode_had_ended_counts(
 ) -> None:
     drive, stores = session.drive("press", "a"), [True]
     monkeypatch.setattr(Drive, "stores", property(lambda each: stores[0]))
-    async with session.automations.run():
+    async with automated(session):
         for line, counted in (("PR P", set()), ("MR 5", {"a"})):
             stores[0] = True
             with pytest.raises(Refused):
-                async with sending(session.automations, drive, line, starts=False):
+                async with sending(session.automations, session.origin, drive, line, starts=False):
                     stores[0] = False
                     raise DOUBT
             assert started(session) == counted
-        session.automations.leave()
+        session.automations.leave(session.origin)
 
 
 @pytest.mark.parametrize(
@@ -119,7 +120,7 @@ async def test_after_a_stop_a_drive_that_refused_a_line_is_not_taken_for_started
 ) -> None:
     drive, halt = session.drive("press", "a"), session.buses["press"].stop()
     with pytest.raises(Refused):
-        async with session.path.starting(drive, "MR 5", parts=parts):
+        async with session.path.starting(session.origin, drive, "MR 5", parts=parts):
             assert halt.started_since(drive)
             raise failure
     assert halt.started_since(drive) is commanded

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import asyncio
 import re
+from dataclasses import replace
 from random import Random
 
 import pytest
@@ -23,6 +24,7 @@ from multidrop.families.tmcl.manual import commands
 from multidrop.macros import Macro, Step
 from multidrop.shell.events import By
 from multidrop.shell.line_syntax import DriveLine, parse
+from multidrop.shell.origin import PERSON
 from multidrop.shell.scripts.executor import play, run_script
 from multidrop.shell.scripts.reading import read_script
 from tests.support.cases import for_each
@@ -61,7 +63,7 @@ async def test_what_would_be_cut_is_refused_and_nothing_is_sent(tmp_path) -> Non
         for line in _lines():
             for by in (By.OPERATOR, By.SCRIPT):
                 with pytest.raises(DriveError) as caught:
-                    await shop.session.run(line, by)
+                    await shop.session.run(line, replace(shop.session.origin, by=by))
                 assert isinstance(caught.value, Inexpressible) and "\n" not in str(caught.value), line
         sent = [shop.written(name) for name in ("press", "alone", "stages", "lab")]
         assert sent == [b"", b"", b"", b""]
@@ -84,14 +86,24 @@ async def test_a_script_and_a_macro_are_refused_before_their_first_line(tmp_path
         for wrong in (each for each in _lines() if each.isascii() and each.isprintable() and " #" not in each):
             (tmp_path / "s.txt").write_text(f"@press:a MR 51200\n{wrong}\n", encoding="utf-8")
             with pytest.raises(Diagnostic, match=r"s.txt:2: "):
-                await run_script(shop.session, read_script(str(tmp_path / "s.txt"), {}))
+                await run_script(shop.session, PERSON, read_script(str(tmp_path / "s.txt"), {}))
             with pytest.raises(Diagnostic, match="go, step 2: "):
-                await play(shop.session, Macro("go", (Step(0.0, "@press:a MR 51200"), Step(0.0, wrong))), {})
+                await play(
+                    shop.session,
+                    PERSON,
+                    Macro("go", (Step(0.0, "@press:a MR 51200"), Step(0.0, wrong))),
+                    {},
+                )
         with pytest.raises(Diagnostic, match="go, step 2: .*# begins a comment"):
-            await play(shop.session, Macro("go", (Step(0.0, "@press:a MR 51200"), Step(0.0, "@press:a MR 5 # x"))), {})
+            await play(
+                shop.session,
+                PERSON,
+                Macro("go", (Step(0.0, "@press:a MR 51200"), Step(0.0, "@press:a MR 5 # x"))),
+                {},
+            )
         value = read_script(str(_written(tmp_path, "@press:a MR 51200\n@press:a MR {FAR}\n")), {"FAR": "51\\200"})
         with pytest.raises(Diagnostic, match="51\\\\200 would be read as 51; write 51200"):
-            await run_script(shop.session, value)
+            await run_script(shop.session, PERSON, value)
         await asyncio.sleep(1.0)
         assert b"MR" not in shop.written("press")
 
@@ -104,7 +116,11 @@ def _written(folder, text):
 @pytest.mark.virtual
 async def test_a_script_sends_a_text_with_a_number_sign_whole(tmp_path) -> None:
     async with CellSession(tmp_path, *CELL) as shop:
-        await run_script(shop.session, read_script(str(_written(tmp_path, '@press:a PR "part # 5" # six\n')), {}))
+        await run_script(
+            shop.session,
+            PERSON,
+            read_script(str(_written(tmp_path, '@press:a PR "part # 5" # six\n')), {}),
+        )
         assert shop.printed() == ["part # 5"]
 
 

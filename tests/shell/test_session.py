@@ -3,6 +3,7 @@
 import asyncio
 import contextlib
 import re
+from dataclasses import replace
 
 import pytest
 
@@ -111,7 +112,7 @@ async def test_an_address_at_the_head_of_a_command_is_refused_with_the_right_spe
         await both.run(line)
     assert both.written("press") == both.written("eth") == b""
     with pytest.raises(Diagnostic, match=re.escape(f"write {right}")):
-        await play(both.session, Macro("m", (Step(0.0, line),)), {})
+        await play(both.session, both.session.origin, Macro("m", (Step(0.0, line),)), {})
     assert both.written("press") == both.written("eth") == b""
 
 
@@ -260,7 +261,7 @@ async def test_after_an_accepted_quit_a_line_of_a_person_is_refused_and_a_macro_
         with pytest.raises(Diagnostic, match=f"multidrop is ending, so '{line}' was not sent"):
             await press.session.run(line)
     assert press.written("press") == b""
-    await press.session.run("PR P", By.MACRO)  # of its `on_early_end`
+    await press.session.run("PR P", replace(press.session.origin, by=By.MACRO))  # of its `on_early_end`
     await press.session.run("/stop")
     assert press.session.stops == 1
 
@@ -305,12 +306,12 @@ async def test_a_stop_latches_against_automation_but_not_against_a_person(press)
     session.stop()
     for by in (By.MACRO, By.SCRIPT):
         with pytest.raises(Stopped, match="/resume"):
-            await session.run("MR 100", by)
+            await session.run("MR 100", replace(session.origin, by=by))
     with pytest.raises(Stopped):
-        await session.run("/resume", By.SCRIPT)
+        await session.run("/resume", replace(session.origin, by=By.SCRIPT))
     await session.run("R1=5")
     await session.run("/resume")
-    await session.run("MR 100", By.SCRIPT)
+    await session.run("MR 100", replace(session.origin, by=By.SCRIPT))
     assert press.done == [("a", "R1=5"), ("a", "MR 100")]
 
 
@@ -492,7 +493,7 @@ async def agreed():
 @pytest.mark.parametrize("word", ["exit", "quit", "help", "?"])
 async def test_a_bare_word_of_a_script_or_a_pipe_is_refused_and_goes_to_no_drive(press, word, by):
     with pytest.raises(Diagnostic, match="not a command of a drive: .*; nothing was sent"):
-        await press.session.run(word, by)
+        await press.session.run(word, replace(press.session.origin, by=by))
     assert (press.done, press.heard(Sent)) == ([], [])
 
 

@@ -149,7 +149,7 @@ async def test_the_simulator_replies_like_the_machine(tmp_path):
 async def test_the_remarks_of_a_downloaded_file_are_kept(tmp_path):
     text = "' shuttle\nPG 1\nLB Ga   ' there\n\n  ' a step\n  MR 51200\n  H\nE\nPG\n"
     async with CellSession(tmp_path, bus("a", 'personality = "LMDCM"', baud=0)) as cell:
-        await transfers.download(cell.session, cell.session.drive(), "shuttle.mxt", text=text)
+        await transfers.download(cell.session, cell.session.origin, cell.session.drive(), "shuttle.mxt", text=text)
         await snapshots.save(cell.session, str(tmp_path / "one.toml"))
     first = (tmp_path / "one.toml").read_text()
     assert "PG 1\nLB Ga   ' there\n\n  ' a step\n  MR 51200\n  H\nE\nPG\n" in first

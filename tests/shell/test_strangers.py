@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import AsyncIterator, Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +17,7 @@ from multidrop.shell.channel import Front
 from multidrop.shell.configuration import Settings
 from multidrop.shell.events import FAILURES, By, Notified
 from multidrop.shell.session import Session
+from tests.support.automated import automated
 from tests.support.foreign_device import LEXIUM, Device, device
 from tests.support.until import until
 
@@ -64,21 +66,21 @@ async def test_a_person_writes_without_a_question_after_the_warning(session: Ses
 @pytest.mark.parametrize("line", ["MA 100", "SL 0", "/register 0x99 =5", "/coil 7 1"])
 async def test_automation_is_refused_also_beside_a_person(session: Session, plc: Device, by: By, line: str) -> None:
     with pytest.raises(Diagnostic, match="did not identify itself.*cannot ask, nothing was sent"):
-        await session.run(line, by)
+        await session.run(line, replace(session.origin, by=by))
     assert not plc.received
 
 
 async def test_what_is_refused_names_the_device_the_line_and_why(session: Session) -> None:
     for line, what in (("MA 100", "'MA 100' writes"), ("/coil 7 1", "'/coil 7 1' writes")):
         with pytest.raises(Diagnostic) as caught:
-            await session.run(line, By.SCRIPT)
+            await session.run(line, replace(session.origin, by=By.SCRIPT))
         assert str(caught.value).startswith(f"plc: {what}, and ")
 
 
 async def test_bytes_of_automation_on_a_raw_line_are_refused(session: Session, plc: Device) -> None:
     await session.run("/raw on")
     with pytest.raises(Diagnostic, match="did not identify itself"):
-        await session.run("/bytes 00", By.SCRIPT)
+        await session.run("/bytes 00", replace(session.origin, by=By.SCRIPT))
     assert not plc.received
 
 
@@ -113,8 +115,8 @@ async def test_the_early_end_of_a_script_that_was_agreed_to_stops_nothing_and_sa
 ) -> None:
     session.questions.agreed = True
     with pytest.raises(ZeroDivisionError):
-        async with session.automations.run("script x"):
-            await session.run("MA 100", By.SCRIPT)
+        async with automated(session, "script x"):
+            await session.run("MA 100", replace(session.origin, by=By.SCRIPT))
             raise ZeroDivisionError
     await asyncio.sleep(QUIET)
     assert plc.received == [MA]
@@ -123,8 +125,8 @@ async def test_the_early_end_of_a_script_that_was_agreed_to_stops_nothing_and_sa
 
 async def test_an_interruption_stops_nothing(session: Session, plc: Device) -> None:
     session.questions.agreed = True
-    async with session.automations.run("script x"):
-        await session.run("MA 100", By.SCRIPT)
+    async with automated(session, "script x"):
+        await session.run("MA 100", replace(session.origin, by=By.SCRIPT))
         session.interrupt()
     await asyncio.sleep(QUIET)
     assert plc.received == [MA] and len(said(session, "no stop was sent")) == 1

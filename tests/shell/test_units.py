@@ -3,12 +3,14 @@
 import asyncio
 import re
 from contextlib import asynccontextmanager
+from dataclasses import replace
 
 import pytest
 
 from multidrop.base.errors import Diagnostic, Differs, DriveError, Inexpressible, Refused, Stopped
 from multidrop.macros import Macro, Step
 from multidrop.shell.events import By, Notified
+from multidrop.shell.origin import PERSON
 from multidrop.shell.scripts.executor import play, run_script
 from multidrop.shell.scripts.reading import read_script
 from tests.support.cell_session import CellSession, bus, drive, party, pmx
@@ -349,7 +351,7 @@ async def test_a_move_that_leaves_the_travel_is_asked_about_and_yes_does_not_inc
         shop.session.questions.agreed = True
         for by in (By.OPERATOR, By.SCRIPT, By.MACRO):
             with pytest.raises(Diagnostic, match="the travel is 0 mm to 300 mm; .*nothing was sent; --beyond agrees"):
-                await shop.session.run(f"@a {line}", by)
+                await shop.session.run(f"@a {line}", replace(shop.session.origin, by=by))
         assert not moves(shop)
         asked = []
 
@@ -365,10 +367,10 @@ async def test_a_move_that_leaves_the_travel_is_asked_about_and_yes_does_not_inc
 async def test_beyond_agrees_beforehand_and_the_guard_can_be_off(tmp_path):
     async with opened(tmp_path, units={"a": ANCHORED}) as shop:
         shop.session.questions.beyond = True
-        await shop.session.run("@a MA {301 mm}", By.SCRIPT)
+        await shop.session.run("@a MA {301 mm}", replace(shop.session.origin, by=By.SCRIPT))
         assert moves(shop)
     async with opened(tmp_path, units={"a": ANCHORED}, guards=["TRAVEL"]) as shop:
-        await shop.session.run("@a MA {301 mm}", By.SCRIPT)
+        await shop.session.run("@a MA {301 mm}", replace(shop.session.origin, by=By.SCRIPT))
         assert moves(shop)
 
 
@@ -457,7 +459,7 @@ async def test_a_script_keeps_quantities_and_a_value_may_be_one(tmp_path):
     async with opened(tmp_path, units={"a": "5 mm/turn"}) as shop:
         script = read_script(str(file), {"X": "1 mm"})
         results = []
-        await run_script(shop.session, script, results.append)
+        await run_script(shop.session, shop.session.origin, script, results.append)
         assert moves(shop) == ["MR 10240", "MR 20480", "VM=102400"]
         assert "1 mm" in shop.printed()
 
@@ -472,12 +474,12 @@ async def test_a_condition_with_a_quantity_fails_and_is_refused_as_a_line_is(tmp
         ):
             (tmp_path / "one.txt").write_text(line)
             with pytest.raises((Diagnostic, DriveError)) as caught:
-                await run_script(shop.session, read_script(str(tmp_path / "one.txt"), {}), [].append)
+                await run_script(shop.session, PERSON, read_script(str(tmp_path / "one.txt"), {}), [].append)
             assert named in str(caught.value)
         await run(shop, "@a MS=128")
         (tmp_path / "one.txt").write_text("/assert @a P < {2.9 mm}")
         with pytest.raises(Differs, match="MS was 256 and is 128 now"):
-            await run_script(shop.session, read_script(str(tmp_path / "one.txt"), {}), [].append)
+            await run_script(shop.session, PERSON, read_script(str(tmp_path / "one.txt"), {}), [].append)
 
 
 async def test_a_recorded_macro_has_the_quantity_as_typed_and_plays_it(tmp_path):
@@ -487,8 +489,8 @@ async def test_a_recorded_macro_has_the_quantity_as_typed_and_plays_it(tmp_path)
         macro = shop.session.recorder.macro()
         assert [step.line for step in macro.steps] == ["@a MR {1 mm}", "/wait stopped"]
         shop.session.recorder.discard()
-        await play(shop.session, macro, {}, fast=True)
-        await play(shop.session, Macro("n", (Step(0.0, "@a MR {X}"),)), {"X": "2 mm"}, fast=True)
+        await play(shop.session, shop.session.origin, macro, {}, fast=True)
+        await play(shop.session, shop.session.origin, Macro("n", (Step(0.0, "@a MR {X}"),)), {"X": "2 mm"}, fast=True)
         assert moves(shop) == ["MR 10240", "MR 10240", "MR 20480"]
 
 

@@ -11,6 +11,7 @@ import pytest
 
 from multidrop.base.errors import Diagnostic, DriveError, Timeout
 from multidrop.dialects import Motion
+from multidrop.shell.origin import PERSON
 from multidrop.shell.waits import SIGNS, Condition, Standing, condition, in_motion, seconds, standings, wait
 from tests.support.cell_session import CellSession, bus, party, pmx
 
@@ -118,7 +119,7 @@ async def test_a_wait_that_runs_out_says_what_still_runs_and_how_long_it_waited(
 async def test_a_wait_names_itself_as_a_person_called_it(shop):
     await shop.session.run("@a SL 51200")
     with pytest.raises(Timeout, match=r"^MOVE: press:a still runs after 0\.5 s$"):
-        await wait(shop.session, 0.5, idle=False, drives=[shop.session.drive("press", "a")], said="MOVE")
+        await wait(shop.session, PERSON, 0.5, idle=False, drives=[shop.session.drive("press", "a")], said="MOVE")
 
 
 async def test_a_wait_is_for_the_drives_that_got_a_line(shop):

@@ -31,6 +31,7 @@ from multidrop.shell.channel import Front
 from multidrop.shell.configuration import Settings
 from multidrop.shell.events import By, Entered, Failed, Notified, OnBus, Printed, SessionEvent, StateChanged
 from multidrop.shell.line_syntax import Place, TypedLine, VerbLine
+from multidrop.shell.origin import PERSON, Origin
 from multidrop.shell.prompt.complete import Completion
 from multidrop.shell.roles import RunningPlot, Series
 from multidrop.shell.state.backups import Drafts
@@ -258,7 +259,7 @@ class FakeSession:
                     raise
                 failed(number, failure)
 
-    async def run(self, line: str, by: By = By.OPERATOR, since: int | None = None) -> None:
+    async def run(self, line: str, origin: Origin = PERSON, since: int | None = None) -> None:
         if since is not None and since != self.stops:
             raise Stopped(f"a stop came after '{line}' was typed; it was not sent")
         if line == "/stop":
@@ -268,8 +269,8 @@ class FakeSession:
         elif line.startswith("/page ") and self.front.screen is not None:
             await self.front.screen(line.split()[1])
         address = self.selected.address if self.selected else ""
-        self.emit(Entered(self.time, line, by, self.selected_bus, address))
-        self.lines.append((line, by))
+        self.emit(Entered(self.time, line, origin.by, self.selected_bus, address))
+        self.lines.append((line, origin.by))
         self.sent.append(f"{self.selected_bus}:{address} {line}")
         if self.gate is not None:
             await self.gate.wait()
@@ -282,7 +283,7 @@ class FakeSession:
             self.emit(Failed(self.time, self.refuses[line], self.selected_bus, address))
             raise DriveError(self.refuses[line])
 
-    def start(self, line: str | TypedLine, by: By = By.OPERATOR, since: int | None = None) -> asyncio.Task[bool]:
+    def start(self, line: str | TypedLine, origin: Origin = PERSON, since: int | None = None) -> asyncio.Task[bool]:
         text = line if isinstance(line, str) else line.typed
         if isinstance(line, VerbLine):
             self.shown.append(line.shown)
@@ -290,7 +291,7 @@ class FakeSession:
 
         async def quietly() -> bool:
             try:
-                await self.run(text, by, typed)
+                await self.run(text, origin, typed)
             except (DriveError, Diagnostic, TransportLost):
                 return False
             return True

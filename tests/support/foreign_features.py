@@ -26,17 +26,19 @@ from multidrop.base.foreign import guarded
 from multidrop.base.registry import Entry
 from multidrop.dialects.families import Dialect
 from multidrop.dialects.usb import UsbModule
-from multidrop.shell import configuration, hooks, plot_targets, relaying
+from multidrop.shell import configuration, plot_targets, relaying
+from multidrop.shell.at_session import AtSession
 from multidrop.shell.configuration import Settings
 from multidrop.shell.connect.scheme import Connection, NoLine, Scheme
 from multidrop.shell.connect.schemes import local_ports
 from multidrop.shell.connect.urls import parse
-from multidrop.shell.hooks import Added, AtSession, Options, Predicting, Switch
+from multidrop.shell.hooks import Added, Options, Predicting, Switch
 from multidrop.shell.operations.operation import Examples, Operation
 from multidrop.shell.operations.table import COMMANDS, VERBS
 from multidrop.shell.plot_targets import PlotTargets
 from multidrop.shell.relaying import Lent
 from multidrop.shell.sections import Section, sections
+from multidrop.shell.session import begin
 from multidrop.simulator import cells
 from multidrop.simulator.cell.endpoint_kinds import EndpointKind, kind_of
 from multidrop.simulator.declared import Demo, Simulated
@@ -146,7 +148,7 @@ def _of_scheme(name: str, *given: Any) -> Callable[[Any, Scheme], Any]:
 CONNECTION = parse("tcp://127.0.0.1:1")
 Call = Callable[[Any, Any], Any]
 CALLS: Mapping[tuple[type, str], Call] = {
-    (AtSession, "begin"): lambda session, record: hooks.begin(session),
+    (AtSession, "begin"): lambda session, record: begin(session),
     (EndpointKind, "open"): _serve,
     (EndpointKind, "remark"): lambda session, record: kind_of("slow").remark("slow://h:1"),  # type: ignore[union-attr,misc]
     (Lent, "lend"): lambda session, record: relaying.lender("slow:1").lend("1"),  # type: ignore[union-attr]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Coroutine
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +12,7 @@ import pytest
 from multidrop.macros import Macro, Step
 from multidrop.shell.configuration import Settings
 from multidrop.shell.events import By, Entered
+from multidrop.shell.origin import PERSON
 from multidrop.shell.scripts.executor import play
 from multidrop.shell.scripts.model import Ending, Result
 from multidrop.shell.session import Session
@@ -33,7 +35,7 @@ class Shop(CellSession):
         return macro
 
     async def play(self, macro: Macro, values: dict[str, str] | None = None, **manner: object) -> None:
-        await play(self.session, macro, values or {}, executed=self.executed, ended=self.ended, **manner)  # type: ignore[arg-type]
+        await play(self.session, PERSON, macro, values or {}, executed=self.executed, ended=self.ended, **manner)  # type: ignore[arg-type]
 
     def executed(self, result: Result) -> None:
         self.results.append(result)
@@ -56,7 +58,7 @@ def macro_runner(folder: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[...,
         session = Session(Settings(folder=folder, state=folder))
         try:
             await session.open("sim:#press")
-            await session.run(line, by=by)
+            await session.run(line, replace(session.origin, by=by))
         finally:
             await session.close()
 

@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from multidrop.base.errors import MotionFailed
+from multidrop.shell.origin import PERSON
 from multidrop.shell.session import Session
 from tests.support.cell_session import bus, drive, pmx, session_on
 
@@ -17,9 +18,9 @@ SWITCHES = "[bus.drive.world.x]\nlimit_plus = 3000\nlimit_minus = -3000\nhome = 
 
 async def sent(session: Session, *lines: str) -> None:
     """Run lines as one automation, as `send` does."""
-    async with session.automations.run():
+    async with session.automations.run(PERSON) as origin:
         for line in lines:
-            await session.run(line)
+            await session.run(line, origin)
 
 
 async def failed(session: Session, *lines: str) -> MotionFailed:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import re
+from dataclasses import replace
 from pathlib import Path
 
 from multidrop.base.errors import Diagnostic, DriveError, TransportLost
@@ -30,7 +31,7 @@ async def said(shop: CellSession, line: str, by: By = By.OPERATOR) -> list[str]:
     shop.events.clear()
     refused = []
     try:
-        await shop.session.run(line, by)
+        await shop.session.run(line, replace(shop.session.origin, by=by))
     except (Diagnostic, DriveError, TransportLost) as error:
         refused = [f"x {error}"]
     return [*texts(shop), *refused]

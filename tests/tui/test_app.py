@@ -342,7 +342,7 @@ async def test_a_small_terminal_says_so_and_comes_back_by_itself() -> None:
 async def test_a_bug_is_not_hidden(monkeypatch: pytest.MonkeyPatch) -> None:
     session = demo_session()
 
-    async def run(line: str, by: By = By.OPERATOR, since: int | None = None) -> None:
+    async def run(line: str, origin: object = None, since: int | None = None) -> None:
         raise ZeroDivisionError("a bug")
 
     monkeypatch.setattr(session, "run", run)

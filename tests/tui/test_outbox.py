@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from multidrop.shell.events import By
+from multidrop.shell.origin import PERSON
 from multidrop.tui.outbox import BURST, Outbox
 from tests.support.fake_session import FakeSession, demo_session
 
@@ -28,8 +28,8 @@ class Box:
         self.outbox = Outbox(self.session, self.told.append, self._watch)
         run = self.session.run
 
-        async def slow(line: str, by: By = By.OPERATOR, since: int | None = None) -> None:
-            await run(line, by, since)
+        async def slow(line: str, origin: object = None, since: int | None = None) -> None:
+            await run(line, PERSON, since)
             await asyncio.sleep(next((s for word, s in self.takes.items() if word in line), 0.0))
 
         self.session.run = slow  # type: ignore[method-assign]
@@ -109,9 +109,9 @@ async def test_a_refusal_drops_what_was_waiting_when_it_came() -> None:
     box.session.refuses["BAD"] = "a: no answer"
     run = box.session.run
 
-    async def refused_late(line: str, by: By = By.OPERATOR, since: int | None = None) -> None:
+    async def refused_late(line: str, origin: object = None, since: int | None = None) -> None:
         await asyncio.sleep(2.0 if line == "BAD" else 0.0)
-        await run(line, by, since)
+        await run(line, PERSON, since)
 
     box.session.run = refused_late  # type: ignore[method-assign]
     await box.type("BAD", "MR 2", apart=LATER)
@@ -143,9 +143,9 @@ async def test_a_line_carries_the_count_of_stops_of_its_enter() -> None:
 
 
 def note(typed: list[int | None], start: Callable[..., Any]) -> Callable[..., Any]:
-    def noting(line: str, by: By = By.OPERATOR, since: int | None = None) -> Any:
+    def noting(line: str, origin: object = None, since: int | None = None) -> Any:
         typed.append(since)
-        return start(line, by, since)
+        return start(line, PERSON, since)
 
     return noting
 

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from random import Random
 
 from multidrop.shell.events import FAILURES
+from multidrop.shell.origin import PERSON
 from multidrop.shell.scripts.executor import run_script
 from multidrop.shell.scripts.reading import read_script
 from soak.simulation.acts.act import Act
@@ -244,7 +245,7 @@ def script(world: World, rng: Random) -> None:
         session = world.session
         with contextlib.suppress(*FAILURES, asyncio.CancelledError):
             read = read_script(run.typed, {}, session.macros)
-            await watched(world, run, session.tasks.run(run_script(session, read)))
+            await watched(world, run, session.tasks.run(run_script(session, PERSON, read)))
 
     world.beside(work())
     end(world, rng)

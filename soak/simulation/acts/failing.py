@@ -11,6 +11,7 @@ import contextlib
 from random import Random
 
 from multidrop.shell.events import FAILURES
+from multidrop.shell.origin import PERSON
 from multidrop.shell.scripts.executor import run_script
 from multidrop.shell.scripts.reading import read_script
 from soak.simulation.acts.act import Act
@@ -58,7 +59,7 @@ def failing(world: World, rng: Random) -> float:
         with contextlib.suppress(*FAILURES, asyncio.CancelledError):
             read = read_script(run.typed, {}, session.macros)
             try:
-                await watched(world, run, session.tasks.run(run_script(session, read)))
+                await watched(world, run, session.tasks.run(run_script(session, PERSON, read)))
             finally:
                 awaited = Awaited(run, (place.name, drive, PHRASES[place.language].value.format(value)), goal)
                 awaited.position = device.position(world.floor.now())

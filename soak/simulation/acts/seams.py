@@ -16,9 +16,9 @@ import multidrop.shell.macro_changes
 import multidrop.shell.macro_recording
 import multidrop.shell.prompt.terminal_input
 import multidrop.shell.scripts.executor
+import multidrop.shell.session
 import multidrop.shell.snapshots
 import multidrop.shell.verbs.buses
-import multidrop.shell.verbs.call
 import multidrop.shell.verbs.explaining
 import multidrop.shell.verbs.macros
 import multidrop.shell.verbs.programs

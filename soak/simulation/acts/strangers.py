@@ -18,6 +18,7 @@ from multidrop.families.lexium.manual.modbus.registers import REGISTERS
 from multidrop.shell.channel import Front
 from multidrop.shell.configuration import Settings
 from multidrop.shell.events import FAILURES, By
+from multidrop.shell.origin import Origin
 from multidrop.shell.session import Session
 from soak.simulation.acts.act import Act
 from soak.simulation.records.told import Strange
@@ -109,13 +110,13 @@ class Visit:
         """Let lines be sent by themselves, agreed to or not, and end that early."""
         self.session.questions.agreed = agreed = self._rng.random() < 0.7
         try:
-            async with self.session.automations.run("script x"):
+            async with self.session.automations.run(Origin(By.SCRIPT), "script x") as origin:
                 for _ in range(self._rng.randrange(1, 3)):
                     line = self._line(agreed)
-                    await self.session.run(line, By.SCRIPT)
+                    await self.session.run(line, origin)
                 if self._rng.random() < 0.3:
                     self.session.interrupt()
-                await self.session.run("/fail of the script", By.SCRIPT)
+                await self.session.run("/fail of the script", origin)
         finally:
             self.session.questions.agreed = False
 

@@ -23,6 +23,7 @@ from multidrop.dialects.units import scale
 from multidrop.shell.channel import Front
 from multidrop.shell.configuration import Guarding, SavedConnection, Settings
 from multidrop.shell.events import FAILURES, Notified, Output
+from multidrop.shell.origin import PERSON
 from multidrop.shell.scripts.executor import run_script
 from multidrop.shell.scripts.reading import read_script
 from multidrop.shell.session import Session
@@ -160,7 +161,9 @@ class Workshop:
         file = self.folder / f"s{len(self.said)}.txt"
         file.write_text("\n".join(lines))
         try:
-            await self.session.tasks.run(run_script(self.session, read_script(str(file), {}, self.session.macros)))
+            await self.session.tasks.run(
+                run_script(self.session, PERSON, read_script(str(file), {}, self.session.macros))
+            )
         except (*FAILURES, asyncio.CancelledError) as failure:
             return str(failure) or type(failure).__name__
         return ""

@@ -31,7 +31,8 @@ SHARED = {
     "multidrop.drives.line": ("Line",),
     "multidrop.drives.roster": ("Roster",),
     "multidrop.shell.workspace": ("Workspace",),
-    "multidrop.shell.session": ("Session", "LinePath"),
+    "multidrop.shell.session": ("Session", "VerbPath"),
+    "multidrop.shell.line_path": ("LinePath",),
     "multidrop.shell.prompt.keyboard": ("Keyboard",),
     "multidrop.shell.prompt.line_queue": ("LineQueue",),
 }

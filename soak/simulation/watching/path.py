@@ -1,8 +1,8 @@
 """What the acts at the prompt come to, watched where each line and each verb of a session passes.
 
-Typed lines and those of macros and scripts go one way (`Session.run`, `LinePath`). Here each is told from the other: a
-line for a drive in program mode is stored, a text for a line in raw mode is only written, and a verb that works by
-itself has an end, after which its drives are looked at.
+Typed lines and those of macros and scripts go one way (`Session.run`, then `LinePath` or `VerbPath`). Here each is told
+from the other: a line for a drive in program mode is stored, a text for a line in raw mode is only written, and a verb
+that works by itself has an end, after which its drives are looked at.
 """
 
 from __future__ import annotations
@@ -13,9 +13,10 @@ from collections.abc import Awaitable
 from typing import TYPE_CHECKING, Any
 
 from multidrop.base.errors import Diagnostic, DriveError
-from multidrop.shell.events import By
+from multidrop.shell.line_path import LinePath
 from multidrop.shell.line_syntax import DriveLine, VerbLine
-from multidrop.shell.session import LinePath
+from multidrop.shell.origin import Origin
+from multidrop.shell.session import VerbPath
 from soak.simulation.records.history import Executed
 from soak.simulation.records.phrases import PHRASES
 from soak.simulation.records.told import Put, Run
@@ -40,23 +41,14 @@ class WatchedPath(LinePath):
     """The way of the lines of a session, watched."""
 
     def __init__(self, session: Session, world: World) -> None:
-        super().__init__(session)
+        super().__init__(session, session.automations, session.units)
         self._world = world
 
-    async def verb(self, parsed: VerbLine, by: By) -> None:
-        """Run a verb; one that works by itself has an end."""
-        told = self._world.history.told
-        if parsed.name == "/resume":
-            told.latches.append((self._world.loop.now, False))
-        run = told.runs.get(parsed.typed.strip())
-        work = super().verb(parsed, by)
-        await (work if run is None else watched(self._world, run, work))
-
-    async def text(self, parsed: DriveLine, by: By) -> None:
+    async def text(self, parsed: DriveLine, origin: Origin) -> None:
         """Pass a text on; note it where it is stored, or written as it is."""
-        put = self._put(parsed)
+        put = self._put(parsed, origin)
         try:
-            await super().text(parsed, by)
+            await super().text(parsed, origin)
         except BaseException:
             if put is not None:
                 put.sent = False
@@ -64,11 +56,11 @@ class WatchedPath(LinePath):
         if put is not None:
             put.sent = True
 
-    def _put(self, parsed: DriveLine) -> Put | None:
-        session, history = self._session, self._world.history
+    def _put(self, parsed: DriveLine, origin: Origin) -> Put | None:
+        session, history = self._workspace, self._world.history
         typed = parsed.typed.strip()
         with contextlib.suppress(Diagnostic, DriveError):
-            bus = session.bus(parsed.bus)
+            bus = session.bus(origin.played(parsed.bus))
             if bus.name in session.raw:
                 history.commands.pop(typed, None)
                 put = Put(session.now(), bus.name, "", str(parsed.text))
@@ -84,6 +76,23 @@ class WatchedPath(LinePath):
                 history.told.stored.append(put)
                 return put
         return None
+
+
+class WatchedVerbs(VerbPath):
+    """The way of the verbs of a session, watched."""
+
+    def __init__(self, session: Session, world: World) -> None:
+        super().__init__(session)
+        self._world = world
+
+    async def run(self, parsed: VerbLine, origin: Origin) -> None:
+        """Run a verb; one that works by itself has an end."""
+        told = self._world.history.told
+        if parsed.name == "/resume":
+            told.latches.append((self._world.loop.now, False))
+        run = told.runs.get(parsed.typed.strip())
+        work = super().run(parsed, origin)
+        await (work if run is None else watched(self._world, run, work))
 
 
 async def watched(world: World, run: Run, work: Awaitable[Any]) -> None:

@@ -17,7 +17,7 @@ from multidrop.shell.workspace import LATCHED
 from soak.judge import Word, word
 from soak.simulation.records.commands import Command, Outcome
 from soak.simulation.system.process import Process
-from soak.simulation.watching.path import WatchedPath, examine_before_a_stop
+from soak.simulation.watching.path import WatchedPath, WatchedVerbs, examine_before_a_stop
 from soak.simulation.world import World
 
 WORDS = {
@@ -55,7 +55,7 @@ class WatchedSession(Session):
     def __init__(self, settings: Settings, world: World, process: Process | None = None) -> None:
         super().__init__(settings, reconnect=True)
         self._world, self._process = world, process
-        self.path = WatchedPath(self, world)
+        self.path, self.verbs = WatchedPath(self, world), WatchedVerbs(self, world)
 
     @property
     def _dead(self) -> bool:

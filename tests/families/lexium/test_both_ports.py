@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 from contextlib import AsyncExitStack
+from dataclasses import replace
 
 import pytest
 
@@ -16,6 +17,7 @@ from multidrop.simulator.cells import load
 from multidrop.simulator.floor import Floor
 from multidrop.simulator.serving.endpoints import serve_bus
 from multidrop.simulator.serving.running import RunningFloor
+from tests.support.automated import automated
 from tests.support.until import PATIENCE
 
 CELL = """
@@ -223,7 +225,7 @@ async def test_a_stop_ends_program_and_motion_and_is_seen_to_work(session):
     session.buses = {"modbus": bus}
     session.stop()
     with pytest.raises(Stopped):
-        await session.run("@modbus: MR 5", by=By.MACRO)
+        await session.run("@modbus: MR 5", replace(session.origin, by=By.MACRO))
     async with asyncio.timeout(PATIENCE):
         await bus.stopped()
     sent = [e.event.data for e in session.events if isinstance(e, OnBus) and isinstance(e.event, Traffic)]
@@ -282,7 +284,7 @@ async def test_a_refused_line_ends_no_program_and_no_motion(session, line):
     await session.run("/use modbus")
     session.events.clear()
     with pytest.raises(FAILURES):
-        async with session.automations.run():
+        async with automated(session):
             await session.run(line)
     assert await answers(session, "PR BY", "mcode") == ["1"]
     assert await answers(session, "PR V", "mcode") == ["20000"]
@@ -295,7 +297,7 @@ async def test_an_accepted_write_that_moves_counts_and_the_program_is_named(sess
     await session.run("/use modbus")
     assert await answers(session, "PR BY", "modbus") == ["1"]
     with pytest.raises(FAILURES):
-        async with session.automations.run():
+        async with automated(session):
             for each in (line, "/sleep 0.2", "RC=200"):
                 await session.run(each)
     told = [event.text for event in session.events if isinstance(event, Notified) and event.warning]
@@ -308,7 +310,7 @@ async def test_a_write_that_starts_nothing_leaves_a_program_alone(session, line)
     await session.run("@mcode: EX A3")
     await session.run("/use modbus")
     with pytest.raises(FAILURES):
-        async with session.automations.run():
+        async with automated(session):
             for each in (line, "RC=200"):
                 await session.run(each)
     assert await answers(session, "PR BY", "mcode") == ["1"]

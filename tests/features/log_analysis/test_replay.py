@@ -15,6 +15,7 @@ from multidrop.features.log_analysis.replay import replay
 from multidrop.shell.log.files import BEGIN, KINDS, Entry, line_of
 from multidrop.shell.log.steps import compared, read
 from multidrop.shell.log.writer import SessionLog
+from tests.support.automated import automated
 from tests.support.cell_session import CellSession, bus, party
 from tests.support.virtual import in_virtual_time
 
@@ -117,7 +118,7 @@ async def test_numbers_of_a_drive_that_may_move_are_not_compared_until_a_wait(tm
 
 async def test_what_it_moved_is_stopped_at_the_end(tmp_path):
     async with Cell(tmp_path, PRESS) as cell:
-        async with cell.session.automations.run():
+        async with automated(cell.session):
             await taken(cell, tmp_path, typed("SL 20000"))
         assert cell.moving() == set() and "SL 20000" in cell.lines()[0]
 

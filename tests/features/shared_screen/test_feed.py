@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -48,6 +49,6 @@ async def test_a_watchers_stop_stops_every_drive_and_latches_macros_and_scripts(
             await session.run("/play m")
         for by in (By.MACRO, By.SCRIPT):
             with pytest.raises(Stopped):
-                await session.run("@press:a MR 5", by)
+                await session.run("@press:a MR 5", replace(session.origin, by=by))
         await session.run("/resume")
-        await session.run("@press:a MR 5", By.SCRIPT)
+        await session.run("@press:a MR 5", replace(session.origin, by=By.SCRIPT))

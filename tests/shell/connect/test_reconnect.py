@@ -420,7 +420,7 @@ async def test_a_drive_that_is_restarted_is_said_and_found_as_it_was_saved(
 async def test_a_macro_ends_with_the_loss_and_its_drive_is_stopped_on_return(tmp_path: Path) -> None:
     async with opened(tmp_path, bus("line", party("a", ES=3), party("b", ES=3))) as shop:
         macro = Macro("go", (Step(0.0, "@a SL 20000"), Step(0.0, "/wait stopped 60")))
-        playing = asyncio.create_task(play(shop.session, macro, {}))
+        playing = asyncio.create_task(play(shop.session, shop.session.origin, macro, {}))
         await asyncio.sleep(1.0)
         await shop.session.run("@b SL 10000")
         await lost(shop)

@@ -1,6 +1,7 @@
 """A line of which nothing is known, or that is not there: it keeps its place, says what came, and is searched there."""
 
 import asyncio
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -238,7 +239,7 @@ async def test_stated_drives_that_are_off_are_asked_again_by_themselves(tmp_path
 async def test_a_script_opens_no_line_without_drives(tmp_path, monkeypatch):
     async with Desk(tmp_path, monkeypatch, ttyUSB9=bus("b", party("a"), baud=19200)) as desk:
         with pytest.raises(NoAnswer, match="no drive replies"):
-            await desk.session.run(f"/open {PORT}", by=By.SCRIPT)
+            await desk.session.run(f"/open {PORT}", replace(desk.session.origin, by=By.SCRIPT))
         assert not desk.session.buses
 
 

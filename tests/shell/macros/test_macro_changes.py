@@ -36,7 +36,7 @@ async def run(session: Session, *lines: str, by: By = By.OPERATOR) -> list[str]:
     told: list[str] = []
     leave = session.subscribe(lambda event: told.append(event.text) if isinstance(event, Notified | Output) else None)
     for line in lines:
-        await session.run(line, by)
+        await session.run(line, replace(session.origin, by=by))
     leave()
     return told
 

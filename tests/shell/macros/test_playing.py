@@ -179,7 +179,7 @@ async def test_a_script_that_calls_a_macro_is_checked_with_its_roles_and_its_end
         (tmp_path / "s.txt").write_text(f"@press:a MR 7000\n/call {name}\n")
         script = read_script(str(tmp_path / "s.txt"), {}, shop.session.macros)
         with pytest.raises(Diagnostic, match=said):
-            await run_script(shop.session, script)
+            await run_script(shop.session, shop.session.origin, script)
     assert shop.written("press") == b""
 
 

@@ -17,6 +17,7 @@ from multidrop.shell.scripts.executor import play, run_script
 from multidrop.shell.scripts.model import Ending
 from multidrop.shell.scripts.reading import read_script
 from multidrop.shell.streams.stdout import report
+from tests.support.automated import automated
 from tests.support.macro_shop import Shop
 
 pytestmark = pytest.mark.virtual
@@ -243,7 +244,7 @@ async def test_a_connection_that_is_lost_while_no_line_uses_it_ends_it_at_once(
         macro = shop.save("m", *lines, on_early_end=("@press:a PR 2",))
         (tmp_path / "s.txt").write_text("\n".join(lines))
         script = read_script(str(tmp_path / "s.txt"), {})
-        work = shop.play(macro) if kind == "macro" else run_script(shop.session, script)
+        work = shop.play(macro) if kind == "macro" else run_script(shop.session, shop.session.origin, script)
         playing = asyncio.create_task(work)
         await asyncio.sleep(0.5)
         shop.world("/sim unplug gantry")
@@ -275,8 +276,8 @@ async def test_a_script_that_plays_a_macro_runs_its_on_stop_and_reports_both(tmp
     (tmp_path / "s.txt").write_text("@gantry:c SL 100\n/play m\n")
     script = read_script(str(tmp_path / "s.txt"), {}, shop.session.macros)
     with pytest.raises(DriveError) as caught:
-        async with shop.session.automations.run():
-            await run_script(shop.session, script, shop.executed)
+        async with automated(shop.session):
+            await run_script(shop.session, shop.session.origin, script, shop.executed)
     assert [note.partition(" (")[0] for note in caught.value.__notes__] == [
         "macro m, step 2",
         f"{tmp_path}{os.sep}s.txt:2",
@@ -297,7 +298,9 @@ async def test_the_json_of_a_macro_names_macro_step_and_round_and_its_end(
         macro = shop.save("m", "@press:a PR 1", '/expect "2" 0', on_early_end=("/print x",))
         told = Report("macro m", as_json=True, junit=str(tmp_path / "r.xml"))
         with pytest.raises(DriveError):
-            await play(shop.session, macro, {}, times=None, executed=told.executed, ended=told.ended)
+            await play(
+                shop.session, shop.session.origin, macro, {}, times=None, executed=told.executed, ended=told.ended
+            )
         assert told.finish(1) == 1
         objects = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
     first, second, third, last = objects

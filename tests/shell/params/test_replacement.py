@@ -12,6 +12,7 @@ from multidrop.base.errors import Diagnostic, DriveError, Refused, Stopped, Tran
 from multidrop.drives.events import Traffic
 from multidrop.shell import snapshots
 from multidrop.shell.operations.argument_types import Restoring
+from multidrop.shell.origin import PERSON
 from multidrop.shell.params import replacement
 from multidrop.simulator import cells
 from tests.support.cell_session import CellSession, bus
@@ -57,7 +58,7 @@ async def applied(cell: CellSession, folder: Path, source: str = "b", **wanted: 
     drive = cell.session.drive()
     spec = replacement.chosen(machine, "machine.toml", drive, source)
     asked = Restoring(**wanted)  # type: ignore[arg-type]
-    await replacement.apply(cell.session, drive, "machine.toml", spec, asked)
+    await replacement.apply(cell.session, PERSON, drive, "machine.toml", spec, asked)
 
 
 @pytest.mark.parametrize("present", [FRESH, OTHER, OTHER + '\nname = "x"\nparty = true'])
@@ -115,11 +116,11 @@ async def test_a_drive_that_changed_during_the_question_gets_nothing(tmp_path, c
 
         cell.session.questions.agreed, cell.session.front.ask = False, ask
         if not change:
-            await replacement.apply(cell.session, drive, "m", spec, Restoring())
+            await replacement.apply(cell.session, PERSON, drive, "m", spec, Restoring())
             assert drive.commands > sent[0]
             return
         with pytest.raises(Refused, match="it changed since the question was asked; nothing was sent; try again"):
-            await replacement.apply(cell.session, drive, "m", spec, Restoring())
+            await replacement.apply(cell.session, PERSON, drive, "m", spec, Restoring())
         assert drive.commands == sent[0]
 
 
@@ -130,7 +131,7 @@ async def test_without_a_yes_nothing_is_sent(tmp_path):
         spec = replacement.chosen(cells.load(tmp_path / "machine.toml"), "m", drive, "b")
         cell.session.questions.agreed = False
         with pytest.raises(Diagnostic, match="nothing was sent; --yes agrees to it"):
-            await replacement.apply(cell.session, drive, "m", spec, Restoring())
+            await replacement.apply(cell.session, PERSON, drive, "m", spec, Restoring())
         assert drive.commands == 0
 
 
@@ -168,9 +169,9 @@ async def test_what_could_move_the_motor_is_left_alone_and_said(tmp_path):
         drive = cell.session.drive()
         spec = replacement.chosen(cells.load(tmp_path / "m.toml"), "m.toml", drive, "b")
         with pytest.raises(DriveError, match="is not as 'b' in m.toml: AS 0, in the file 1"):
-            await replacement.apply(cell.session, drive, "m.toml", spec, Restoring())
+            await replacement.apply(cell.session, PERSON, drive, "m.toml", spec, Restoring())
         assert any("AS is left alone: it can turn the motor" in line for line in cell.printed())
-        await replacement.apply(cell.session, drive, "m.toml", spec, Restoring(named=frozenset({"AS"})))
+        await replacement.apply(cell.session, PERSON, drive, "m.toml", spec, Restoring(named=frozenset({"AS"})))
 
 
 @pytest.mark.slow
@@ -243,7 +244,7 @@ async def becomes(folder: Path, machine: str, present: str, name: str, **named: 
     drive = cell.session.drive()
     spec = replacement.chosen(cells.load(folder / "machine.toml"), "machine.toml", drive, name)
     asked = Restoring(**named)  # type: ignore[arg-type]
-    await replacement.apply(cell.session, drive, "machine.toml", spec, asked)
+    await replacement.apply(cell.session, PERSON, drive, "machine.toml", spec, asked)
     return cell
 
 

@@ -12,6 +12,7 @@ from multidrop.base.errors import Diagnostic, DriveError, Refused, Stopped
 from multidrop.drives.events import Traffic
 from multidrop.shell.events import Notified, Output
 from multidrop.shell.operations.argument_types import Restoring
+from multidrop.shell.origin import PERSON
 from multidrop.shell.params import replacement
 from multidrop.simulator import cells
 from tests.support.cell_session import CellSession, bus, drive, party
@@ -31,7 +32,7 @@ async def applied(cell: CellSession, folder: Path, text: str, source: str = "", 
     cell.session.questions.agreed = True
     here = cell.session.drive()
     spec = replacement.chosen(cells.load(folder / "m.toml"), "m.toml", here, source)
-    await replacement.apply(cell.session, here, "m.toml", spec, Restoring(**wanted))
+    await replacement.apply(cell.session, PERSON, here, "m.toml", spec, Restoring(**wanted))
 
 
 def told(cell: CellSession) -> list[str]:
@@ -208,7 +209,7 @@ async def test_the_question_says_in_short_what_it_gets_and_a_no_writes_nothing(t
         cell.session.questions.agreed, cell.session.front.ask = False, ask
         spec = replacement.chosen(cells.load(tmp_path / "m.toml"), "m.toml", cell.session.drive(), "")
         with pytest.raises(Diagnostic, match="the answer was no, so it was not done"):
-            await replacement.apply(cell.session, cell.session.drive(), "m.toml", spec, Restoring())
+            await replacement.apply(cell.session, PERSON, cell.session.drive(), "m.toml", spec, Restoring())
         assert len(questions) == 1 and questions[0].startswith(f"{asked}")
         assert cell.session.drive().commands == 0
 
@@ -361,9 +362,9 @@ async def test_after_a_yes_it_is_applied_unless_the_drive_changed_or_began_to_mo
         here = cell.session.drive()
         spec = replacement.chosen(cells.load(tmp_path / "m.toml"), "m.toml", here, "")
         if not refused:
-            await replacement.apply(cell.session, here, "m.toml", spec, Restoring())
+            await replacement.apply(cell.session, PERSON, here, "m.toml", spec, Restoring())
             assert told(cell)[-1] == "= line: verified: it is as '!' in m.toml"
             return
         with pytest.raises(Refused) as caught:
-            await replacement.apply(cell.session, here, "m.toml", spec, Restoring())
+            await replacement.apply(cell.session, PERSON, here, "m.toml", spec, Restoring())
         assert refused in str(caught.value) and here.commands == 0

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+from dataclasses import replace
 from pathlib import Path
 from random import Random
 from typing import Any
@@ -16,6 +17,7 @@ from multidrop.families.lexium.host.mcode.debugging import MCodeDebugging
 from multidrop.families.lexium.host.mcode.state import MCodeState
 from multidrop.shell.events import FAILURES, By
 from multidrop.simulator.cell.spec import Faults
+from tests.support.automated import automated
 from tests.support.cell_session import CellSession, bus
 from tests.support.debugged import cell, ethernet, keys, out, run, serial
 
@@ -130,9 +132,9 @@ async def test_a_script_that_ends_early_stops_the_drive_that_it_stepped(tmp_path
     async with CellSession(tmp_path, bus("line", serial("!", party=False), baud=0)) as it:
         session = it.session
         with pytest.raises(Refused):
-            async with session.automations.run():
+            async with automated(session):
                 for line in ("/step K2", "/step", "/step", "/step"):
-                    await session.run(line, By.SCRIPT)
+                    await session.run(line, replace(session.origin, by=By.SCRIPT))
         await asyncio.sleep(1)
         assert not it.moving() and not it.device("line:!").running
         assert any(text.startswith("stopped line") for text in it.told())
@@ -142,8 +144,8 @@ async def test_a_script_that_only_tried_to_step_stops_nothing(tmp_path: Path) ->
     async with CellSession(tmp_path, bus("line", ethernet(), baud=0)) as it:
         await run(it, "SL 20000")
         with pytest.raises(Refused):
-            async with it.session.automations.run():
-                await it.session.run("/step", By.SCRIPT)
+            async with automated(it.session):
+                await it.session.run("/step", replace(it.session.origin, by=By.SCRIPT))
         await asyncio.sleep(1)
         assert it.moving() == {"line:!"}
 
@@ -153,7 +155,7 @@ async def test_a_latched_session_steps_for_a_person_only(tmp_path: Path) -> None
         it.session.stop()
         await asyncio.sleep(2)
         with pytest.raises(Stopped):
-            await it.session.run("/step G1", By.SCRIPT)
+            await it.session.run("/step G1", replace(it.session.origin, by=By.SCRIPT))
         await run(it, "/step G1", "/step")
         assert it.device("line:!").thread.stepping
 

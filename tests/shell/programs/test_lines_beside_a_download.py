@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -30,7 +31,7 @@ async def test_a_macro_sends_no_line_that_asks_first(tmp_path: Path) -> None:
         task = await downloading(cell, tmp_path)
         cell.session.questions.agreed = False
         with pytest.raises(Diagnostic, match="DN"):
-            await cell.session.run('@a DN="z"', By.MACRO)
+            await cell.session.run('@a DN="z"', replace(cell.session.origin, by=By.MACRO))
         await task
         assert b'DN="z"' not in cell.written("line")
 
@@ -40,7 +41,7 @@ async def test_a_move_counts_as_a_start(tmp_path: Path) -> None:
         task = await downloading(cell, tmp_path)
         drive = cell.session.drive("line", "a")
         assert drive.programming and not drive.stores and drive.starts("SL 5000")
-        await cell.session.run("@a SL 5000", By.MACRO)
+        await cell.session.run("@a SL 5000", replace(cell.session.origin, by=By.MACRO))
         await task
         assert cell.moving() == {"line:a"} and not drive.programming
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -45,7 +46,7 @@ async def test_nothing_is_sent_of_a_file_with_a_line_that_acts(tmp_path: Path) -
                     await load(shop, tmp_path)
                 for by in (By.SCRIPT, By.MACRO):
                     with pytest.raises(Diagnostic, match=f"a {by.value} cannot ask, nothing was sent"):
-                        await shop.session.run(f"/download {tmp_path / 'p.mxt'} a", by)
+                        await shop.session.run(f"/download {tmp_path / 'p.mxt'} a", replace(shop.session.origin, by=by))
                 assert b"SL" not in shop.written("line") and b"PG" not in shop.written("line")
                 assert not kept(tmp_path) and not shop.moving()
 

@@ -25,7 +25,7 @@ class FakeSession:
     def now(self) -> float:
         return asyncio.get_running_loop().time()
 
-    async def run(self, line: TypedLine, since: int) -> None:
+    async def run(self, line: TypedLine, origin: object, since: int) -> None:
         await asyncio.sleep(1.0)
         if line.typed == "bad":
             raise Refused("bad")

@@ -15,6 +15,7 @@ from multidrop.shell.scripts.executor import run_script
 from multidrop.shell.scripts.reading import read_script
 from multidrop.shell.scripts.use import CheckFailed
 from multidrop.shell.streams.stdout import report
+from tests.support.automated import automated
 from tests.support.cell_session import CellSession, bus, party, pmx
 
 pytestmark = pytest.mark.virtual
@@ -32,8 +33,8 @@ class Shop(CellSession):
     async def run(self, text, **values):
         (self.folder / "s.txt").write_text(text, encoding="utf-8")
         script = read_script(str(self.folder / "s.txt"), values, self.session.macros)
-        async with self.session.automations.run():
-            await run_script(self.session, script, self.results.append)
+        async with automated(self.session):
+            await run_script(self.session, self.session.origin, script, self.results.append)
 
     async def failure(self, text, kind=DriveError, **values):
         """What a failing script says, without the folder."""
