@@ -151,6 +151,11 @@ def callback(function: Callable[..., Any]) -> Callable[..., Any]:
     return function if guard is None else guard.function(function)
 
 
+def being_called() -> bool:
+    """Whether a feature by others is being called: what is done now is of its doing."""
+    return _calling.get() is not None
+
+
 def _is_function(value: object) -> bool:
     return callable(value) and not isinstance(value, type)
 

@@ -20,6 +20,7 @@ sys.path.insert(0, str(Path(__file__).parent.parent))
 from report import Row, alone, main
 
 from multidrop.shell.log.files import Entry, line_of
+from multidrop.shell.log.index import IndexKeeper
 
 SIZE = 100 * 1000 * 1000
 AIM = 1.0
@@ -38,22 +39,27 @@ def rows(full: bool) -> Iterator[Row]:
                 at = (AT + (ends[0] - AT) * share).isoformat()
                 seconds = [_run("log", "at", at, str(paths[0])) for _ in range(ROUNDS)]
                 yield alone(f"log at, {name}, {what}", "s", seconds, aim=AIM)
+            end, older = written(paths[0], polls, "512", indexed=False), []
+            for _ in range(ROUNDS):
+                older.append(_run("log", "at", (AT + (end - AT) * 0.5).isoformat(), str(paths[0])))
+            yield alone(f"log at, middle, {what}, no index", "s", older, aim=AIM, note="a log of an older version")
             seconds = [_run("log", "bisect", *map(str, paths), code=1) for _ in range(ROUNDS)]
             yield alone(f"log bisect, last line, {what}", "s", seconds, aim=AIM, note="two logs of 100 MB")
         if full:
             yield alone("log show, all entries", "s", [_run("log", "show", str(paths[0]))])
 
 
-def written(path: Path, polls: bool, last: str) -> datetime:
+def written(path: Path, polls: bool, last: str, indexed: bool = True) -> datetime:
     """Write a log of this size whose last drive's line is `last`; return its last time."""
-    now, size = AT, 0
+    now, size, keeper = AT, 0, IndexKeeper(0)
     with path.open("wb") as file:
-        size += file.write(line_of(Entry(now, "log", "session of process 1", marks=True)))
-        size += file.write(line_of(Entry(now, "bus", "/dev/ttyUSB0: b LMDCM 6.002", "press")))
+        begin = [Entry(now, "log", "session of process 1", marks=True)]
+        begin += [Entry(now, "bus", "/dev/ttyUSB0: b LMDCM 6.002", "press")]
         while size < SIZE:
             now += timedelta(seconds=0.02)
-            for entry in _exchange(now, polls):
-                size += file.write(line_of(entry))
+            data = b"".join(map(line_of, [*begin, *_exchange(now, polls)]))
+            size += file.write(data + (keeper.take(data) if indexed else b""))
+            begin = []
         file.write(line_of(Entry(now, "printed", last, "press", "b")))
     return now
 

@@ -8,7 +8,8 @@ from collections.abc import AsyncIterator, Sequence
 
 from multidrop.base.errors import Diagnostic, Refused, Stopped
 from multidrop.drives.bus import Bus
-from multidrop.drives.drive import Drive
+from multidrop.drives.drive import Check, Drive
+from multidrop.macros.recorder import Recorded
 from multidrop.shell import motions, travel
 from multidrop.shell.automation import AGREED, Automations, only_ends
 from multidrop.shell.events import FAILURES, By, Entered, Printed
@@ -32,57 +33,12 @@ class LinePath:
 
     async def text(self, parsed: DriveLine, origin: Origin) -> None:
         """Send a text to its drive and publish what it prints; on a bus in raw mode send it with its terminator."""
-        workspace, by = self._workspace, origin.by
-        bus = workspace.bus(origin.played(parsed.bus))
-        if (raw := workspace.of(bus).raw) is not None:
+        bus = self._workspace.bus(origin.played(parsed.bus))
+        if (raw := self._workspace.of(bus).raw) is not None:
             return await self._raw_text(raw, parsed, origin)
-        drive = workspace.drive(bus.name, parsed.address)
-        workspace.publish(Entered(workspace.now(), parsed.typed.strip(), by, bus.name, drive.address), origin)
-        self.allow(by)
-        text, check, values, stops = parsed.text, None, "", drive.stops
-        if (workspace.doubted or workspace.of(bus).doubt) and not _only_reads(drive, text):
-            await self.undoubted([bus], by)
-        if workspace.scaled or _MAYBE_QUANTITY.search(text):
-            line = await self._units.line(drive, text)
-            text, check, values = line.text, line.check, line.values
-            drive.check_line(text)
-            await travel.ask(self._units, drive, text, origin)
-        drive.check_line(text)
-        await self.guard(drive, text, by)
-        if drive.stops != stops:
-            raise Stopped(f"a stop came before '{text.strip()}' was sent")
-        recorded, starts = None, drive.starts(text)
-        if by is not By.MACRO:
-            target = workspace.qualified_address(drive)
-            typed = f"@{target} {parsed.text}" if target else parsed.text
-            recorded = workspace.recorder.record(typed, workspace.now(), join_target(bus.name, drive.address), starts)
-        if workspace.recording:
-            workspace.changed()
-        workspace.addressed.add((bus.name, drive.address))
-        workspace.lately.begin(origin)
-        before = drive.commands
-        if _changes_program(drive, text):
-            Sight(workspace, drive).changes()
-        try:
-            ends = only_ends(drive, text)
-            async with sending(self._automations, origin, drive, text, starts=starts, only_ends=ends):
-                printed = await motions.send(workspace, origin, drive, text, check)
-        except FAILURES as failure:
-            if recorded is not None:
-                recorded.came_back([f"failed: {failure}"])
-            raise
-        finally:
-            if values and drive.commands != before:
-                workspace.notify(f"{text.strip()}   {values}", bus=bus.name)
-        if recorded is not None:
-            recorded.came_back(printed)
-        if drive.address not in (*EVERYONE, *bus.drives):
-            bus.drives[drive.address] = drive  # it replied, so it exists: a stop and a wait must know it
-            workspace.changed()
-        for each in printed:
-            workspace.publish(Printed(workspace.now(), bus.name, drive.address, each, by), origin)
-        if workspace.scaled:
-            await self._units.look(drive, text)
+        drive = self._workspace.drive(bus.name, parsed.address)
+        passage = LinePassage(self, self._workspace, self._automations, self._units, bus, drive, parsed, origin)
+        await passage.run()
 
     async def _raw_text(self, raw: RawLine, parsed: DriveLine, origin: Origin) -> None:
         by = origin.by
@@ -181,6 +137,116 @@ class LinePath:
         """Raise Stopped after a stop, but not for an operator's line."""
         if self._workspace.latched and by is not By.OPERATOR:
             raise Stopped(LATCHED)
+
+
+class LinePassage:
+    """One line on its way to its drive, in the stages of `run`. Each may refuse it by what it raises."""
+
+    def __init__(
+        self,
+        path: LinePath,
+        workspace: Workspace,
+        automations: Automations,
+        units: Units,
+        bus: Bus,
+        drive: Drive,
+        parsed: DriveLine,
+        origin: Origin,
+    ) -> None:
+        self._path, self._workspace, self._automations, self._units = path, workspace, automations, units
+        self._bus, self._drive, self._parsed, self._origin = bus, drive, parsed, origin
+        self._text = parsed.text
+        """What is sent: the line, with the drive's own numbers once it is converted."""
+        self._check: Check | None = None
+        """What is read right before it is sent: whether the scale of its numbers still holds."""
+        self._quantities = ""
+        """Its quantities and the numbers that they became, for a person."""
+
+    async def run(self) -> None:
+        self._enter()
+        stops = self._drive.stops
+        await self._resolve_doubt()
+        await self._convert()
+        await self._agree()
+        if self._drive.stops != stops:
+            raise Stopped(f"a stop came before '{self._text.strip()}' was sent")
+        starts = self._drive.starts(self._text)
+        recorded = self._note(starts)
+        try:
+            printed = await self._send(starts)
+        except FAILURES as failure:
+            if recorded is not None:
+                recorded.came_back([f"failed: {failure}"])
+            raise
+        if recorded is not None:
+            recorded.came_back(printed)
+        await self._show(printed)
+
+    def _enter(self) -> None:
+        """Publish the line. Raises Stopped after a stop."""
+        workspace, typed = self._workspace, self._parsed.typed.strip()
+        entered = Entered(workspace.now(), typed, self._origin.by, self._bus.name, self._drive.address)
+        workspace.publish(entered, self._origin)
+        self._path.allow(self._origin.by)
+
+    async def _resolve_doubt(self) -> None:
+        """Ask once where names, units or guards may not be in force, but for a line that only reads."""
+        doubt = self._workspace.doubted or self._workspace.of(self._bus).doubt
+        if doubt and not _only_reads(self._drive, self._text):
+            await self._path.undoubted([self._bus], self._origin.by)
+
+    async def _convert(self) -> None:
+        """Make the drive's own numbers of quantities, and ask about a move that leaves its travel."""
+        if self._workspace.scaled or _MAYBE_QUANTITY.search(self._text):
+            line = await self._units.line(self._drive, self._text)
+            self._text, self._check, self._quantities = line.text, line.check, line.values
+            self._drive.check_line(self._text)
+            await travel.ask(self._units, self._drive, self._text, self._origin)
+
+    async def _agree(self) -> None:
+        """Check what the drive takes, and ask before a guarded line."""
+        self._drive.check_line(self._text)
+        await self._path.guard(self._drive, self._text, self._origin.by)
+
+    def _note(self, starts: bool) -> Recorded | None:
+        """Record the line, and note that its drive was addressed and whether its program changes."""
+        workspace, drive, parsed = self._workspace, self._drive, self._parsed
+        recorded = None
+        if self._origin.by is not By.MACRO:
+            target = workspace.qualified_address(drive)
+            typed = f"@{target} {parsed.text}" if target else parsed.text
+            place = join_target(self._bus.name, drive.address)
+            recorded = workspace.recorder.record(typed, workspace.now(), place, starts)
+        if workspace.recording:
+            workspace.changed()
+        workspace.addressed.add((self._bus.name, drive.address))
+        workspace.lately.begin(self._origin)
+        if _changes_program(drive, self._text):
+            Sight(workspace, drive).changes()
+        return recorded
+
+    async def _send(self, starts: bool) -> Sequence[str]:
+        """Send it; return what the drive prints. A quantity is shown with its number once anything was sent."""
+        drive, text, workspace = self._drive, self._text, self._workspace
+        before = drive.commands
+        try:
+            ends = only_ends(drive, text)
+            async with sending(self._automations, self._origin, drive, text, starts=starts, only_ends=ends):
+                return await motions.send(workspace, self._origin, drive, text, self._check)
+        finally:
+            if self._quantities and drive.commands != before:
+                workspace.notify(f"{text.strip()}   {self._quantities}", bus=self._bus.name)
+
+    async def _show(self, printed: Sequence[str]) -> None:
+        """Publish what the drive printed, and look at what the line may have changed."""
+        workspace, bus, drive = self._workspace, self._bus, self._drive
+        if drive.address not in (*EVERYONE, *bus.drives):
+            bus.drives[drive.address] = drive  # it replied, so it exists: a stop and a wait must know it
+            workspace.changed()
+        for each in printed:
+            workspace.publish(Printed(workspace.now(), bus.name, drive.address, each, self._origin.by), self._origin)
+        if workspace.scaled:
+            await self._units.look(drive, self._text)
 
 
 def _only_asks(drive: Drive, text: str) -> bool:

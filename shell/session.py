@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any
 
 from multidrop.base import registry
 from multidrop.base.errors import Diagnostic, DriveError, Refused, Stopped
+from multidrop.base.foreign import being_called
 from multidrop.base.isolation import at_once
 from multidrop.drives.bus import Bus
 from multidrop.drives.drive import Drive
@@ -45,6 +46,7 @@ if TYPE_CHECKING:
     from multidrop.macros import Macro
 
 BARE_WORDS = {"exit": "/quit", "quit": "/quit", "help": "/help", "?": "/help"}
+WITHOUT_ORIGIN = "in a verb: call.run(line); elsewhere: session.run(line, session.origin)"
 
 
 def bare(word: str) -> Diagnostic:
@@ -139,17 +141,21 @@ class Session(Workspace):
         `origin`: by default that of the session. `since` is the value of `stops` when the line was typed; a line older
         than the last stop is refused with Stopped.
 
+        A feature by others must say the origin: it may be a script, whose end stops what the line starts.
+
         Raises DriveError, Diagnostic or TransportLost, after one Failed event.
         """
         if self.front.ready is not None:
             await self.front.ready()
         target, place = DriveLine(""), self.place
         typed = line if isinstance(line, str) else line.typed
-        origin = origin or self.origin
+        without, origin = origin is None and self.origin.automation is None, origin or self.origin
         published = [] if origin.published is None else origin.published
         origin, by = replace(origin, published=published), origin.by
         with self.under_way(f"running {typed.strip()}"):
             try:
+                if without and being_called():
+                    raise Diagnostic("a feature ran it without its origin; it was not sent", typed, WITHOUT_ORIGIN)
                 if since is not None and since != self.stops:
                     raise Stopped(f"a stop came after '{typed.strip()}' was typed; it was not sent")
                 if self.quitting and by is By.OPERATOR and typed.strip() != EVEN_NOW:

@@ -104,12 +104,8 @@ class Boundary:
         if not known and len(self.counts) <= MOST:
             written = self._write(place, failure)
             details = f"details: {self.path}" if written else f"{self.path} could not be written"
-            try:
+            with self.at("what is said of a defect"):  # the part that shows a line may be defective, too
                 self._say(f"{defect} in {place}: {type(failure).__name__}; {self._goes_on}; {details}")
-            except Exception as another:  # the part that shows a line is defective, too: the file has both
-                if RAISES:
-                    raise
-                self._write("what is said of a defect", another)
         return text
 
     def end(self) -> None:

@@ -13,6 +13,7 @@ from multidrop.base.errors import Diagnostic
 from multidrop.base.text import counted, visible
 from multidrop.commands.log import STAMP, log_path, reported, text
 from multidrop.features.log_analysis import moments
+from multidrop.features.log_analysis.differences import Run, first_difference
 from multidrop.features.log_analysis.judge import RULES, judged
 from multidrop.features.log_analysis.moments import Known, Moments
 from multidrop.features.log_analysis.replay import ReplayReport
@@ -124,8 +125,8 @@ def _time(moment: datetime) -> str:
 
 def bisect(file1: str, file2: str, as_json: bool) -> int:
     """Print the first difference between two runs; the exit code says whether there is any, or may be."""
-    runs = [moments.Run(Path(file)) for file in (file1, file2)]
-    found = moments.first_difference(*runs)
+    runs = [Run(Path(file)) for file in (file1, file2)]
+    found = first_difference(*runs)
     lines = [None if index is None else run.line(index) for run, index in zip(runs, found or (None, None), strict=True)]
     damaged = [place for file in (file1, file2) for place in files.damaged(Path(file))]
     if damaged:

@@ -1,7 +1,4 @@
-"""A moment of a session log, and the first difference between two runs, in less time than reading all entries takes.
-
-Lines are searched as bytes. `line_of` writes the time, the kind, the bus and the drive of an entry in this order, and
-escapes quotation marks in texts. So a pattern with a bare quotation mark matches no text.
+"""A moment of a session log: what was known then, by the index of the log, or by searching its bytes where it has none.
 
 The order of a log is that of its lines. A clock that was set back passes a time again, so one time may be several
 moments. A time without a zone is compared with the clock as it was shown then, whatever the zone.
@@ -9,35 +6,43 @@ moments. A time without a zone is compared with the clock as it was shown then, 
 
 from __future__ import annotations
 
+import json
 import os
 import re
-from collections import defaultdict, deque
+from collections import defaultdict
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
-from contextlib import suppress
 from dataclasses import dataclass
 from datetime import datetime, time, timedelta, tzinfo
 from functools import cache, partial
-from itertools import islice, pairwise, product
+from itertools import pairwise, product
 from pathlib import Path
-from typing import IO, NamedTuple, TypeVar
+from typing import IO, NamedTuple
 
 from multidrop.base.errors import Diagnostic
-from multidrop.base.files import opened, why
 from multidrop.dialects.codec import copy_with
 from multidrop.dialects.families import FAMILIES
+from multidrop.features.log_analysis.log_parts import (
+    Block,
+    Segment,
+    back,
+    blocks_back,
+    forth,
+    line_at,
+    newest,
+    open_part,
+    segments,
+    steady,
+)
 from multidrop.shell.log import files
 from multidrop.shell.log.decoding import Assumed, Decoding, Measured
 from multidrop.shell.log.files import BEGIN, LONGEST, Entry, Line, entry_of, parts
+from multidrop.shell.log.index import KEPT, ZONE_AT, EntryKey, LogIndex
 from multidrop.shell.log.steps import Exchange
 
-BLOCK = 4 * LONGEST
-"""The bytes that are searched at once; no entry is as long."""
 BACK = timedelta(seconds=1)
 """A time that is so much before that of the entry above it: the clock was set back. Threads differ by less."""
 MOST = 5
 """The moments of one time that are found: the last ones."""
-ATTEMPTS = 3
-"""Attempts to read a log that is rotated meanwhile."""
 POLLS, QUESTIONS, DECODED = 2000, 4, 16
 """The entries of polls before a moment in which samples are looked for; the questions of a drive that are shown; and
 those that are decoded."""
@@ -50,99 +55,13 @@ SETTINGS: Mapping[str, Sequence[object]] = {
 """The settings of a codec that a poll's bytes depend on, and that the log does not say."""
 STATES: Mapping[str, Sequence[object]] = {"signs": (True, False), "motors": (6, 3, 2, 1)}
 """The same of the state of a drive."""
-COMPRESSED = (b"\x1f\x8b", b"BZh", b"\xfd7zXZ", b"\x28\xb5\x2f\xfd", b"PK\x03\x04")
-_SESSION = f'"kind": "log", "text": "{BEGIN} '.encode()
 _TIME = re.compile(rb'"time": "(\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d\.\d{6}[+-](?:[01]\d|2[0-3]):[0-5]\d)"')
-_ZONE = 26
-"""The place of the zone in a time."""
 _KIND = b'"kind": "'
 _RESUME = b'"kind": "typed", "text": "/resume"'
 _POLL = b'"poll": true}'
+_BEGUN = f'"kind": "log", "text": "{BEGIN} '.encode()
 _PLACE = rb'(?:, "bus": "(?:[^"\\]|\\.)*")?(?:, "drive": "(?:[^"\\]|\\.)*")?'
-_STEP = re.compile(rb'"kind": "(?:typed|printed|unsolicited|failed|stop)"[^\n]*\}(?=\r?$)', re.MULTILINE)
-_KEPT = rb"(?:bus|typed|printed|unsolicited|output|notice|failed|stop|missing)"
-_STEP_PLACE = re.compile(rb'"kind": "[a-z]+"' + _PLACE)
-T = TypeVar("T")
-_BY = tuple(f', "by": "{word}"'.encode() for word in ("operator", "macro", "script"))
-
-
-class Block(NamedTuple):
-    """Whole lines of a part, from an offset on. `first`: a session begins with them."""
-
-    path: Path
-    offset: int
-    data: bytes
-    first: bool
-
-    def line(self, at: int) -> tuple[int, bytes]:
-        """The line that has a place, and where it begins."""
-        begin = self.data.rfind(b"\n", 0, at) + 1
-        return begin, self.data[begin : self.data.find(b"\n", at) + 1 or len(self.data)]
-
-
-def _opened(path: Path) -> IO[bytes]:
-    """Open a part. Raises Diagnostic."""
-    try:
-        file = opened(path)
-        begin = file.read(8)
-    except (OSError, ValueError) as problem:
-        raise Diagnostic(f"cannot be read: {why(problem)}", str(path)) from None
-    if begin.startswith(COMPRESSED):
-        file.close()
-        raise Diagnostic("is compressed", str(path), "unpack it first")
-    return file
-
-
-def _back(paths: Sequence[Path], end: int | None = None) -> Iterator[Block]:
-    """Yield the lines of the last session before an offset of the last part, in blocks, the newest first."""
-    for path in reversed(paths):
-        with _opened(path) as file:
-            last = file.seek(0, os.SEEK_END) if end is None else end
-            end = None
-            while last > 0:
-                begin = max(0, last - BLOCK)
-                file.seek(begin)
-                data = file.read(last - begin)
-                cut = data.find(b"\n") + 1 if begin else 0
-                session = data.rfind(_SESSION, cut)
-                if session >= 0:
-                    cut = data.rfind(b"\n", 0, session) + 1
-                yield Block(path, begin + cut, data[cut:], session >= 0)
-                if session >= 0:
-                    return
-                last = begin + cut if 0 < cut < len(data) else begin  # else it is in a line that is no entry
-
-
-def _steady(path: Path, read: Callable[[], T]) -> T:
-    """Read a log, and again where it was rotated meanwhile. Raises Diagnostic."""
-    for _ in range(ATTEMPTS):
-        before = _files(path)
-        try:
-            found = read()
-        except Diagnostic:
-            if _files(path) == before:
-                raise
-            continue
-        if _files(path) == before:
-            return found
-    raise _rotated(path)
-
-
-def _files(path: Path) -> list[tuple[int, int]]:
-    """The identities of the parts of a log."""
-    found = []
-    for each in parts(path):
-        with suppress(OSError, ValueError):
-            state = os.stat(each)
-            found.append((state.st_dev, state.st_ino))
-    return found
-
-
-def _rotated(path: Path) -> Diagnostic:
-    return Diagnostic("was rotated while it was read", str(path), "try again")
-
-
-# A moment
+_KEPT = f"(?:{'|'.join(KEPT)})".encode()
 
 
 @dataclass
@@ -182,12 +101,12 @@ class End(NamedTuple):
 
 def known(path: Path, text: str) -> Moments:
     """Find what was known at a time. Raises Diagnostic for a text that is none, or before the log, and for a file."""
-    return _steady(path, partial(_moments, path, text))
+    return steady(path, partial(_moments, path, text))
 
 
 def _moments(path: Path, text: str) -> Moments:
     paths = parts(path)
-    last = next((each for block in _back(paths) for each in _newest(block)), None)
+    last = next((each for block in blocks_back(paths) for each in newest(block)), None)
     if last is None:
         raise Diagnostic("is not a session log", str(path), "a log of this version is one JSON object a line")
     first = next((each.entry for each in files.lines(paths[0]) if each.entry is not None), last)
@@ -211,7 +130,7 @@ def _ends(paths: Sequence[Path], at: datetime) -> tuple[list[End], list[tuple[da
         return wall.replace(tzinfo=None).isoformat(timespec="microseconds").encode()
 
     def is_late(stamp: bytes) -> bool:
-        return stamp[:_ZONE] > limit(stamp[_ZONE:])
+        return stamp[:ZONE_AT] > limit(stamp[ZONE_AT:])
 
     ends: list[End] = []
     backs: list[tuple[datetime, datetime]] = []
@@ -222,16 +141,17 @@ def _ends(paths: Sequence[Path], at: datetime) -> tuple[list[End], list[tuple[da
         if passed:  # times of threads that differ by less than BACK are in any order
             ends.pop()
         passed = True
-        ends.append(End(part, offset, before[_ZONE:]))
+        ends.append(End(part, offset, before[ZONE_AT:]))
 
     for part, path in enumerate(paths):
-        for offset, data in _forth(path):
-            stamps = _TIME.findall(data)
+        for piece in _pieces(path):
+            stamps = piece.stamps
             steps = [each for each in pairwise([before, *stamps]) if each[1] < each[0]]
-            sides = {late, *(is_late(each) for each in (*stamps[:1], *stamps[-1:]))}
+            sides = {late, *map(is_late, stamps if steps else (*stamps[:1], *stamps[-1:]))}
             if len(sides) == 1 and not any(_set_back(*each, at) for each in steps):
                 before = stamps[-1] if stamps else before
                 continue
+            data = piece.read()
             for match in _TIME.finditer(data):
                 stamp, was_late = match[1], late
                 if stamp < before and (step := _set_back(before, stamp, at)):
@@ -239,20 +159,37 @@ def _ends(paths: Sequence[Path], at: datetime) -> tuple[list[End], list[tuple[da
                     passed = False
                 late = is_late(stamp)
                 if late and not was_late:
-                    put(part, offset + data.rfind(b"\n", 0, match.start()) + 1)
+                    put(part, piece.offset + data.rfind(b"\n", 0, match.start()) + 1)
                 before = stamp
     if not late:
         put(len(paths) - 1, None)
     return ends, backs
 
 
-def _forth(path: Path) -> Iterator[tuple[int, bytes]]:
-    """Yield whole lines of a part in blocks, each with its offset."""
-    with _opened(path) as file:
-        file.seek(0)
-        while data := file.read(BLOCK):
-            offset = file.tell() - len(data)
-            yield offset, data + file.readline(LONGEST)
+class Piece(NamedTuple):
+    """Lines of a part from an offset on: their times, or the first and the last of times that are in their order."""
+
+    offset: int
+    stamps: Sequence[bytes]
+    read: Callable[[], bytes]
+
+
+def _pieces(path: Path) -> Iterator[Piece]:
+    """Divide a part into pieces, in their order; those of a steady segment are not read for that."""
+    with open_part(path) as file:
+        for segment in segments(file):
+            index = segment.described_by
+            if index is not None and index.steady:
+                stamps = [index.first.encode(), index.last.encode()]
+                yield Piece(segment.first, stamps, partial(_read, file, segment))
+            else:
+                for offset, data in forth(file, segment.first, segment.last):
+                    yield Piece(offset, _TIME.findall(data), partial(bytes, data))
+
+
+def _read(file: IO[bytes], segment: Segment) -> bytes:
+    file.seek(segment.first)
+    return file.read(segment.last - segment.first)
 
 
 def _set_back(before: bytes, after: bytes, at: datetime) -> tuple[datetime, datetime] | None:
@@ -272,21 +209,105 @@ def _zone(text: bytes) -> tzinfo | None:
 
 def _known(paths: Sequence[Path], end: End, at: datetime, last: Entry | None) -> Iterator[Known]:
     """Yield what was known at the end of some entries, if these have anything. `last`: see Known."""
-    found: dict[bytes, Line] = {}
-    polls: list[Line] = []
-    session: Entry | None = None
-    for block in _back(paths[: end.part + 1], end.offset):
-        for key in {*_other_keys(found).findall(block.data), _RESUME} - found.keys():
-            if (place := block.data.rfind(key)) >= 0 and (line := _line(block, place)) is not None:
-                found[key] = line
-        place = len(block.data)
-        while len(polls) < POLLS and (place := block.data.rfind(_POLL, 0, place)) >= 0:
-            polls += filter(None, [_line(block, place)])
-        if block.first:
-            session = entry_of(block.line(0)[1])
-    if found or session is not None:
+    search = Search(paths)
+    search.run(end)
+    if search.found or search.session is not None:
         path = paths[end.part - (end.offset == 0 and end.part > 0)]
-        yield _made(at, path, session, last, found, polls, paths)
+        yield _made(at, path, search.session, last, search.found, search.polls, paths)
+
+
+class Search:
+    """A search for the last entries of a session before a moment, from there backwards.
+
+    The first index line that it meets names all of them but polls. From there on only segments with polls are read.
+    """
+
+    def __init__(self, paths: Sequence[Path]) -> None:
+        self.found: dict[bytes, Line] = {}
+        """The last entry of each kind and place, by its bytes up to the text."""
+        self.polls: list[Line] = []
+        """The last polls, the newest first."""
+        self.session: Entry | None = None
+        """The first entry of the session."""
+        self._paths = paths
+        self._indexed = False
+        """Whether an index line has named the entries."""
+
+    def run(self, end: End) -> None:
+        """Raises Diagnostic for a part that cannot be read."""
+        for number in range(end.part, -1, -1):
+            with open_part(self._paths[number]) as file:
+                offset = end.offset if number == end.part else None
+                for segment in reversed(_until(segments(file), offset)):
+                    if not self._goes_on(number, segment, file):
+                        return
+
+    def _goes_on(self, number: int, segment: Segment, file: IO[bytes]) -> bool:
+        """Search a segment; return whether there may be more before it."""
+        index = segment.described_by
+        self._indexed = self._indexed or (index is not None and self._look_up(number, index))
+        if self._indexed and len(self.polls) >= POLLS:
+            return False
+        if self._indexed and index is not None and not index.polls:
+            return index.session < index.start
+        for block in back(file, self._paths[number], segment.first, segment.last):
+            self._search(block)
+            if block.first:
+                return False
+        return True
+
+    def _search(self, block: Block) -> None:
+        keys = set() if self._indexed else {*_other_keys(self.found).findall(block.data), _RESUME}
+        for key in keys - self.found.keys():
+            if (place := block.data.rfind(key)) >= 0 and (line := line_at(block, place)) is not None:
+                self.found[key] = line
+        place = len(block.data)
+        while len(self.polls) < POLLS and (place := block.data.rfind(_POLL, 0, place)) >= 0:
+            self.polls += filter(None, [line_at(block, place)])
+        if block.first:
+            self.session = entry_of(block.line(0)[1])
+
+    def _look_up(self, number: int, index: LogIndex) -> bool:
+        """Take what an index line of a part names. Return whether it is there; else nothing is taken."""
+        named = {_bytes_of(key): place for key, place in index.entries.items()}
+        wanted = {key: place for key, place in named.items() if key not in self.found}
+        if index.resumed is not None and _RESUME not in self.found:
+            wanted[_RESUME] = index.resumed
+        taken = {key: self._line(number, index.base, place) for key, place in {**wanted, _BEGUN: index.session}.items()}
+        if any(line is not None and (line.entry is None or key not in line.data) for key, line in taken.items()):
+            return False
+        first = taken.pop(_BEGUN)
+        self.session = None if first is None else first.entry
+        self.found |= {key: line for key, line in taken.items() if line is not None}
+        return True
+
+    def _line(self, number: int, base: int, place: int) -> Line | None:
+        """The line at a place of the log, from a part and the place where it begins; None: its part was removed."""
+        while place < base:
+            number -= 1
+            if number < 0:
+                return None
+            base -= os.path.getsize(self._paths[number])
+        path = self._paths[number]
+        with open_part(path) as file:
+            file.seek(place - base)
+            data = file.readline(LONGEST)
+        return Line(path, place - base, data, entry_of(data))
+
+
+def _until(found: Sequence[Segment], offset: int | None) -> list[Segment]:
+    """The segments before an offset; the last one is cut off there, and so has no index. None: all of them."""
+    if offset is None:
+        return [*found]
+    whole = [each for each in found if each.last <= offset]
+    cut = whole[-1].last if whole else 0
+    return [*whole, Segment(cut, offset)] if cut < offset else whole
+
+
+def _bytes_of(key: EntryKey) -> bytes:
+    """The beginning of an entry, up to its text."""
+    place = {name: text for name, text in (("bus", key.bus), ("drive", key.drive)) if text}
+    return json.dumps({"kind": key.kind, **place}).encode()[1:-1] + b', "text"'
 
 
 def _other_keys(found: Collection[bytes]) -> re.Pattern[bytes]:
@@ -371,22 +392,6 @@ def _samples(polls: Sequence[Line]) -> Iterator[Line]:
             yield from (line, *reply)
 
 
-def _line(block: Block, place: int) -> Line | None:
-    """The entry that has a place of a block; its number is its offset."""
-    begin, data = block.line(place)
-    entry = entry_of(data)
-    return None if entry is None else Line(block.path, block.offset + begin, data, entry)
-
-
-def _newest(block: Block) -> Iterator[Entry]:
-    end = len(block.data)
-    while end > 0:
-        begin, data = block.line(end - 1)
-        if (entry := entry_of(data)) is not None:
-            yield entry
-        end = begin
-
-
 def moment(text: str, first: datetime, last: datetime) -> datetime:
     """Read a time; one of any day is the last one in a log from `first` to `last`. Raises Diagnostic.
 
@@ -406,95 +411,3 @@ def moment(text: str, first: datetime, last: datetime) -> datetime:
         first, last = first.replace(tzinfo=None), last.replace(tzinfo=None)
     day_before = found - timedelta(days=1)
     return day_before if of_any_day and found > last and day_before >= first else found
-
-
-# The first difference
-
-
-class Run:
-    """The steps of the last session in a log: lines typed and printed, failures, stops; without times and origins."""
-
-    def __init__(self, path: Path) -> None:
-        """Read it. Raises Diagnostic."""
-        _steady(path, partial(self._read, path))
-
-    def _read(self, path: Path) -> None:
-        self._blocks: list[tuple[Path, int, int, int]] = []
-        """Of each block the part, its offset, its size and its lines."""
-        found: list[list[bytes]] = []
-        readable = False
-        for block in _back(parts(path)):
-            readable = readable or next(_newest(block), None) is not None
-            found.append(_STEP.findall(block.data))
-            self._blocks.append((block.path, block.offset, len(block.data), block.data.count(b"\n")))
-        self._counts = [len(each) for each in reversed(found)]
-        self._blocks.reverse()
-        self.steps = [step for each in reversed(found) for step in each]
-        if not readable:
-            raise Diagnostic("is not a session log", str(path), "a log of this version is one JSON object a line")
-
-    def line(self, index: int) -> Line:
-        """The line of a step. Raises Diagnostic where that is no entry, or the log was rotated since it was read."""
-        step = self.steps[index]
-        before: dict[Path, int] = {}
-        for (path, offset, size, lines), count in zip(self._blocks, self._counts, strict=True):
-            if path not in before:
-                before[path] = _count(path, offset)
-            if index < count:
-                number = before[path]
-                with _opened(path) as file:
-                    file.seek(offset)
-                    block = Block(path, offset, file.read(size), False)
-                match = next(islice(_STEP.finditer(block.data), index, None), None)
-                if match is None or match[0] != step:
-                    raise _rotated(path)
-                begin, data = block.line(match.start())
-                line = Line(path, number + block.data.count(b"\n", 0, begin) + 1, data, entry_of(data))
-                if line.entry is None:
-                    raise Diagnostic("is not an entry of a session log", line.where, "the log is damaged there")
-                return line
-            index -= count
-            before[path] += lines
-        raise IndexError(index)
-
-
-def _count(path: Path, size: int) -> int:
-    """The lines in the first bytes of a file."""
-    with _opened(path) as file:
-        file.seek(0)
-        return sum(file.read(min(BLOCK, size - begin)).count(b"\n") for begin in range(0, size, BLOCK))
-
-
-def _bare(step: bytes) -> bytes:
-    """A step without its origin."""
-    for word in _BY:
-        step = step.replace(word, b"")
-    return step
-
-
-def first_difference(one: Run, other: Run) -> tuple[int | None, int | None] | None:
-    """The indices of the first steps that differ, None where a run has no step any more; None: there is no difference.
-
-    Each drive has an order of its own: a step is compared with that of the same place.
-    """
-    runs = one.steps, other.steps
-    low, high = 0, min(map(len, runs))
-    while low < high:  # the longest equal beginning
-        middle = (low + high + 1) // 2
-        low, high = (middle, high) if runs[0][low:middle] == runs[1][low:middle] else (low, middle - 1)
-    waiting: dict[bytes, tuple[deque[int], deque[int]]] = defaultdict(lambda: (deque(), deque()))
-    for index in range(low, max(map(len, runs))):
-        for side, steps in enumerate(runs):
-            if index >= len(steps):
-                continue
-            match = _STEP_PLACE.match(steps[index])
-            queues = waiting[match[0].partition(b",")[2] if match else b""]
-            if not queues[1 - side]:
-                queues[side].append(index)
-            elif _bare(runs[1 - side][before := queues[1 - side].popleft()]) != _bare(steps[index]):
-                return (index, before) if side == 0 else (before, index)
-    rests = [(queue[0], side) for queues in waiting.values() for side, queue in enumerate(queues) if queue]
-    if not rests:
-        return None
-    index, side = min(rests)
-    return (index, None) if side == 0 else (None, index)

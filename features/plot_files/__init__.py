@@ -6,6 +6,7 @@ from collections.abc import Awaitable, Callable
 from typing import TYPE_CHECKING, Annotated
 
 from multidrop.base.feature import Feature
+from multidrop.features.plot_files.options import PlotOptions
 from multidrop.shell.operations.argument_types import NoReconnect, Url
 from multidrop.shell.operations.operation import Operation, typed
 from multidrop.shell.operations.parameter import Argument, Listed, OneOf
@@ -25,7 +26,6 @@ TO = "FILE.rrd|FILE.csv|FILE.parquet|rerun+http://HOST:PORT/proxy"
 FILE = (Listed.FILE,)
 TypedTo = Annotated[str | None, Argument("into a file, or to a viewer", metavar=TO, listed=FILE, one_of=TARGET)]
 TypedServe = Annotated[str | None, Argument("for viewers that connect", metavar="[HOST:]PORT", one_of=TARGET)]
-TypedRate = Annotated[str, Argument("samples a second of each drive, or max", metavar="N|max")]
 Plotted = Annotated[str, Argument(metavar="ADDR", listed=(Listed.DRIVE, Listed.FILE))]
 To = Annotated[
     str | None,
@@ -37,10 +37,6 @@ To = Annotated[
     ),
 ]
 Serve = Annotated[str | None, Argument("serve a viewer's data here", metavar="[HOST:]PORT", one_of=ONE_TARGET)]
-Rate = Annotated[
-    str,
-    Argument("samples a second of each drive, at most (default: 50); max: as fast as the line allows", metavar="N|max"),
-]
 OfUrl = Annotated[
     str,
     Argument(
@@ -52,18 +48,18 @@ OfUrl = Annotated[
 
 
 async def _typed(
-    call: Call, *texts: Plotted, to: TypedTo = None, serve: TypedServe = None, rate: TypedRate = ""
+    call: Call, *texts: Plotted, to: TypedTo = None, serve: TypedServe = None, options: PlotOptions
 ) -> None:
     from multidrop.features.plot_files.verb import plot
 
-    await plot(call, texts, to, serve, rate)
+    await plot(call, texts, to, serve, options)
 
 
 def _plot(
     url: Url,
     *,
     drive: tuple[OfUrl, ...] = (),
-    rate: Rate = "50",
+    options: PlotOptions,
     to: To = None,
     serve: Serve = None,
     no_reconnect: NoReconnect = False,
@@ -71,7 +67,7 @@ def _plot(
     from multidrop.features.plot_files.command import run
 
     drives = () if "all" in drive else drive
-    return run(url, drives, to=to, serve=serve, rate=rate, reconnect=not no_reconnect)
+    return run(url, drives, to=to, serve=serve, options=options, reconnect=not no_reconnect)
 
 
 def _save(text: str) -> tuple[str, Callable[[Batch], Awaitable[None]]]:

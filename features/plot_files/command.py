@@ -7,8 +7,9 @@ import sys
 from collections.abc import Sequence
 
 from multidrop.base.errors import DriveError
+from multidrop.features.plot_files.options import PlotOptions
 from multidrop.features.plot_files.plot import begin
-from multidrop.features.plot_files.request import PlotTarget, parse_rate, parse_target
+from multidrop.features.plot_files.request import PlotTarget, parse_target
 from multidrop.shell.batch import runner
 from multidrop.shell.plots.poll import lost
 from multidrop.shell.plots.series import parse_series, read_first
@@ -17,22 +18,28 @@ from multidrop.shell.streams.stdout import write
 
 
 def run(
-    url: str, drives: Sequence[str], *, to: str | None, serve: str | None, rate: str, reconnect: bool = True
+    url: str,
+    drives: Sequence[str],
+    *,
+    to: str | None,
+    serve: str | None,
+    options: PlotOptions,
+    reconnect: bool = True,
 ) -> int:
     """Plot until a signal, which ends it well; return the exit code. `reconnect`: a lost bus leaves a gap.
 
-    Raises Diagnostic for a wrong target or rate.
+    Raises Diagnostic for a wrong target.
     """
-    target, period = parse_target(to, serve), parse_rate(rate)
+    target = parse_target(to, serve)
     return runner.run(
-        [url], lambda workspace: _until_ended(workspace, target, drives, period), interrupted=0, reconnect=reconnect
+        [url], lambda workspace: _until_ended(workspace, target, drives, options), interrupted=0, reconnect=reconnect
     )
 
 
-async def _until_ended(workspace: Session, target: PlotTarget, drives: Sequence[str], period: float) -> None:
+async def _until_ended(workspace: Session, target: PlotTarget, drives: Sequence[str], options: PlotOptions) -> None:
     series = parse_series(workspace, drives)
     await read_first(workspace, series)
-    running, plot = await begin(workspace, target, series, period)
+    running, plot = await begin(workspace, target, series, options)
     write(sys.stderr, f"plotting to {running.where}, {running.rate}; Ctrl+C ends it")
     if running.desk:
         write(sys.stderr, f"at your desk: {running.desk}, then {running.viewer}")

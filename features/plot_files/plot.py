@@ -21,7 +21,8 @@ from multidrop.dialects.values import UNREAD, Conditions
 from multidrop.drives.events import Conditioned, Lost, Sample, Unsolicited, Valued
 from multidrop.drives.telemetry import MODEST, USUAL, Subscription, Telemetry, Value
 from multidrop.features.plot_files.file import SinkBroken
-from multidrop.features.plot_files.request import TABLES, PlotTarget, shown
+from multidrop.features.plot_files.options import PlotOptions
+from multidrop.features.plot_files.request import TABLES, PlotTarget
 from multidrop.features.plot_files.rerun_calls import AGREES, COLOURS, DIFFERS, RUNS, Sink
 from multidrop.features.plot_files.table import TableSink
 from multidrop.shell import events
@@ -31,6 +32,7 @@ from multidrop.shell.session import Session
 from multidrop.shell.threads import in_thread
 from multidrop.transports.sockets import exposed
 
+USUAL_OPTIONS = PlotOptions()
 FILE_PERIOD, LIVE_PERIOD = 0.4, 0.1
 """The time between batches, s: longer makes a smaller file, shorter a smoother view."""
 BATCH_TIMEOUT = 8.0
@@ -271,13 +273,13 @@ carries is asked for: a reading takes the time of four samples."""
 
 
 async def begin(
-    workspace: Session, target: PlotTarget, series: Sequence[Series], period: float = MODEST
+    workspace: Session, target: PlotTarget, series: Sequence[Series], options: PlotOptions = USUAL_OPTIONS
 ) -> tuple[RunningPlot, Plot]:
-    """Begin to plot drives and values, each every `period` s; 0: as fast as the line allows."""
+    """Begin to plot drives and values."""
     if not series:
         raise Diagnostic("no drive to plot", hint="/open URL opens a line of drives")
     plot = await Plot.open(target, clock=workspace.now, wall=workspace.wall)
-    detach = attach(workspace, plot, series, period)
+    detach = attach(workspace, plot, series, options.period)
 
     async def end() -> str:
         if running in workspace.plots:
@@ -286,7 +288,7 @@ async def begin(
         return await plot.close()
 
     where = plot.target.text
-    running = RunningPlot(where, plot.target.desk, f"rerun {where}", shown(period), plot.target.about, end)
+    running = RunningPlot(where, plot.target.desk, f"rerun {where}", options.shown, plot.target.about, end)
     workspace.plots.append(running)
     if target.serves and exposed(target.host):
         workspace.notify(f"other computers can read the plot at {target.text}; they need no password", warning=True)

@@ -1,7 +1,4 @@
-"""What a person asks of a plot: its target, and its rate.
-
-A target is a file, a server of our own, or a viewer elsewhere. The rate says how often each drive is read, at most.
-"""
+"""The target of a plot: a file, a server of our own, or a viewer elsewhere."""
 
 from __future__ import annotations
 
@@ -14,8 +11,6 @@ from pathlib import Path
 from urllib.parse import urlsplit
 
 from multidrop.base.errors import Diagnostic
-from multidrop.base.text import real
-from multidrop.drives.telemetry import FASTEST, MODEST
 from multidrop.shell.connect.urls import listening
 from multidrop.shell.secrets import url_without_secrets
 
@@ -107,26 +102,3 @@ def _viewer(text: str) -> PlotTarget:
     if not proxy or extra or not host or not port:
         raise wrong
     return PlotTarget(host=host, port=port, url=f"rerun+http://{bracketed(host)}:{port}/proxy")
-
-
-MAX = "max"
-SLOWEST = 0.01
-"""The lowest rate, samples a second."""
-DEFAULT = f"{1 / MODEST:g}"
-
-
-def parse_rate(text: str) -> float:
-    """The period between two samples of a drive, s; 0 for `max`. Raises Diagnostic."""
-    if text == MAX:
-        return 0.0
-    rate = real(text) or 0.0
-    if not SLOWEST <= rate <= 1 / FASTEST:
-        valid = f"valid: {SLOWEST:g} to {1 / FASTEST:g} samples a second of each drive, or {MAX}"
-        raise Diagnostic(f"invalid rate {text!r}", "--rate", valid)
-    return 1 / rate
-
-
-def shown(period: float) -> str:
-    if period <= FASTEST:
-        return "as fast as the line allows"
-    return f"at most {1 / period:g} samples a second of each drive"

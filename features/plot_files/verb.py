@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Awaitable, Callable, Sequence
 from functools import partial
 
-from multidrop.features.plot_files.plot import begin, write
-from multidrop.features.plot_files.request import DEFAULT, parse_rate, parse_target
+from multidrop.features.plot_files.options import PlotOptions
+from multidrop.features.plot_files.plot import USUAL_OPTIONS, begin, write
+from multidrop.features.plot_files.request import parse_target
 from multidrop.shell.plots.batch import Batch
 from multidrop.shell.plots.series import parse_series, read_first
 from multidrop.shell.session import Call
@@ -15,7 +16,7 @@ from multidrop.shell.verbs import plotting
 ENDINGS = (".rrd", ".csv", ".parquet")
 
 
-async def plot(call: Call, texts: Sequence[str], to: str | None, serve: str | None, rate: str) -> None:
+async def plot(call: Call, texts: Sequence[str], to: str | None, serve: str | None, options: PlotOptions) -> None:
     """Begin what a line of `/plot` asks for: on the screen, or beside it, and say where it goes.
 
     A word that can only be a target has `--to`.
@@ -26,17 +27,16 @@ async def plot(call: Call, texts: Sequence[str], to: str | None, serve: str | No
     if targets:
         texts, to = [text for text in texts if text not in targets], targets[0]
     if to is None and serve is None:
-        if rate:
+        if options != USUAL_OPTIONS:
             raise call.wrong("no target for the plot")
         return await plotting.plot(call, texts)
     workspace = call.session
     target = parse_target(to, serve)
     if target.file is not None:
         call.output_file(str(target.file))
-    period = parse_rate(rate or DEFAULT)
     series = parse_series(workspace, texts)
     await read_first(workspace, series)
-    begun, _ = await begin(workspace, target, series, period)
+    begun, _ = await begin(workspace, target, series, options)
     workspace.notify(f"plotting to {begun.where}, {begun.rate}")
     if begun.desk:
         workspace.notify(f"at your desk: {begun.desk}, then {begun.viewer}")

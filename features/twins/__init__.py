@@ -11,7 +11,7 @@ from multidrop.base.text import whole
 from multidrop.shell.at_session import AtSession
 from multidrop.shell.hooks import Options, Predicting, Switch
 from multidrop.shell.operations.argument_types import RAW, Address
-from multidrop.shell.operations.operation import Operation, typed
+from multidrop.shell.operations.operation import Group, Operation, typed
 from multidrop.shell.operations.parameter import Argument
 
 if TYPE_CHECKING:
@@ -97,7 +97,7 @@ FEATURE = Feature(
         Operation(
             _list,
             verb="/twin",
-            group="Settings and values",
+            group=Group.VALUES,
             after="/plot",
             recorded=typed,
             help="""Run a simulated drive beside a real one, and warn where the two differ.

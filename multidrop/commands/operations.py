@@ -324,6 +324,31 @@ OPERATIONS = (
         ),
     ),
     Operation(
+        sim,
+        command="sim",
+        meaning="serve a simulated cell to other programs; the demo cell without CELL",
+        examples=("sim", "sim cell.toml --json", "sim --speed 10"),
+    ),
+    Operation(
+        poll,
+        command="poll",
+        meaning="print values of drives in a row every so many seconds, until interrupted",
+        examples=("poll press P V --every 1", "poll press IT b.VM --drive a --every 60 --json"),
+    ),
+    Operation(
+        ports,
+        command="ports",
+        meaning="list the serial ports of this machine, with their stable names",
+        examples=("ports", "ports --json"),
+    ),
+    Operation(
+        relay,
+        command="relay",
+        connection=True,
+        meaning="lend a serial port of this machine to ssh://HOST/PORT elsewhere, which starts this by itself",
+        examples=("relay /dev/ttyUSB0", "relay /dev/ttyUSB0 --baud 115200"),
+    ),
+    Operation(
         scan,
         command="scan",
         meaning=(
@@ -343,37 +368,7 @@ OPERATIONS = (
         ),
         examples=("rescue /dev/ttyUSB0", "rescue /dev/ttyUSB0 --plain", "rescue COM3 --baud 9600"),
     ),
-    Operation(
-        sim,
-        command="sim",
-        meaning="serve a simulated cell to other programs; the demo cell without CELL",
-        examples=("sim", "sim cell.toml --json", "sim --speed 10"),
-    ),
-    Operation(
-        relay,
-        command="relay",
-        connection=True,
-        meaning="lend a serial port of this machine to ssh://HOST/PORT elsewhere, which starts this by itself",
-        examples=("relay /dev/ttyUSB0", "relay /dev/ttyUSB0 --baud 115200"),
-    ),
-    Operation(
-        ports,
-        command="ports",
-        meaning="list the serial ports of this machine, with their stable names",
-        examples=("ports", "ports --json"),
-    ),
-    Operation(
-        poll,
-        command="poll",
-        meaning="print values of drives in a row every so many seconds, until interrupted",
-        examples=("poll press P V --every 1", "poll press IT b.VM --drive a --every 60 --json"),
-    ),
-    Operation(
-        help_,
-        command="help",
-        meaning="explain a command of the drives, an error number or a verb; without a connection",
-        examples=("help 86", "help VM"),
-    ),
+    Operation(command="log", meaning="show, follow, search, compare, judge and replay session logs, which /log begins"),
     Operation(
         log_show,
         command="log show",
@@ -392,6 +387,7 @@ OPERATIONS = (
         meaning="print the entries of a session log that match; exit code 0: some do, 1: none does",
         examples=('log grep "PR P"', "log grep -i refused day.jsonl --drive b"),
     ),
+    Operation(command="config", meaning="show and check the configuration: saved connections, keys, colours"),
     Operation(
         config_path,
         command="config path",
@@ -419,6 +415,12 @@ OPERATIONS = (
         examples=("features", "features --json"),
     ),
     Operation(
+        help_,
+        command="help",
+        meaning="explain a command of the drives, an error number or a verb; without a connection",
+        examples=("help 86", "help VM"),
+    ),
+    Operation(
         report,
         command="report",
         meaning="show what a bug report needs, and write it to a file",
@@ -433,6 +435,4 @@ OPERATIONS = (
             "completion fish | source",
         ),
     ),
-    Operation(command="log", meaning="show, follow, search, compare, judge and replay session logs, which /log begins"),
-    Operation(command="config", meaning="show and check the configuration: saved connections, keys, colours"),
 )

@@ -31,6 +31,8 @@ FORMAT = 1
 """The version of the format, in the first entry of each file."""
 BEGIN = "session"
 """The first word of the `log` entry of a new session; that of a further part has another one."""
+INDEX = "index"
+"""The text of the `log` entries that only an index uses: see `shell.log.index`."""
 TRAFFIC = ("sent", "received")
 """The kinds of entries that hold bytes."""
 KINDS = {
@@ -209,13 +211,18 @@ def parts(path: Path) -> list[Path]:
 
 
 def lines(path: Path, offset: int = 0, number: int = 0) -> Iterator[Line]:
-    """Yield the lines of one file after so many bytes and lines. Raises Diagnostic where it cannot be read."""
+    """Yield the lines of one file after so many bytes and lines, but those of an index.
+
+    Raises Diagnostic where it cannot be read.
+    """
     try:
         with opened(path) as file:
             file.seek(offset)
             while data := file.readline(LONGEST):
                 number += 1
-                yield Line(path, number, data, entry_of(data) if data.endswith(b"\n") else None)
+                entry = entry_of(data) if data.endswith(b"\n") else None
+                if entry is None or (entry.kind, entry.text) != ("log", INDEX):
+                    yield Line(path, number, data, entry)
     except (OSError, ValueError) as problem:
         raise Diagnostic(f"cannot be read: {why(problem)}", str(path)) from None
 

@@ -30,6 +30,7 @@ from multidrop.shell.events import (
 from multidrop.shell.line_syntax import EVERYONE
 from multidrop.shell.log import files
 from multidrop.shell.log.files import BEGIN, KINDS, TRAFFIC, Entry, line_of
+from multidrop.shell.log.index import IndexKeeper
 from multidrop.shell.openings import model
 from multidrop.shell.threads import BoundedWriter
 from multidrop.shell.workspace import Workspace
@@ -205,7 +206,8 @@ class Disk:
     Theory of operation. `put` queues bytes and waits for the thread to write them, so that a crash of this program
     loses nothing that was put. A disk that takes longer than PATIENCE is not waited for again until it has caught up.
     Meanwhile the queue is bounded; what has no room is counted, and the file says so. Another session may write the
-    same file: each write begins at its end, and a session follows the other's rotation.
+    same file: each write begins at its end, and a session follows the other's rotation. The index of a file ends with
+    that.
 
     `head` makes the first bytes of each part, `missing` the bytes in place of so many dropped entries.
     """
@@ -218,6 +220,8 @@ class Disk:
         """Bytes in the file after the last write."""
         self._path, self._size, self._files, self._head = path, size, files, head
         self._slow = False
+        self._index: IndexKeeper | None = None
+        """None before the first write, and once another session writes the file."""
         self._descriptor = _opened(path)
         self._regular = stat.S_ISREG(os.fstat(self._descriptor).st_mode)
         self._writer = BoundedWriter(
@@ -241,27 +245,40 @@ class Disk:
         self._writer.close(ENDING)
 
     def _write(self, data: bytes) -> int:
-        rest = data
-        if self._regular:
-            # Another session may have rotated it: then open the path again.
-            try:
-                found = os.stat(self._path)
-            except FileNotFoundError:
-                raise FileNotFoundError(errno.ENOENT, "the file is gone") from None
-            ours = os.fstat(self._descriptor)
-            if (found.st_dev, found.st_ino) != (ours.st_dev, ours.st_ino):
-                self._close()
-                self._descriptor = _opened(self._path)
-            now = os.fstat(self._descriptor).st_size
-            if now and now + len(data) > self._size:
-                rest, now = self._rotate() + data, 0
-            self.size = now + len(rest)
+        rest = self._placed(data) if self._regular else data
         while rest:
             try:
                 rest = rest[os.write(self._descriptor, rest) :]
             except BlockingIOError:
                 raise OSError(errno.EAGAIN, "its reader does not take it") from None
         return len(data)
+
+    def _placed(self, data: bytes) -> bytes:
+        """Find or begin the part that takes these bytes; return them with the head of a new part, and their index."""
+        # Another session may have rotated it: then open the path again.
+        try:
+            found = os.stat(self._path)
+        except FileNotFoundError:
+            raise FileNotFoundError(errno.ENOENT, "the file is gone") from None
+        ours = os.fstat(self._descriptor)
+        alone = (found.st_dev, found.st_ino) == (ours.st_dev, ours.st_ino)
+        if not alone:
+            self._close()
+            self._descriptor = _opened(self._path)
+        now = os.fstat(self._descriptor).st_size
+        if not self.size:
+            self._index = IndexKeeper(now)
+        elif not alone or now != self.size:
+            self._index = None
+        if now and now + len(data) > self._size:
+            data = self._rotate() + data
+            now = os.fstat(self._descriptor).st_size
+            if self._index is not None and not now:
+                self._index.begin_part()
+        if self._index is not None:
+            data += self._index.take(data)
+        self.size = now + len(data)
+        return data
 
     def _rotate(self) -> bytes:
         """Begin a new part; return its first bytes. A part that cannot be renamed now is so at a later write."""

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable, Mapping, Sequence
-from enum import Enum, auto
+from enum import Enum, StrEnum, auto
 from functools import cache
 from inspect import isawaitable, iscoroutine
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -21,6 +21,20 @@ from multidrop.shell.operations.parsing import LineParser, add_parameters, value
 
 if TYPE_CHECKING:
     from multidrop.shell.workspace import Workspace
+
+
+class Group(StrEnum):
+    """The titles of `/help`, in their order."""
+
+    STOPS = "Stop and end"
+    LINES = "Lines and drives"
+    VALUES = "Settings and values"
+    PROGRAMS = "Programs of drives"
+    MACROS = "Macros"
+    WAITS = "Waits"
+    BYTES = "Bytes"
+    SCREEN = "The session and its screen"
+    SIMULATED = "Simulated drives"
 
 
 class Kind(Enum):
@@ -99,9 +113,11 @@ class Operation(NamedTuple):
     through: Callable[..., Any] | None = None
     """Calls a function with what `do` is given first, and returns the exit code; a coroutine is awaited."""
     group: str = ""
-    """The title of `/help` under which the verb is listed."""
+    """The title of `/help` under which the verb is listed: one of `Group`, or another one of a feature."""
     after: str = ""
-    """The verb or command that a feature's is listed after, in `/help` and `--help`; empty: it comes last."""
+    """The verb or command that it is listed after, in `/help` and `--help`.
+
+    Empty: in the order of the declarations; a feature's comes last."""
     recorded: Callable[[Call], str] | None = None
     """The line that a macro records; None: none."""
     rows: Callable[[], Sequence[str]] | None = None

@@ -1,7 +1,8 @@
 """All operations: `VERBS["/open"]`, `COMMANDS["program check"]`, and `find` for a typed name.
 
-The modules in `base.registry.OPERATIONS` declare those of multidrop itself, and features theirs. The two orders below
-are those of the overviews; an operation that they do not name comes last.
+The modules in `base.registry.OPERATIONS` declare those of multidrop itself, and features theirs. The overviews have the
+order of these declarations: verbs by their groups, commands before the parts of groups, and each `after` the one that
+it names.
 """
 
 from __future__ import annotations
@@ -16,19 +17,10 @@ from multidrop.base import registry
 from multidrop.base.errors import Diagnostic
 from multidrop.base.feature import Feature
 from multidrop.base.on_demand import imported
-from multidrop.shell.operations.operation import Operation
+from multidrop.shell.operations.operation import Group, Operation
 from multidrop.shell.operations.parsing import LineParser
 from multidrop.shell.operations.verb import Verb
 
-VERB_ORDER = """/stop /resume /quit /exit
-    /open /close /use /drives /scan /status /units /referenced /rename /tab /keep
-    /params /snapshot /plot /register /coil /device
-    /check /download /upload /list /trace /step /continue /break /watch
-    /macros /macro /record /play /key
-    /wait /sleep /raw /hex /bytes
-    /help /clear /log /page /tour /times /filter /save /unsent /sim"""
-COMMAND_ORDER = """demo tui shell send run sim program params macro poll snapshot ports relay scan rescue
-    log config features help report completion"""
 _VERB = re.compile(r"/[a-z][a-z0-9-]*")
 _COMMAND = re.compile(r"[a-z][a-z0-9-]*( [a-z][a-z0-9-]*)?")
 BY_OTHERS = "Added by others"
@@ -65,13 +57,16 @@ class Declared(Mapping[str, D]):
 
     def __init__(
         self,
-        order: Sequence[str],
         by_name: Callable[[Iterable[Operation]], Mapping[str, D]],
         extended: Callable[[D], D],
+        rank: Callable[[D], int],
         named: re.Pattern[str],
     ) -> None:
-        """`extended`: adds to an operation what features add. `named`: matches the names; features have other words."""
-        self._order, self._by_name, self._extended, self._named = order, by_name, extended, named
+        """`extended`: adds to an operation what features add. `rank`: those with the least come first.
+
+        `named` matches the names; features have other words.
+        """
+        self._by_name, self._extended, self._rank, self._named = by_name, extended, rank, named
 
     @cached_property
     def of_core(self) -> Mapping[str, D]:
@@ -80,8 +75,13 @@ class Declared(Mapping[str, D]):
 
     @cached_property
     def core_names(self) -> Sequence[str]:
-        """The names of the core's operations."""
-        return list(dict.fromkeys((*(each for each in self._order if each in self.of_core), *self.of_core)))
+        """The names of the core's operations, in the order of the overviews."""
+        after = {name: each.after for name, each in self.of_core.items() if each.after in self.of_core}
+        names = sorted(
+            (name for name in self.of_core if name not in after), key=lambda name: self._rank(self.of_core[name])
+        )
+        registry.place(after, names)
+        return names
 
     def __getitem__(self, name: str) -> D:
         if name in self.of_core:
@@ -143,9 +143,9 @@ def _with_forms(verb: Verb) -> Verb:
     return verb.extended(added) if added else verb
 
 
-VERBS: Declared[Verb] = Declared(VERB_ORDER.split(), _verbs, _with_forms, _VERB)
+VERBS: Declared[Verb] = Declared(_verbs, _with_forms, lambda each: [*Group].index(Group(each.group)), _VERB)
 """By name, in the order of `/help`."""
-COMMANDS: Declared[Operation] = Declared(COMMAND_ORDER.split(), _commands, lambda each: each, _COMMAND)
+COMMANDS: Declared[Operation] = Declared(_commands, lambda each: each, lambda each: " " in each.command, _COMMAND)
 """By their words, in the order of `--help`; the parts of a group after it."""
 
 

@@ -8,14 +8,13 @@ from typing import TYPE_CHECKING, Annotated
 from multidrop.base.errors import Diagnostic, Inexpressible, NoAnswer
 from multidrop.shell.operations import conditions
 from multidrop.shell.operations.argument_types import Address, BusName, UrlForm
-from multidrop.shell.operations.operation import Operation
+from multidrop.shell.operations.operation import Group, Operation
 from multidrop.shell.operations.parameter import Argument, Listed
 
 if TYPE_CHECKING:
     from multidrop.drives.drive import Drive
     from multidrop.shell.session import Call
 
-GROUP = "Lines and drives"
 NewBusName = Annotated[str, Argument(metavar="NAME")]
 Selected = Annotated[str, Argument(metavar="ADDR|BUS[:ADDR]", listed=(Listed.DRIVE, Listed.BUS))]
 Side = Annotated[str, Argument(words={"left": "before its neighbour", "right": "after its neighbour"})]
@@ -155,7 +154,7 @@ OPERATIONS = (
     Operation(
         open_,
         verb="/open",
-        group=GROUP,
+        group=Group.LINES,
         rows=urls,
         help="""
 Open a line of drives; moves nothing.
@@ -163,11 +162,11 @@ Open a line of drives; moves nothing.
 NAME becomes the name of the bus. URL is a port, the name of a saved connection, or one of these:
 """,
     ),
-    Operation(close, verb="/close", group=GROUP, help="Close a bus; moves nothing and stops nothing."),
+    Operation(close, verb="/close", group=Group.LINES, help="Close a bus; moves nothing and stops nothing."),
     Operation(
         use,
         verb="/use",
-        group=GROUP,
+        group=Group.LINES,
         immediate=True,
         help="""
 Select the drive or the bus for lines without an address.
@@ -178,14 +177,14 @@ A drive of the selected bus takes precedence over a bus of the same name.
     Operation(
         drives,
         verb="/drives",
-        group=GROUP,
+        group=Group.LINES,
         immediate=True,
         help="List the drives of every open bus; * marks the selected drive.",
     ),
     Operation(
         scan,
         verb="/scan",
-        group=GROUP,
+        group=Group.LINES,
         help="""
 Search an open line for drives that are not listed: every name or number, at its baud rate; moves nothing.
 
@@ -195,14 +194,14 @@ Search an open line for drives that are not listed: every name or number, at its
     Operation(
         status,
         verb="/status",
-        group=GROUP,
+        group=Group.LINES,
         fits=conditions.reports_status,
         help="Show the state of a drive in words: motion, program, errors, inputs, outputs.",
     ),
     Operation(
         referenced,
         verb="/referenced",
-        group=GROUP,
+        group=Group.LINES,
         immediate=True,
         help="""
 Take the position of a drive for right again after a restart; nothing is sent.
@@ -213,7 +212,7 @@ A homing that ends well, or a position that is set, does the same. Until then `~
     Operation(
         rename,
         verb="/rename",
-        group=GROUP,
+        group=Group.LINES,
         immediate=True,
         help="""
 Give an open bus (by default the selected one) another name; moves nothing.
@@ -224,14 +223,14 @@ Give an open bus (by default the selected one) another name; moves nothing.
     Operation(
         tab,
         verb="/tab",
-        group=GROUP,
+        group=Group.LINES,
         immediate=True,
         help="Move the tab of a bus, by default of the selected one; no drive moves.",
     ),
     Operation(
         keep,
         verb="/keep",
-        group=GROUP,
+        group=Group.LINES,
         immediate=True,
         help="""
 Save an open bus (by default the selected one) as a connection: /open NAME opens it again.

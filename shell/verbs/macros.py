@@ -15,14 +15,13 @@ from multidrop.shell.operations.argument_types import (
     Reporting,
     Yes,
 )
-from multidrop.shell.operations.operation import Operation, typed
+from multidrop.shell.operations.operation import Group, Operation, typed
 from multidrop.shell.operations.parameter import Argument, Listed
 from multidrop.shell.verbs.macro_places import AtTerminal, Macros, at_terminal, changing
 
 if TYPE_CHECKING:
     from multidrop.shell.session import Call
 
-GROUP = "Macros"
 NewName = Annotated[str, Argument("the other name", metavar="NAME")]
 Note = Annotated[str, Argument("the note", metavar="TEXT ...", rest=True, read=arguments.one_text)]
 Key = Annotated[str, Argument(metavar="F2..F12", read=arguments.function_key, listed=(Listed.KEY,))]
@@ -245,7 +244,7 @@ OPERATIONS = (
         at=Macros,
         command="macro list",
         through=at_terminal,
-        group=GROUP,
+        group=Group.MACROS,
         immediate=True,
         help="""
 List the macros: name, key and page, number of lines, values, note.
@@ -258,7 +257,8 @@ Macros beside a project, in the folder `macros` of the current folder, come befo
     Operation(
         verb="/macro",
         command="macro",
-        group=GROUP,
+        group=Group.MACROS,
+        after="params",
         help="""
 Show, describe, rename, copy or delete a macro; import or export function-key strings.
 
@@ -282,7 +282,7 @@ terminal opens an editor.
     Operation(
         play,
         verb="/play",
-        group=GROUP,
+        group=Group.MACROS,
         recorded=typed,
         concurrent=True,
         help="""
@@ -364,7 +364,7 @@ stops the drives that it set in motion; its on_early_end lines follow. After Ctr
         at=Macros,
         command="macro key",
         through=at_terminal,
-        group=GROUP,
+        group=Group.MACROS,
         immediate=True,
         help="""
 Assign a macro to a function key, or free the key.
@@ -399,7 +399,8 @@ Keys are in pages, each a number or a word; the default is 1. Only key and page 
     Operation(
         recording,
         verb="/record",
-        group=GROUP,
+        group=Group.MACROS,
+        after="/macro",
         immediate=True,
         help="""
 Record the typed lines as a macro, until `/record stop`.

@@ -15,7 +15,7 @@ from multidrop.shell.operations.argument_types import (
     Testing,
     Url,
 )
-from multidrop.shell.operations.operation import Operation, typed
+from multidrop.shell.operations.operation import Group, Operation, typed
 from multidrop.shell.operations.parameter import Argument, Listed
 from multidrop.shell.verbs.on_drives import (
     OfUrl,
@@ -31,7 +31,6 @@ from multidrop.shell.verbs.on_drives import (
 if TYPE_CHECKING:
     from multidrop.shell.session import Call
 
-GROUP = "Programs of drives"
 Personality = Annotated[str, Argument(metavar="PERSONALITY", listed=(Listed.PERSONALITY,))]
 NewFile = Annotated[
     str, Argument("the new file; it can be downloaded again; -: standard output", metavar="FILE", listed=(Listed.FILE,))
@@ -176,7 +175,7 @@ OPERATIONS = (
     Operation(
         check,
         verb="/check",
-        group=GROUP,
+        group=Group.PROGRAMS,
         recorded=typed,
         concurrent=True,
         help="""
@@ -188,6 +187,7 @@ Commands that this drive lacks, by its firmware and part number, are named too.
     ),
     Operation(
         command="program",
+        after="sim",
         meaning="check, test and sweep program files; transfer programs",
         urls=True,
     ),
@@ -210,7 +210,8 @@ Commands that this drive lacks, by its firmware and part number, are named too.
     Operation(
         list_,
         verb="/list",
-        group=GROUP,
+        group=Group.PROGRAMS,
+        after="/upload",
         recorded=list_recorded,
         help="""
 List the program of a drive, or write the list into a new file.
@@ -236,7 +237,8 @@ A word with a dot or a slash is a file. `/upload` writes a file that can be down
         at=one_of_call,
         command="program upload",
         through=of_url_to_files,
-        group=GROUP,
+        group=Group.PROGRAMS,
+        after="/download",
         recorded=upload_recorded,
         help="""
 Save the program of a drive, with its variables, to a new file that can be downloaded again.
@@ -252,7 +254,8 @@ It has the remarks and the layout of the file that was downloaded last with the 
         at=one_of_call,
         command="program download",
         through=agreed_of_url,
-        group=GROUP,
+        group=Group.PROGRAMS,
+        after="/check",
         recorded=download_recorded,
         changes=True,
         help="""
@@ -266,7 +269,7 @@ The program that it replaces is cleared (CP); a program at another address stays
     Operation(
         trace,
         verb="/trace",
-        group=GROUP,
+        group=Group.PROGRAMS,
         recorded=debugger_recorded,
         changes=True,
         concurrent=True,
@@ -281,7 +284,7 @@ shown at the lines at which its program was seen.
     Operation(
         step,
         verb="/step",
-        group=GROUP,
+        group=Group.PROGRAMS,
         recorded=debugger_recorded,
         changes=True,
         help="""
@@ -294,7 +297,7 @@ with a checksum. The line may start a motion. A stop ends program and single ste
     Operation(
         continue_,
         verb="/continue",
-        group=GROUP,
+        group=Group.PROGRAMS,
         recorded=debugger_recorded,
         changes=True,
         help="Let a program that waits run on at normal speed.",
@@ -302,7 +305,7 @@ with a checksum. The line may start a motion. A stop ends program and single ste
     Operation(
         break_,
         verb="/break",
-        group=GROUP,
+        group=Group.PROGRAMS,
         recorded=debugger_recorded,
         changes=True,
         help="""
@@ -314,7 +317,7 @@ A drive has one break point. Without arguments, show it.
     Operation(
         watch,
         verb="/watch",
-        group=GROUP,
+        group=Group.PROGRAMS,
         recorded=debugger_recorded,
         help="Show variables now, and whenever a step, a break or the end of a program has changed them.",
     ),

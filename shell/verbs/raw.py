@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 from multidrop.base.errors import Diagnostic
 from multidrop.shell.operations import arguments, conditions
 from multidrop.shell.operations.argument_types import Switch, UrlForm
-from multidrop.shell.operations.operation import Operation
+from multidrop.shell.operations.operation import Group, Operation
 from multidrop.shell.operations.parameter import Argument
 
 if TYPE_CHECKING:
@@ -17,7 +17,6 @@ if TYPE_CHECKING:
     from multidrop.shell.raw import RawLine
     from multidrop.shell.session import Call
 
-GROUP = "Bytes"
 BREAK = 250
 """The length of a break, ms."""
 LONGEST_BREAK = 2000
@@ -167,7 +166,7 @@ OPERATIONS = (
     Operation(
         begin,
         verb="/raw",
-        group=GROUP,
+        group=Group.BYTES,
         changes=True,
         help="""
 Talk to the selected port itself, whatever is on it: bytes both ways, with times.
@@ -192,7 +191,7 @@ serial port, rfc2217:// or ssh://. MS is 250 unless given.
     Operation(
         show_bytes,
         verb="/hex",
-        group=GROUP,
+        group=Group.BYTES,
         immediate=True,
         help="""
 Show the bytes on the selected line, both ways, beside its lines; without a word, or no longer.
@@ -203,7 +202,7 @@ Bytes of polls are left out. In raw mode bytes are always shown: see /raw show. 
     Operation(
         send_bytes,
         verb="/bytes",
-        group=GROUP,
+        group=Group.BYTES,
         fits=conditions.is_raw,
         changes=True,
         help="""

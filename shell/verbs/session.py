@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 from multidrop.base.errors import Diagnostic, Stopped
 from multidrop.shell.operations import conditions
 from multidrop.shell.operations.argument_types import FileName
-from multidrop.shell.operations.operation import Operation
+from multidrop.shell.operations.operation import Group, Operation
 from multidrop.shell.operations.parameter import Argument, Listed
 from multidrop.shell.roles import EVERYTHING, TIMES, Filter
 
@@ -15,7 +15,6 @@ if TYPE_CHECKING:
     from multidrop.shell.roles import Transcripts
     from multidrop.shell.session import Call
 
-STOPS, SCREEN = "Stop and end", "The session and its screen"
 Word = Annotated[str, Argument(metavar="WORD|NUMBER", listed=(Listed.WORD,))]
 PageName = Annotated[str, Argument(metavar="NAME")]
 LogPlace = Annotated[
@@ -195,7 +194,7 @@ OPERATIONS = (
     Operation(
         stop,
         verb="/stop",
-        group=STOPS,
+        group=Group.STOPS,
         immediate=True,
         help="""
 Stop every drive on every bus, and macros, scripts and waits.
@@ -204,12 +203,12 @@ Ctrl+X does the same from anywhere. Macros and scripts are refused until /resume
 """,
     ),
     Operation(
-        resume, verb="/resume", group=STOPS, immediate=True, help="Let macros and scripts run again after a stop."
+        resume, verb="/resume", group=Group.STOPS, immediate=True, help="Let macros and scripts run again after a stop."
     ),
     Operation(
         quit_,
         verb="/quit",
-        group=STOPS,
+        group=Group.STOPS,
         immediate=True,
         help="""
 End multidrop; drives go on as they are.
@@ -217,11 +216,11 @@ End multidrop; drives go on as they are.
 At a terminal it first names the drives that move or may move, and asks.
 """,
     ),
-    Operation(quit_, verb="/exit", group=STOPS, immediate=True, help="End multidrop, as /quit does."),
+    Operation(quit_, verb="/exit", group=Group.STOPS, immediate=True, help="End multidrop, as /quit does."),
     Operation(
         help_,
         verb="/help",
-        group=SCREEN,
+        group=Group.SCREEN,
         immediate=True,
         help="""
 Explain a verb, a command of the drives or an error number.
@@ -233,7 +232,7 @@ drive, `@* TEXT` to all drives of a bus.
     Operation(
         clear,
         verb="/clear",
-        group=SCREEN,
+        group=Group.SCREEN,
         fits=conditions.has_something_to_clear,
         immediate=True,
         help="""
@@ -245,7 +244,7 @@ No drive notices. A log and the history keep their lines.
     Operation(
         log,
         verb="/log",
-        group=SCREEN,
+        group=Group.SCREEN,
         immediate=True,
         help="""
 Append everything typed, sent, received and printed to a file, in JSON lines with the time of day.
@@ -256,7 +255,7 @@ Without a word it shows the file. `multidrop log show` shows what is in it.
     Operation(
         page,
         verb="/page",
-        group=SCREEN,
+        group=Group.SCREEN,
         fits=conditions.has_screen,
         immediate=True,
         help="""
@@ -268,7 +267,7 @@ Escape goes back. A name that is not a page is answered with the names of all.
     Operation(
         tour,
         verb="/tour",
-        group=SCREEN,
+        group=Group.SCREEN,
         fits=conditions.has_screen,
         immediate=True,
         help="""
@@ -280,7 +279,7 @@ Each step names what to type or press, and goes on when it was done. Escape ends
     Operation(
         times,
         verb="/times",
-        group=SCREEN,
+        group=Group.SCREEN,
         fits=conditions.has_transcript,
         immediate=True,
         help="""
@@ -292,7 +291,7 @@ configuration keeps the form for the next start.
     ),
     Operation(
         verb="/filter",
-        group=SCREEN,
+        group=Group.SCREEN,
         fits=conditions.has_transcript,
         help="""
 Show only some lines of the selected bus: /filter mine, /filter errors b, /filter text VX.
@@ -307,7 +306,7 @@ the filter. Ctrl+F searches instead.
     Operation(
         save,
         verb="/save",
-        group=SCREEN,
+        group=Group.SCREEN,
         fits=conditions.has_transcript,
         help="""
 Write the lines of the transcript that is shown to a new text file, with date and time.
@@ -318,7 +317,7 @@ With a filter, these are the lines that it shows. It replaces no file. /log on k
     Operation(
         unsent,
         verb="/unsent",
-        group=SCREEN,
+        group=Group.SCREEN,
         fits=conditions.has_transcript,
         help="""
 Offer the lines again that were held back by a failure before them, or dropped by a stop.

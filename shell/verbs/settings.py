@@ -13,7 +13,7 @@ from multidrop.shell.operations.argument_types import (
     Url,
     Yes,
 )
-from multidrop.shell.operations.operation import Operation, typed
+from multidrop.shell.operations.operation import Group, Operation, typed
 from multidrop.shell.operations.parameter import Argument, Listed
 from multidrop.shell.verbs.on_drives import (
     OfCall,
@@ -30,7 +30,6 @@ if TYPE_CHECKING:
     from multidrop.shell.origin import Origin
     from multidrop.shell.session import Call, Session
 
-GROUP = "Settings and values"
 NewFile = Annotated[str, Argument("the new file; -: standard output", metavar="FILE", listed=(Listed.FILE,))]
 Backup = Annotated[str, Argument("a file of `params backup`", metavar="FILE", listed=(Listed.FILE,))]
 With = Annotated[str, Argument("compare with this drive", metavar="ADDR", listed=(Listed.DRIVE,))]
@@ -205,7 +204,8 @@ OPERATIONS = (
     Operation(
         verb="/params",
         command="params",
-        group=GROUP,
+        group=Group.VALUES,
+        after="program",
         help="""
 Read the settings of a drive, keep them in a file, compare them, or restore what differs.
 
@@ -295,7 +295,7 @@ leaves alone what can move the motor, unless --with names it.
     Operation(
         snapshot,
         verb="/snapshot",
-        group=GROUP,
+        group=Group.VALUES,
         recorded=typed,
         help="""
 Read every drive and write a new cell file, which the simulator opens as the same machine.
@@ -306,6 +306,7 @@ Nothing moves. The file has identity, settings, variables, program, position and
     Operation(
         snapshot_of_urls,
         command="snapshot",
+        after="poll",
         meaning="read every drive into a new cell file, which the simulator opens as the same machine",
         examples=(
             "snapshot press -o machine.toml",

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 from multidrop.base.errors import Diagnostic
 from multidrop.shell.operations import conditions
 from multidrop.shell.operations.argument_types import BusName
-from multidrop.shell.operations.operation import Operation, typed
+from multidrop.shell.operations.operation import Group, Operation, typed
 from multidrop.shell.operations.parameter import Argument, Listed
 from multidrop.simulator import MEANINGS, table
 
@@ -84,7 +84,7 @@ FORMS: Mapping[str, Callable[..., None]] = {
 OPERATIONS = (
     Operation(
         verb="/sim",
-        group="Simulated drives",
+        group=Group.SIMULATED,
         rows=_words,
         fits=conditions.is_simulated,
         help="Act on simulated drives from outside: inputs, loads, power, cables.",

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from multidrop.base.errors import Diagnostic
 from multidrop.shell.operations import arguments
-from multidrop.shell.operations.operation import Operation
+from multidrop.shell.operations.operation import Group, Operation
 from multidrop.shell.operations.parameter import Argument, Listed
 
 if TYPE_CHECKING:
@@ -14,7 +14,6 @@ if TYPE_CHECKING:
     from multidrop.shell.session import Call
 
 
-GROUP = "Lines and drives"
 Shown = Annotated[str, Argument(words={"on": "show positions in units", "off": "show the drive's own numbers"})]
 Axis = Annotated[str, Argument(metavar="ADDR", listed=(Listed.DRIVE,))]
 MaybeAxis = Annotated[str, Argument(metavar="ADDR", listed=(Listed.DRIVE,), omitted="")]
@@ -138,7 +137,8 @@ OPERATIONS = (
     Operation(
         list_,
         verb="/units",
-        group=GROUP,
+        group=Group.LINES,
+        after="/status",
         help="""
 Give an axis a scale, or list the scales; on and off: show positions in units, or in the drive's numbers.
 

@@ -5,13 +5,12 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Annotated
 
 from multidrop.shell.operations import arguments, conditions
-from multidrop.shell.operations.operation import Operation, typed
+from multidrop.shell.operations.operation import Group, Operation, typed
 from multidrop.shell.operations.parameter import Argument, Listed
 
 if TYPE_CHECKING:
     from multidrop.shell.session import Call
 
-GROUP = "Settings and values"
 Plotted = Annotated[str, Argument(metavar="ADDR", listed=(Listed.DRIVE,))]
 Access = Annotated[
     arguments.Accessed,
@@ -55,7 +54,7 @@ OPERATIONS = (
     Operation(
         plot,
         verb="/plot",
-        group=GROUP,
+        group=Group.VALUES,
         recorded=typed,
         help="""
 Plot drives and values on the screen, until /plot off.
@@ -68,7 +67,7 @@ It reads only while a plot is shown, each drive 50 times a second; `/plot` alone
     Operation(
         register,
         verb="/register",
-        group=GROUP,
+        group=Group.VALUES,
         recorded=typed,
         fits=conditions.has_registers,
         changes=True,
@@ -82,7 +81,7 @@ registers of its value, low word first; =LOW,HIGH writes two words. It transfers
     Operation(
         coil,
         verb="/coil",
-        group=GROUP,
+        group=Group.VALUES,
         recorded=typed,
         fits=conditions.has_registers,
         changes=True,
@@ -91,7 +90,7 @@ registers of its value, low word first; =LOW,HIGH writes two words. It transfers
     Operation(
         device,
         verb="/device",
-        group=GROUP,
+        group=Group.VALUES,
         fits=conditions.has_registers,
         help="Show vendor, part number, revision, serial number and version of the selected drive.",
     ),

@@ -6,14 +6,13 @@ import argparse
 import re
 from typing import TYPE_CHECKING, Annotated, NamedTuple
 
-from multidrop.shell.operations.operation import Operation, typed
+from multidrop.shell.operations.operation import Group, Operation, typed
 from multidrop.shell.operations.parameter import Argument, Listed
 
 if TYPE_CHECKING:
     from multidrop.shell.session import Call
     from multidrop.shell.waits import Condition
 
-GROUP = "Waits"
 _TEXT = re.compile(r"""(?P<quote>["'])(?P<text>.+?)(?P=quote)(?:\s+(?P<seconds>\S+))?""")
 _VALUE = re.compile(r"(?P<condition>(?:@\S+\s+)?[^\s=!<>]+\s*[=!<>]=?\s*(?:\{[^{}]*\}|\S+))(?:\s+(?P<seconds>\S+))?")
 
@@ -122,7 +121,7 @@ OPERATIONS = (
     Operation(
         wait,
         verb="/wait",
-        group=GROUP,
+        group=Group.WAITS,
         recorded=typed,
         checked=True,
         help="""
@@ -138,5 +137,5 @@ last line to a drive.
     ),
     Operation(wait_value, verb="/wait", recorded=with_drive),
     Operation(wait_text, verb="/wait", recorded=typed),
-    Operation(sleep, verb="/sleep", group=GROUP, recorded=typed, checked=True, help="Wait for a time."),
+    Operation(sleep, verb="/sleep", group=Group.WAITS, recorded=typed, checked=True, help="Wait for a time."),
 )

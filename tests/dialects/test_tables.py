@@ -16,7 +16,7 @@ PAIRS = (
     ["word", "text"],
     ["topic", "text"],
     ["of", "value"],
-    ["product", "point"],
+    ["group", "point"],
 )
 """The heads of the two cells that are the key of a row together."""
 

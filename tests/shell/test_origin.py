@@ -9,6 +9,8 @@ from typing import Any
 
 import pytest
 
+from multidrop.base.errors import Diagnostic
+from multidrop.base.foreign import Guard
 from multidrop.shell.events import Entered, Output, Printed
 from multidrop.shell.operations.table import VERBS
 from multidrop.shell.origin import PERSON, Origin
@@ -70,3 +72,20 @@ def test_a_role_is_played_by_the_bus_that_was_cast_last() -> None:
     assert [origin.played(name) for name in ("line", "other", "press", "")] == ["gantry", "gantry", "press", ""]
     assert origin.target("line:a") == ("gantry", "a") and origin.target("a") == ("", "a")
     assert PERSON.played("line") == "line"
+
+
+async def test_a_line_that_a_feature_by_others_runs_without_its_origin_is_refused_unsent(shop: CellSession) -> None:
+    """It may be a script's line: its early end would stop nothing of it."""
+
+    async def verb() -> None:
+        await shop.session.run("@a SL 1000")
+
+    async def said() -> None:
+        await shop.session.run("@a SL 1000", shop.session.origin)
+
+    shop.events.clear()
+    with pytest.raises(Diagnostic, match=r"a feature ran it without its origin; it was not sent.*call\.run"):
+        await Guard("gauge").function(verb)()
+    assert shop.written("press") == b"" and shop.moving() == set()
+    await Guard("gauge").function(said)()
+    assert shop.moving() == {"press:a"}

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from random import Random
 
-from multidrop.families.lexium.manual import parameter_plan as checks
 from multidrop.families.lexium.manual import parameters as manual
 from multidrop.families.lexium.manual.mnemonic import Mnemonic
+from multidrop.families.lexium.manual.point_types import types
 
 PROGRAM = "PG 1\nLB G1\nRT\nLB G2\nRT\nE\nPG"
 NAMES = ("TI=1,G1", "TP=100,G2", "TT=9,G1", "TM=G1", "TC=G1", "TR=50,G2,3", "TA=3,G1", "VA Q1=5", "VA Q2", "Q1=7")
@@ -35,10 +35,10 @@ def _plain(random: Random, row: Mnemonic) -> str:
 
 
 def _point(random: Random, product: str, pool: list[Mnemonic]) -> str:
-    names = [each.name for each in pool if checks.types(each.name, product)]
+    names = [each.name for each in pool if types(each.name, product)]
     names += [f"{word}{n}" for word in manual.lists(product) for n in (1, 2, 3) if word != "LS"] + ["LS0", "LS1"]
     name = random.choice(names)
     if name.startswith("LS"):
         return f"LS={name[2]},{random.randint(-300, 300)},{random.randint(0, 1)}"
-    kind, active = random.choice(sorted(checks.types(name, product))), random.randint(0, 1)
+    kind, active = random.choice(sorted(types(name, product))), random.randint(0, 1)
     return f"{name}={kind},{active}" if name[0] == "S" else f"{name[:2]}={name[2]},{kind},{active}"

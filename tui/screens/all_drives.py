@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Awaitable, Sequence
+from collections.abc import Awaitable, Callable, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -26,13 +26,10 @@ URGENCY = (
 )
 """The states, the worst first."""
 AT_REST = (State.NO_CURRENT, State.STOPPED, State.IDLE)
-NAME = 17
-POSITION = 13
-VELOCITY = 11
-SPARK, FEW = 16, 5
-"""Cells of the positions of the last seconds; the few on a screen that is not roomy."""
 ROOMY, NARROW = 100, 80
 """Widths from which the last seconds are wide, and below which trouble has their place and that of the velocity."""
+BETWEEN = 2
+"""Blank cells between the last column and what fills the row."""
 WIDE, LEAST = 110, 16
 """Least width of the page, and least rows below the list, with the chosen drive there."""
 HEAD, FEWEST = 6, 8
@@ -103,33 +100,83 @@ def _has(place: Place, word: str, now: float) -> bool:
     return word in f"{place.name} {sign} {place.alarm()} {place.glance.product}".casefold()
 
 
+class DriveColumn(NamedTuple):
+    """A column of the list. A number that is longer than it takes the room from the next one."""
+
+    head: str
+    cells: int
+    span: Callable[[Place, float, bool, int], Span]
+    """What it shows of a drive, now, whether it is chosen, in so many cells."""
+    right: bool = False
+    gap: int = 0
+    """Blank cells after it."""
+    least: int = 0
+    """The least width of the page with it."""
+    few: int = 0
+    """Its cells on a page that is not roomy; 0: as many."""
+
+    def room(self, width: int) -> int:
+        """The cells that it has on a page of a width."""
+        return self.few if self.few and width < ROOMY else self.cells
+
+    def put(self, text: str, cells: int) -> str:
+        return f"{text:>{max(0, cells)}}" if self.right else fit(text, cells)
+
+
+def _position(place: Place, now: float, chosen: bool, cells: int) -> Span:
+    position, _, role = place.glance.values(now)
+    return position, role
+
+
+def _velocity(place: Place, now: float, chosen: bool, cells: int) -> Span:
+    _, velocity, role = place.glance.values(now)
+    return f" {velocity}", role
+
+
+def _last_seconds(place: Place, now: float, chosen: bool, cells: int) -> Span:
+    role = place.glance.values(now)[2]
+    return spark(place.glance.readout, now, cells), "dim" if role == "dim" else "accent"
+
+
+def _state(place: Place, now: float, chosen: bool, cells: int) -> Span:
+    return short_words(place.glance, place.glance.readout, now), place.glance.sign(now)[1]
+
+
+def _name(place: Place, now: float, chosen: bool, cells: int) -> Span:
+    return visible(place.name), "accent" if chosen else "text"
+
+
+COLUMNS = (
+    DriveColumn("drive", 17, _name, gap=1),
+    DriveColumn("state", STATE, _state),
+    DriveColumn("position", 13, _position, right=True),
+    DriveColumn("velocity", 11, _velocity, right=True, gap=1, least=NARROW),
+    DriveColumn("20 s", 16, _last_seconds, right=True, gap=2, least=NARROW, few=5),
+)
+"""The columns of the list; what matters most besides these fills the row."""
+
+
+def _columns(width: int) -> list[DriveColumn]:
+    return [each for each in COLUMNS if width >= each.least]
+
+
 def drive_row(place: Place, now: float, width: int, chosen: bool) -> Row:
-    """Name, state, position, velocity, the last seconds, and what matters most besides, of a drive."""
-    position, velocity, role = place.glance.values(now)
-    row: list[Span] = [
-        ("▸" if chosen else " ", "accent"),
-        (fit(visible(place.name), NAME) + " ", "accent" if chosen else "text"),
-        (short_words(place.glance, place.glance.readout, now), place.glance.sign(now)[1]),
-        (f"{position:>{POSITION}}", role),
-    ]
-    if width < NARROW:
-        room = width - width_of(row) - 2
-        text, text_role = place.besides(room, now)
-        return (*row, (fit(f"  {text}", room + 2), text_role))
-    beyond = max(0, len(position) - POSITION)
-    row.append((f"{f' {velocity}':>{max(0, VELOCITY - beyond)}} ", role))
-    cells = SPARK if width >= ROOMY else FEW
-    row.append((f"{spark(place.glance.readout, now, cells)}  ", "dim" if role == "dim" else "accent"))
-    room = width - width_of(row)
-    text, text_role = place.besides(room, now)
-    return (*row, (fit(text, room), text_role))
+    """The columns of a drive, and what matters most besides these."""
+    row: list[Span] = [("▸" if chosen else " ", "accent")]
+    beyond, columns = 0, _columns(width)
+    for column in columns:
+        cells = column.room(width)
+        text, role = column.span(place, now, chosen, cells)
+        row.append((column.put(text, cells - beyond) + " " * column.gap, role))
+        beyond = max(0, len(text) - cells) if column.right else 0
+    room, between = width - width_of(row), " " * (BETWEEN - columns[-1].gap)
+    text, role = place.besides(room - len(between), now)
+    return (*row, (fit(between + text, room), role))
 
 
 def columns_row(width: int) -> Row:
-    names = f" {fit('drive', NAME)} {fit('state', STATE)}{'position':>{POSITION}}"
-    if width < NARROW:
-        return ((names, "dim"),)
-    return ((f"{names}{'velocity':>{VELOCITY}} {'20 s':>{SPARK if width >= ROOMY else FEW}}", "dim"),)
+    heads = (each.put(each.head, each.room(width)) + " " * each.gap for each in _columns(width))
+    return ((f" {''.join(heads)}".rstrip(), "dim"),)
 
 
 def summary(places: Sequence[Place]) -> str:

@@ -72,7 +72,7 @@ class Form(StrEnum):
     """A number, and a second one that may be left out."""
     TEXT = "text"
     FIELDS = "fields"
-    """Several numbers; `Setup.numbers` has how many."""
+    """Several numbers; `Setup.numbers` has how many, and then the greatest of each where the drive limits them."""
     LIST = "list"
     """A set-up for each number of `Setup.numbers`, the first field of a line that writes one."""
     TRIP = "trip"
@@ -86,6 +86,8 @@ class Setup(NamedTuple):
     numbers: tuple[int, ...] = ()
     removable: bool = False
     """A trip that 0 removes; others stay until FD."""
+    repeated: bool = False
+    """A trip with how often it repeats as its last field."""
 
 
 class Leads(StrEnum):

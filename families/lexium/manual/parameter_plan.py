@@ -20,8 +20,9 @@ from multidrop.dialects.values import (
 )
 from multidrop.families.lexium.manual import groups
 from multidrop.families.lexium.manual import parameters as manual
-from multidrop.families.lexium.manual.mnemonic import CLOSED_LOOP, EXPANDED, MDRIVE_PLUS, Alone, Kept
+from multidrop.families.lexium.manual.mnemonic import EXPANDED, MDRIVE_PLUS, Alone, Kept
 from multidrop.families.lexium.manual.parameters import CLOCKS, SHARED, TORQUE, writable
+from multidrop.families.lexium.manual.point_types import OUTPUT_TYPES, types
 from multidrop.families.lexium.manual.table import lookup
 
 IN_UNITS = frozenset(
@@ -36,35 +37,8 @@ PER_MICROSTEP = 10000
 """The highest velocity of a Lexium for each microstep of MS, steps/s."""
 LEAST_WITH_HMT = 10
 LONGEST_DELAY = 65535
-_INPUT, _OUTPUT = frozenset({0, 1, 2, 3, 4, 5, 6, 7, 8, 11}), frozenset({16, 17, 18, 19, 20, 23})
-_CLOCK, _HMT = frozenset({13, 14, 15}), frozenset({21, 24, 25})
-_LEXIUM_TYPES = {
-    "IS1": _INPUT | {12},
-    "IS2": _INPUT,
-    "IS3": _INPUT | _CLOCK,
-    "IS4": _INPUT | _CLOCK,
-    "IS5": frozenset({9, 10}),
-    "IS6": frozenset({0}),
-    "OS1": _OUTPUT | {26, 29},
-    "OS2": _OUTPUT | {27, 29},
-    "OS3": _OUTPUT | {28, 29},
-}
-_MDRIVE_TYPES = {
-    **{f"S{n}": _INPUT | _OUTPUT for n in (1, 2, 3, 4, 9, 10, 11, 12)},
-    "S5": frozenset({9, 10}),
-    "S7": frozenset({33, 34, 35, 49, 50, 51}),
-    "S8": frozenset({33, 34, 35, 49, 50, 51}),
-    "S13": frozenset({60, 61}),
-}
 PAIRS = {"IS3": "IS4", "IS4": "IS3", "S7": "S8", "S8": "S7"}
 """The two points of a clock."""
-
-
-def types(name: str, product: str) -> frozenset[int]:
-    """The types that a point takes; empty for any other setting."""
-    if name.startswith("OS") and product in CLOSED_LOOP:
-        return _LEXIUM_TYPES.get(name, frozenset()) | _HMT
-    return _LEXIUM_TYPES.get(name) or _MDRIVE_TYPES.get(name, frozenset())
 
 
 def impossible(name: str, value: Value, now: Mapping[str, Value | None], labels: Collection[str]) -> str:
@@ -156,7 +130,7 @@ def check_together(product: str, final: Mapping[str, Value], counts: bool, goal:
                 raise Diagnostic(
                     f"{name} = {list(value)}: type {value[0]}; valid: {', '.join(map(str, sorted(valid)))}"
                 )
-            sources = product in EXPANDED or value[0] not in _OUTPUT
+            sources = product in EXPANDED or value[0] not in OUTPUT_TYPES
             if any(each not in (0, 1) for each in value[1:]) or (len(value) > 2 and value[2] and not sources):
                 raise Diagnostic(
                     f"{name} = {list(value)}: fields after the type must be 0 or 1, as the product has them"
@@ -471,7 +445,7 @@ def risk(name: str, value: Value, now: Mapping[str, Value | None]) -> str:
         return "the drive may make up lost steps at once"
     if name == "EE" and now.get("PM"):
         return TURNS[Alone.CORRECTION]
-    if name in groups.TRIPS and isinstance(value, tuple) and isinstance(value[1], int) and value[1]:
+    if name in groups.TRIPS and isinstance(value, tuple) and any(each and isinstance(each, int) for each in value[1:2]):
         return "it calls an address, which may hold another program's line"
     point = name.startswith(tuple(groups.LISTS)) or manual.POINT.fullmatch(name) is not None
     if not point or name.startswith(("LS", "OS")) or not isinstance(value, tuple):

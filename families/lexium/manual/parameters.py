@@ -13,23 +13,21 @@ from enum import Enum
 from functools import lru_cache
 from math import isfinite
 
-from multidrop.base.errors import Diagnostic
-from multidrop.dialects.values import IO, PARAMETERS, VARIABLES, Reading, Scalar, Value, number
-from multidrop.families.lexium.manual.grammar import is_name
-from multidrop.families.lexium.manual.groups import FIELDS, LISTS, STATES, TRIPS, TRIPS_WITH_VALUE, UNIT, WIRE
+from multidrop.dialects.values import IO, PARAMETERS, VARIABLES, Reading, Scalar, Value
+from multidrop.families.lexium.manual.groups import LISTS, STATES, TRIPS, UNIT, WIRE
 from multidrop.families.lexium.manual.mnemonic import (
     CLOSED_LOOP,
     ENCODER,
     EVERY,
     FLOAT_HIGH,
-    INT_HIGH,
-    INT_LOW,
     LEXIUM,
     MDRIVE_ENCODER,
     Mnemonic,
 )
+from multidrop.families.lexium.manual.point_types import FRESH
 from multidrop.families.lexium.manual.supported import lacks
 from multidrop.families.lexium.manual.table import MNEMONICS, lookup, words
+from multidrop.families.lexium.manual.value_forms import value_form
 
 ANALOG_UNREAD = ("IS5", "PR IS does not print it")
 HANDLER_UNREAD = ("OE", "no drive prints it")
@@ -85,15 +83,17 @@ def locks_resolution(product: str) -> bool:
 
 def fresh(name: str) -> Value | None:
     """The default of a set-up; None for any other word."""
-    special: dict[str, Value] = {"S5": (9, 0), "S7": (33, 0), "S8": (33, 0), "S13": (60, 0, 0), "PF": (10, 6, 0, 0)}
-    if name in special:
-        return special[name]
+    if name in FRESH:
+        return FRESH[name]
     if name in TRIPS:
         return 0
-    if re.fullmatch(r"S\d+", name):
+    if POINT.fullmatch(name):
         return (0, 0, 0)
-    found = re.fullmatch(r"(IS|OS|LS)\d", name)
-    return None if found is None else {"IS": (0, 0), "OS": (16, 0), "LS": (0, 0)}[found[1]]
+    found = _SETUP.fullmatch(name)
+    if found is not None:
+        return (16, 0) if found[1] == "OS" else (0, 0)
+    default = MNEMONICS[name].default if name in MNEMONICS else None
+    return tuple(map(int, default.split(","))) if isinstance(default, str) and "," in default else None
 
 
 def section(name: str) -> str:
@@ -148,9 +148,6 @@ CLOCKS = frozenset({13, 14, 15, 33, 34, 35, 49, 50, 51})
 """Types of points that are a clock; both points of a pair have one."""
 SHARED = frozenset({0, 16}) | CLOCKS
 """Types that several points may have."""
-PRINT_FORMAT = (16, 16, 1, 1)
-"""The highest fields of PF."""
-MOST_REPEATS = 65000
 LONGEST_NUMBER = 40
 _SETUP = re.compile(r"(IS|OS|LS)(\d)")
 POINT = re.compile(r"S\d+")
@@ -188,53 +185,8 @@ def checked(name: str, value: Value, product: str, counts: bool, labels: Collect
     row, value = row_of(name, product), whole_setup(name, value)
     if isinstance(value, float) and value.is_integer() and not (row is not None and isinstance(row.default, float)):
         value = int(value)
-    if row is None:
-        if not is_name(name):
-            raise Diagnostic(f"{name}: is neither a word of the drive nor a name for a variable")
-        if name in labels:
-            raise Diagnostic(f"{name}: is a label of the program in the drive, so no variable can have that name")
-        if not (isinstance(value, int) and INT_LOW <= value <= INT_HIGH):
-            raise Diagnostic(f"{name} = {value}: a variable takes a whole number from {INT_LOW} to {INT_HIGH}")
-        return value
-    if product in EVERY and product not in row.products:
-        raise Diagnostic(f"{name}: an {product} lacks it")
-    if name in TRIPS:
-        # A trip: a target alone, or a number, a target, and for TR the repeats.
-        fields = value if isinstance(value, tuple) else (value,)
-        alone, most = name not in TRIPS_WITH_VALUE, 3 if name == "TR" else 2
-        target = fields[0 if alone else 1 : 1 if alone else 2]
-        valid = len(fields) == 1 if alone else 2 <= len(fields) <= most or value == 0
-        valid = valid and all(isinstance(each, int) or (each in target and isinstance(each, str)) for each in fields)
-        first = fields[0]
-        if valid and not alone and value != 0:
-            valid = isinstance(first, int) and row.accepts(first) and not (name == "TR" and first == 0)
-        if not valid or any(not 0 <= number(each) <= MOST_REPEATS for each in fields[2:]):
-            raise Diagnostic(f"{name} = {value}: takes {row.syntax.partition(', PR')[0]}")
-        return value
-    if (count := _fields_of(name)) is not None:
-        if not (isinstance(value, tuple) and len(value) == count and all(isinstance(each, int) for each in value)):
-            raise Diagnostic(f"{name} = {value}: takes {count} whole numbers, as in {name} = {[0] * count}")
-        for each, most in zip(value, PRINT_FORMAT if name == "PF" else (), strict=False):
-            if not 0 <= number(each) <= most:
-                raise Diagnostic(f"{name} = {list(value)}: valid: up to {list(PRINT_FORMAT)}")
-        return value
-    if row.access != "RW" or not row.valued:
-        raise Diagnostic(f"{name}: is not a setting ({row.title})")
-    if name == "DN":
-        if not (isinstance(value, str) and len(value) == 1 and value.isascii() and value.isalnum()):
-            raise Diagnostic(f"DN = {value}: takes one letter or digit")
-    elif not (isinstance(value, (int, float)) and row.accepts(value, counts)):
-        low, high = row.bounds(counts)
-        valid_ones = ", ".join(map(str, row.values)) if row.values else f"{low} to {high}"
-        unit = " (with EE=1)" if counts and row.low_encoder else ""
-        raise Diagnostic(f"{name} = {value}: valid: {valid_ones}{unit}")
+    value_form(name, row, product, counts, labels).check(value)
     return value
-
-
-def _fields_of(name: str) -> int | None:
-    if _SETUP.fullmatch(name):
-        return 2
-    return FIELDS.get(name)
 
 
 def writable(value: Value) -> bool:

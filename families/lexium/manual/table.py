@@ -74,7 +74,8 @@ def _products(text: str, everywhere: frozenset[str]) -> frozenset[str]:
 
 def _setup(text: str) -> Setup:
     form, *more = text.split()
-    return Setup(Form(form), tuple(int(each) for each in more if each.isdigit()), "removable" in more)
+    numbers = tuple(int(each) for each in more if each.isdigit())
+    return Setup(Form(form), numbers, "removable" in more, "repeated" in more)
 
 
 def record(row: Mapping[str, str], everywhere: frozenset[str]) -> Mnemonic:

@@ -19,22 +19,12 @@ from multidrop.families.tmcl.host.operations import read
 from multidrop.families.tmcl.manual import commands
 from multidrop.families.tmcl.manual.commands import Axis, Call, Command
 from multidrop.families.tmcl.manual.modules import module_of
+from multidrop.families.tmcl.manual.parameters import AXIS, MEASURED, SCALES
 
 CLOCK = 16_000_000
 """Of the chip, Hz."""
 FULL_STEPS = 200
-REVERSE_SHAFT = 251
-RESTS = (Axis.MICROSTEPS, Axis.RAMP_DIVISOR, Axis.PULSE_DIVISOR, Axis.UNIT_MODE, REVERSE_SHAFT)
-PARAMETERS = {
-    Axis.TARGET_POSITION: Takes.PLACE,
-    Axis.ACTUAL_POSITION: Takes.PLACE,
-    Axis.TARGET_VELOCITY: Takes.VELOCITY,
-    Axis.ACTUAL_VELOCITY: Takes.VELOCITY,
-    Axis.MAXIMUM_VELOCITY: Takes.SPEED,
-    Axis.MAXIMUM_ACCELERATION: Takes.ACCELERATION,
-    Axis.SEARCH_SPEED: Takes.SPEED,
-    Axis.SWITCH_SPEED: Takes.SPEED,
-}
+_SET = [number for number in MEASURED if AXIS[number].writable]
 _SETTING = re.compile(r"(\d{1,3})(?:_(\d))?", re.ASCII)
 _LINE = re.compile(rf"\s*(?:(ROR)|(MVP)\s+(ABS|REL)\s*,|(SAP)\s+(\d+)\s*,)\s*(\d+)\s*,\s*{VALUE}\s*", re.I)
 
@@ -48,7 +38,7 @@ class TmclUnits(Units):
 
     state: TmclState
 
-    words = "MVP ABS, MVP REL, ROR, and SAP of 0, 1, 2, 4, 5, 194, 195"
+    words = f"MVP ABS, MVP REL, ROR, and SAP of {', '.join(map(str, sorted(_SET)))}"
 
     def axes(self) -> Sequence[str]:
         return [str(motor) for motor in range(self.state.motors)] if self.state.motors > 1 else [""]
@@ -62,13 +52,13 @@ class TmclUnits(Units):
         elif found[2]:
             takes = Takes.PLACE if found[3].upper() == "ABS" else Takes.DISTANCE
         else:
-            takes = PARAMETERS.get(Axis(int(found[5]))) if int(found[5]) in PARAMETERS else None
+            takes = MEASURED.get(int(found[5]))
         moves = bool(found[2]) or (found[5] is not None and int(found[5]) == Axis.TARGET_POSITION)
         return (Field(_axis(self.state, int(found[6])), takes, *found.span(7), moves),) if takes is not None else ()
 
     def basis(self, axis: str, full_steps: int | None) -> Procedure[Basis]:
         motor, settings = int(axis or 0), {}
-        for parameter in RESTS:
+        for parameter in SCALES:
             if parameter == Axis.MICROSTEPS or parameter in module_of(self.state.product).axis:
                 try:
                     settings[int(parameter)] = yield from read(self.state, Call(Command.GAP, parameter, motor))
@@ -95,23 +85,23 @@ class TmclUnits(Units):
             return ()
         if call.command == Command.FACTORY:
             return self.axes()
-        sets = call.command in (Command.SAP, Command.RSAP) and call.type in (Axis.ACTUAL_POSITION, *RESTS)
+        sets = call.command in (Command.SAP, Command.RSAP) and call.type in (Axis.ACTUAL_POSITION, *SCALES)
         return (_axis(self.state, call.motor),) if sets else ()
 
     def recounts(self, request: Request) -> bool:
         _, call = call_of(request.body)
         if call.command == Command.FACTORY:
             return True
-        return call.command in (Command.SAP, Command.RSAP) and call.type in RESTS
+        return call.command in (Command.SAP, Command.RSAP) and call.type in SCALES
 
     def reads(self, text: str) -> tuple[str, Takes] | None:
         call = commands.parsed(text)
-        known = call is not None and call.command == Command.GAP and call.type in PARAMETERS
-        return (_axis(self.state, call.motor), PARAMETERS[Axis(call.type)]) if call is not None and known else None
+        known = call is not None and call.command == Command.GAP and call.type in MEASURED
+        return (_axis(self.state, call.motor), MEASURED[call.type]) if call is not None and known else None
 
     def setting(self, name: str) -> tuple[str, Takes] | None:
         found = _SETTING.fullmatch(name)
-        takes = PARAMETERS.get(Axis(int(found[1]))) if found is not None and int(found[1]) in PARAMETERS else None
+        takes = MEASURED.get(int(found[1])) if found is not None else None
         return (_axis(self.state, int(found[2] or 0)), takes) if found is not None and takes is not None else None
 
     def setting_name(self, axis: str, name: str) -> str:

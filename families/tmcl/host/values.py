@@ -39,7 +39,6 @@ from multidrop.families.tmcl.host.motions import DRIVER_FAULTS
 from multidrop.families.tmcl.host.operations import TmclOperations, motors, read
 from multidrop.families.tmcl.host.programs import TmclPrograms
 from multidrop.families.tmcl.manual.commands import (
-    STARTING_PARAMETERS,
     Axis,
     Call,
     Command,
@@ -47,30 +46,36 @@ from multidrop.families.tmcl.manual.commands import (
     parameter,
     setting_name,
 )
-from multidrop.families.tmcl.manual.modules import BAUDS, MODULES, RELATIVE_FROM, Module, Parameter, module_of
+from multidrop.families.tmcl.manual.modules import BAUDS, MODULES, RELATIVE_FROM, Module, module_of
+from multidrop.families.tmcl.manual.parameters import Parameter, Starts, row_of
 
 GLOBAL_PREFIX = "G"
 ADDRESS = f"{GLOBAL_PREFIX}{int(Global.ADDRESS)}"
-WIRE = frozenset({Global.BAUD, Global.ADDRESS, Global.PAUSE, Global.HOST_ADDRESS, Global.SUPPRESS_REPLY})
-UNITS = (Axis.UNIT_MODE, Axis.PULSE_DIVISOR, Axis.RAMP_DIVISOR)
-"""Parameters that change the meaning of others, and so are written first."""
 NOT_STORED = (3, 6)
 """The statuses of a module that lacks a parameter, or does not store it: wrong type, command not available."""
 
 
 def setting_names(module: Module, motors: int) -> tuple[str, ...]:
     """The settings of a module, in the order in which they are written."""
-    axis = [int(number) for number, each in module.axis.items() if each.writable and not each.live]
-    axis.sort(key=lambda number: number not in UNITS)
+    axis = _ordered(module.axis)
     own = [f"{number}{f'_{motor}' if motor else ''}" for motor in range(motors) for number in axis]
-    own_globals = [int(number) for number, each in module.banks[0].items() if each.writable and not each.live]
-    ordered = sorted(own_globals, key=lambda number: (number in WIRE, number == Global.ADDRESS, number == Global.BAUD))
-    return (*own, *(f"{GLOBAL_PREFIX}{number}" for number in ordered))
+    return (*own, *(f"{GLOBAL_PREFIX}{number}" for number in _ordered(module.banks[0])))
+
+
+def _ordered(table: Mapping[int, Parameter]) -> list[int]:
+    """The settings of a table by their numbers, in the order in which they are written."""
+    return sorted((number for number, each in table.items() if each.setting), key=lambda number: table[number].restored)
 
 
 def _row(module: Module, name: str) -> Parameter:
     of_module, number, _ = _parts(name)
     return (module.banks[0] if of_module else module.axis)[number]
+
+
+def _fact(name: str) -> Parameter | None:
+    """A row with the facts of a parameter that every module shares; None: there is no such parameter."""
+    of_module, number, _ = _parts(name)
+    return row_of(number, of_module)
 
 
 def _call(name: str, command: Command, value: int = 0) -> Call:
@@ -86,7 +91,7 @@ def reading(name: str, value: int, module: Module) -> Reading:
     row = _row(module, name)
     unit = ", ".join(each for each in (row.title, row.unit) if each)
     default = row.fresh if row.known else None
-    return Reading(name, value, unit=unit, default=default, fixed=of_module and number in WIRE)
+    return Reading(name, value, unit=unit, default=default, fixed=row.wire)
 
 
 def _parts(name: str) -> tuple[bool, int, int]:
@@ -118,17 +123,16 @@ class TmclParameters(ListedParameters):
         return setting_name(name)
 
     def communicates(self, name: str) -> bool:
-        of_module, number, _ = _parts(name)
-        return of_module and number in WIRE
+        row = _fact(name)
+        return row is not None and row.wire
 
     def risk(self, name: str, value: Value, now: Mapping[str, Value]) -> str:
-        of_module, number, _ = _parts(name)
-        if of_module and number == Global.AUTOSTART and value:
-            return "the stored program starts at power-up"
-        if not of_module and number in (Axis.RIGHT_LIMIT_OFF, Axis.LEFT_LIMIT_OFF) and value:
-            return "a move that the limit switch holds back may go on"
-        waits = not of_module and number in STARTING_PARAMETERS and now.get(name) == 0
-        return "a move may wait for it" if waits else ""
+        row = _fact(name)
+        if row is None:
+            return ""
+        if row.risk and value:
+            return row.risk
+        return "a move may wait for it" if row.starts is not Starts.NOTHING and now.get(name) == 0 else ""
 
     def checked(self, name: str, value: Value) -> int:
         if name not in self.names():

@@ -16,6 +16,7 @@ from functools import lru_cache
 
 from multidrop.base.files import rows
 from multidrop.base.text import counted
+from multidrop.families.tmcl.manual.parameters import CLEARED_BY_READING, INT32, STARTING, TARGETS
 
 
 class Command(IntEnum):
@@ -86,7 +87,6 @@ FACTORY_CODE = 1234
 """The value that command 137 needs."""
 TYPE, MOTOR, BANK, VALUE = "type", "motor", "bank", "value"
 BLANKS = " \t"
-INT32 = range(-(2**31), 2**31)
 MOTORS = range(256)
 
 
@@ -166,7 +166,7 @@ class Call:
     @property
     def changed_by_reading(self) -> bool:
         """Whether it reads the error flags, which that clears: never sent but for a person, and never twice."""
-        return (self.command, self.type) == (Command.GAP, Axis.ERROR_FLAGS)
+        return self.command == Command.GAP and self.type in CLEARED_BY_READING
 
     @property
     def moves(self) -> bool:
@@ -174,7 +174,7 @@ class Call:
         if self.command in NEVER_MOVE:
             return False
         if self.command in (Command.SAP, Command.RSAP):
-            return self.type in STARTING_PARAMETERS
+            return self.type in STARTING
         if self.command == Command.RFS:
             return self.type == Search.START
         return self.row is None or self.row.moves
@@ -183,15 +183,6 @@ class Call:
     def lasts(self) -> bool:
         """Whether what it starts may move the motor again, once that was at rest."""
         return self.command in (Command.SAP, Command.RSAP) and self.type not in TARGETS
-
-
-TARGETS = frozenset({0, 2})
-"""Axis parameters that start one motion when they are set: target position and velocity."""
-STARTING_PARAMETERS = frozenset({0, 1, 2, 4})
-"""Axis parameters that can start a motion when they are set.
-
-0 and 2 are target position and velocity. 1 starts one where 0 differs from it, 4 where a move waits at velocity 0.
-"""
 
 
 NEVER_MOVE = frozenset(

@@ -8,7 +8,8 @@ from multidrop.base.errors import Diagnostic
 from multidrop.dialects.language import Language, labelled, remedied
 from multidrop.families.tmcl.manual import instructions
 from multidrop.families.tmcl.manual.commands import REFUSALS, WORDS, Command, Row
-from multidrop.families.tmcl.manual.modules import RELATIVE_FROM, Parameter, module_of
+from multidrop.families.tmcl.manual.modules import RELATIVE_FROM, module_of
+from multidrop.families.tmcl.manual.parameters import Parameter
 
 ON_AXIS = frozenset({Command.SAP, Command.GAP, Command.STAP, Command.RSAP})
 ON_MODULE = frozenset({Command.SGP, Command.GGP, Command.STGP, Command.RSGP})

@@ -17,7 +17,8 @@ from enum import IntEnum
 
 from multidrop.base.files import rows
 from multidrop.families.tmcl.manual import commands
-from multidrop.families.tmcl.manual.commands import BYTE, INT32, MOTOR, STARTING_PARAMETERS, TYPE, VALUE, Call, Command
+from multidrop.families.tmcl.manual.commands import BYTE, MOTOR, TYPE, VALUE, Call, Command
+from multidrop.families.tmcl.manual.parameters import INT32, STARTING
 
 MEMORY = 2048
 """Lines that a module holds; some hold fewer."""
@@ -273,6 +274,6 @@ def spelled(call: Call, label: str = "") -> str:
 def moves(call: Call) -> bool:
     """Whether a line of a program can start motion."""
     if call.command == Word.AAP:
-        return call.type in STARTING_PARAMETERS
+        return call.type in STARTING
     row = ROWS.get(call.command)
     return call.moves if row is None or row.word in commands.WORDS else row.moves

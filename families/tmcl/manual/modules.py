@@ -1,11 +1,7 @@
-"""The parameters of TMCL modules, with the numbers that the maker's library lists for each module.
+"""The TMCL modules, with the numbers of parameters that the maker's library lists for each: `modules.csv`.
 
-`parameters.csv` has the axis parameters, those that modules which count in units of their chip have otherwise (`chip`),
-and the global ones of bank 0. `valid` is `-` for a parameter that is only read, and `?` for a range that is not public:
-any value of 32 bits is taken. Every cell says something. `modules.csv` has
-the modules. Positions are microsteps. Velocities and accelerations are microsteps/s and microsteps/s2 on modules with a
-TMC5130, TMC5160 or TMC4361; those with a TMC428 or TMC429 count in units of that chip. (TMCL firmware manuals, "Axis
-parameters", "Global parameters".)
+Positions are microsteps. Velocities and accelerations are microsteps/s and microsteps/s2 on modules with a TMC5130,
+TMC5160 or TMC4361; those with a TMC428 or TMC429 count in units of that chip.
 """
 
 from __future__ import annotations
@@ -14,69 +10,13 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from multidrop.base.files import rows
-from multidrop.families.tmcl.manual.commands import INT32, Axis, Status
+from multidrop.families.tmcl.manual.commands import Axis, Status
+from multidrop.families.tmcl.manual.parameters import GROUPS, INT32, Parameter
 
 MIRRORED, INVERTED = 64, 128
 """Added to a mode of the reference search: the right switch in place of the left one; the home switch inverted."""
 
 
-@dataclass(frozen=True)
-class Parameter:
-    """One parameter. `limits`: the values that can be set, in order; empty for one that is only read."""
-
-    title: str
-    limits: Sequence[int] = range(0)
-    unit: str = ""
-    fresh: int = 0
-    live: bool = False
-    """It shows a state of the moment: it is no setting, and nothing restores it."""
-    known: bool = True
-    """More than its number and its name is public."""
-
-    @property
-    def writable(self) -> bool:
-        return len(self.limits) > 0
-
-    @property
-    def valid(self) -> str:
-        """The values that can be set, in words."""
-        if not self.known:
-            return "range not known"
-        if isinstance(self.limits, range):
-            return f"{self.limits[0]} to {self.limits[-1]}"
-        ends = [n for n in self.limits if n - 1 not in self.limits or n + 1 not in self.limits]
-        return ", ".join(f"{low} to {high}" for low, high in zip(ends[::2], ends[1::2], strict=True))
-
-
-def _limits(text: str) -> Sequence[int]:
-    ends = (part.split("..") for part in text.split())
-    ranges = [range(int(low), int(high) + 1) for low, high in ends]
-    return ranges[0] if len(ranges) == 1 else tuple(n for each in ranges for n in each)
-
-
-def record(row: Mapping[str, str]) -> Parameter:
-    """Make the record of a row. Raises ValueError for a wrong cell."""
-    if empty := [column for column, text in row.items() if not text]:
-        raise ValueError(f"the row of {row['group']} {row['number']} says nothing of: {', '.join(empty)}")
-    return Parameter(
-        title=row["title"],
-        limits=INT32 if row["valid"] == "?" else _limits(row["valid"]) if row["valid"] != "-" else range(0),
-        unit="" if row["unit"] == "-" else row["unit"],
-        fresh=int(row["fresh"]),
-        live={"yes": True, "no": False}[row["live"]],
-        known=row["valid"] != "?",
-    )
-
-
-def _groups() -> Mapping[str, Mapping[int, Parameter]]:
-    found: dict[str, dict[int, Parameter]] = {}
-    for row in rows(__file__, "parameters.csv"):
-        found.setdefault(row["group"], {})[int(row["number"])] = record(row)
-    return found
-
-
-GROUPS = _groups()
-"""The parameters by group and number: `axis`, `chip`, `global`, and the name of a module for those that only it has."""
 _AXIS, _CHIP, _GLOBAL = GROUPS["axis"], GROUPS["chip"], GROUPS["global"]
 GLOBAL: Mapping[int, Parameter] = {number: row for number, row in _GLOBAL.items() if row.known}
 RELATIVE_FROM: Mapping[int, str] = {

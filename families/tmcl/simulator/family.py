@@ -31,9 +31,9 @@ from multidrop.families.tmcl.manual.modules import (
     PREFIX,
     USERS,
     Module,
-    Parameter,
     module_of,
 )
+from multidrop.families.tmcl.manual.parameters import Parameter
 from multidrop.families.tmcl.simulator.module import TmclModule, storable, worlds_of
 from multidrop.families.tmcl.simulator.motor import FULL
 from multidrop.simulator.cell.drive_keys import (

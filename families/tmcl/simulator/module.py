@@ -24,7 +24,8 @@ from multidrop.families.tmcl.manual.commands import (
     Version,
 )
 from multidrop.families.tmcl.manual.instructions import CONTROL, MEMORY, Wait, Word
-from multidrop.families.tmcl.manual.modules import BAUDS, GLOBAL, TEMPERATURE, VOLTAGE, Parameter, module_of
+from multidrop.families.tmcl.manual.modules import BAUDS, GLOBAL, TEMPERATURE, VOLTAGE, module_of
+from multidrop.families.tmcl.manual.parameters import TARGETS, Parameter
 from multidrop.families.tmcl.manual.program_file import compiled, read
 from multidrop.families.tmcl.simulator.coordinates import EVERY_MOTOR, NUMBERS, Coordinates
 from multidrop.families.tmcl.simulator.motor import Motor
@@ -351,7 +352,7 @@ class TmclModule:
                 if not row.writable:
                     raise Refused(Status.WRONG_TYPE)
                 _in_range(row, call.value)
-                if call.type in STARTERS:
+                if call.type in TARGETS:
                     motor.end_search()
                 motor.write(call.type, call.value, now)
                 return call.value
@@ -447,7 +448,6 @@ class TmclModule:
 
 
 OUTPUT = Parameter("level of an output", range(2))
-STARTERS = frozenset({Axis.TARGET_POSITION, Axis.TARGET_VELOCITY})
 
 
 def storable(number: int, row: Parameter) -> bool:

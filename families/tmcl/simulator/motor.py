@@ -20,6 +20,7 @@ from typing import NamedTuple
 
 from multidrop.families.tmcl.manual.commands import Axis
 from multidrop.families.tmcl.manual.modules import INVERTED, MIRRORED, Module
+from multidrop.families.tmcl.manual.parameters import RAMPS
 from multidrop.simulator.kinematics import Effort, Pace, halt, move, slew
 from multidrop.simulator.world import REVOLUTION, Shaft, World
 
@@ -33,8 +34,6 @@ FULL_CURRENT = 255
 """Parameter 6 at full current."""
 FROM_TARGET = 0
 """The value of parameter 127 with which MVP REL counts from the last target."""
-VELOCITIES = frozenset({Axis.MAXIMUM_VELOCITY, Axis.MAXIMUM_ACCELERATION, Axis.RAMP_DIVISOR, Axis.PULSE_DIVISOR})
-"""Parameters that change a ramp while it runs."""
 
 
 class Motor:
@@ -94,7 +93,7 @@ class Motor:
             self.parameters[number] = value
             if number in (Axis.MICROSTEPS, Axis.RUN_CURRENT):
                 self._hand_on(t)
-            elif number in VELOCITIES and (self.moving(t) or (self.positioning and not self.reached(t))):
+            elif number in RAMPS and (self.moving(t) or (self.positioning and not self.reached(t))):
                 self._plan(t)
 
     def go(self, target: int, t: float) -> None:

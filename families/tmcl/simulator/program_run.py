@@ -10,6 +10,7 @@ from multidrop.base.text import whole
 from multidrop.families.tmcl.manual import program_file
 from multidrop.families.tmcl.manual.commands import Axis, Call, Command, Search
 from multidrop.families.tmcl.manual.instructions import Word
+from multidrop.families.tmcl.manual.parameters import TARGETS
 from multidrop.families.tmcl.manual.program_file import Assembled
 from multidrop.families.tmcl.simulator.module import TmclModule, worlds_of
 from multidrop.families.tmcl.simulator.program import ALL_PORTS, USERS
@@ -144,5 +145,5 @@ class TmclRun(ProgramRun):
 
 def _begins_motion(call: Call) -> bool:
     if call.command in _SETS:
-        return call.type in (Axis.TARGET_POSITION, Axis.TARGET_VELOCITY)
+        return call.type in TARGETS
     return call.command in _MOTIONS or (call.command, call.type) == (Command.RFS, Search.START)

@@ -32,7 +32,7 @@ SHARED = {
     "multidrop.drives.roster": ("Roster",),
     "multidrop.shell.workspace": ("Workspace",),
     "multidrop.shell.session": ("Session", "VerbPath"),
-    "multidrop.shell.line_path": ("LinePath",),
+    "multidrop.shell.line_path": ("LinePath", "LinePassage"),
     "multidrop.shell.prompt.keyboard": ("Keyboard",),
     "multidrop.shell.prompt.line_queue": ("LineQueue",),
 }

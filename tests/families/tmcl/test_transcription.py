@@ -8,8 +8,8 @@ import csv
 
 import pytest
 
-from multidrop.families.tmcl.manual.commands import INT32
-from multidrop.families.tmcl.manual.modules import GROUPS, Parameter, record
+from multidrop.families.tmcl.manual import parameters
+from multidrop.families.tmcl.manual.parameters import GROUPS, INT32, Parameter, Starts, record
 from tests.support.cases import for_each
 from tests.support.paths import ROOT
 
@@ -56,3 +56,33 @@ def test_a_module_counts_in_units_of_its_chip_or_in_microsteps_and_never_in_both
 def test_a_row_with_an_empty_cell_is_refused_with_its_column(column: str) -> None:
     with pytest.raises(ValueError, match=f"says nothing of: {column}"):
         record({**CELLS[4], column: ""})
+
+
+def test_a_row_for_some_modules_differs_only_in_units_range_and_default() -> None:
+    """Code asks for the facts of a parameter whatever the module is."""
+    for group, table in GROUPS.items():
+        for number, row in table.items():
+            shared = GROUPS["axis"].get(number, row) if group != "global" else row
+            own = {"unit", "limits", "fresh", "known", "title"}
+            assert {key: each for key, each in vars(row).items() if key not in own} == {
+                key: each for key, each in vars(shared).items() if key not in own
+            }, (group, number)
+
+
+@for_each("cells", CELLS)
+def test_the_cells_of_a_row_agree_with_each_other(cells: dict[str, str]) -> None:
+    row = record(cells)
+    assert (cells["restored"] == "-") == (not row.setting)
+    assert (row.starts is not Starts.NOTHING) <= (row.writable and row.quantity is not None)
+    assert row.wire <= (row.restored > 0) and bool(row.risk) <= row.setting and row.clears <= (not row.writable)
+    assert cells["group"] != "global" or (row.starts, row.quantity, row.scale) == (Starts.NOTHING, None, 0)
+
+
+def test_a_turn_is_given_once() -> None:
+    assert [parameters.AXIS[number].scale for number in parameters.SCALES] == [*range(1, len(parameters.SCALES) + 1)]
+
+
+@pytest.mark.parametrize("column", ["live", "starts", "quantity", "scale", "ramp", "restored", "wire", "clears"])
+def test_a_cell_with_an_unknown_answer_is_refused(column: str) -> None:
+    with pytest.raises((ValueError, KeyError)):
+        record({**CELLS[4], column: "perhaps"})

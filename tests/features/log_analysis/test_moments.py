@@ -14,8 +14,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from multidrop.base.errors import Diagnostic
-from multidrop.features.log_analysis import moments
-from multidrop.features.log_analysis.moments import BACK, Known, Run, first_difference, moment
+from multidrop.features.log_analysis import differences, log_parts, moments
+from multidrop.features.log_analysis.differences import Run, first_difference
+from multidrop.features.log_analysis.moments import BACK, Known, moment
 from multidrop.shell.log.files import Entry, Line, line_of, lines
 from tests.support.examples import examples
 
@@ -29,7 +30,8 @@ STEPS = ("typed", "printed", "unsolicited", "failed", "stop")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
     """A folder; blocks are small in it, so that a short log has many."""
     with pytest.MonkeyPatch.context() as patched:
-        patched.setattr(moments, "BLOCK", 700)
+        patched.setattr(log_parts, "BLOCK", 700)
+        patched.setattr(differences, "BLOCK", 700)
         yield tmp_path_factory.mktemp("logs")
 
 
@@ -199,7 +201,7 @@ def test_times_of_threads_in_another_order_are_one_moment(folder: Path) -> None:
 def test_a_log_that_is_rotated_meanwhile_is_read_again(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = written(folder / "turn.jsonl", steps(*((AT, str(number)) for number in range(60))), 2)
     rotations = [1]
-    opened = moments._opened
+    opened = log_parts.open_part
 
     def rotating(part: Path) -> IO[bytes]:
         if rotations:
@@ -209,7 +211,8 @@ def test_a_log_that_is_rotated_meanwhile_is_read_again(folder: Path, monkeypatch
             path.write_bytes(line_of(Entry(AT, "typed", "last", "p", "a")))
         return opened(part)
 
-    monkeypatch.setattr(moments, "_opened", rotating)
+    for module in (log_parts, differences):
+        monkeypatch.setattr(module, "open_part", rotating)
     run = Run(path)
     assert len(run.steps) == 61
     path.write_bytes(b"")

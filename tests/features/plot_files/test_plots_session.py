@@ -16,8 +16,9 @@ from multidrop.dialects.values import Conditions, Lamp
 from multidrop.drives.events import Conditioned, Sample, Unsolicited, Valued
 from multidrop.drives.telemetry import Value
 from multidrop.features.plot_files import plot
+from multidrop.features.plot_files.options import PlotOptions
 from multidrop.features.plot_files.plot import Plot, attach, begin
-from multidrop.features.plot_files.request import parse_rate, parse_target
+from multidrop.features.plot_files.request import parse_target
 from multidrop.shell.batch import runner
 from multidrop.shell.configuration import Settings
 from multidrop.shell.events import By, Entered, Failed, Notified, OnBus, Output, Printed, SessionEvent
@@ -239,11 +240,11 @@ async def test_a_plot_that_other_computers_can_read_is_said_to_be_so(tmp_path, m
 
 @pytest.mark.parametrize(("text", "period"), [("50", 0.02), ("0.5", 2.0), ("1000", 0.001), ("max", 0.0)])
 def test_a_rate_is_a_number_of_samples_a_second_or_max(text: str, period: float) -> None:
-    assert parse_rate(text) == pytest.approx(period)
+    assert PlotOptions(rate=text).period == pytest.approx(period)
 
 
 @pytest.mark.parametrize("text", ["", "0", "-5", "1001", "fast", "nan", "inf", "1e-9", "MAX"])
 def test_any_other_rate_is_refused_with_the_valid_ones(text: str) -> None:
     with pytest.raises(Diagnostic, match="invalid rate") as refused:
-        parse_rate(text)
+        PlotOptions(rate=text)
     assert "0.01 to 1000" in str(refused.value)

@@ -14,7 +14,8 @@ from multidrop.families.lexium.manual.errors import ErrorNumber as E
 from multidrop.families.lexium.manual.grammar import Argument, Number, Statement
 from multidrop.families.lexium.manual.groups import TRIPS, TRIPS_WITH_VALUE
 from multidrop.families.lexium.manual.statements import device_name as device_name_of
-from multidrop.families.lexium.manual.table import lookup
+from multidrop.families.lexium.manual.table import MNEMONICS, lookup
+from multidrop.families.lexium.manual.value_forms import MOST_REPEATS
 from multidrop.families.lexium.simulator.event_loop import EventLoop
 from multidrop.families.lexium.simulator.language.variables import Compile, Variables, bare, is_place, missing, only
 from multidrop.families.lexium.simulator.motion.inputs import ANALOG
@@ -24,7 +25,6 @@ from multidrop.families.lexium.simulator.state.memory import Trip
 from multidrop.families.lexium.simulator.state.program_memory import Action
 
 FIRST_INPUT = 1
-MOST_REPEATS = 65000
 PRINT_FORMAT = (10, 6, 0, 0)
 """PF: width, decimals, scientific, left."""
 
@@ -206,7 +206,7 @@ class Setups:
     def _print_format(self, values: list[int]) -> None:
         """PF (manual 5.1.97). Its default is the format of a new drive, which pads nothing."""
         values = [*values, *PRINT_FORMAT[len(values) :]]
-        if not all(0 <= value <= most for value, most in zip(values, (16, 16, 1, 1), strict=True)):
+        if not all(0 <= value <= most for value, most in zip(values, MNEMONICS["PF"].setup.numbers[1:], strict=True)):
             raise Fault(E.OUT_OF_RANGE)
         self._keep("PF", [] if values == [*PRINT_FORMAT] else values)
 

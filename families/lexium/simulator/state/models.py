@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from types import MappingProxyType
 from typing import NamedTuple
 
-from multidrop.base.files import rows
+from multidrop.families.lexium.manual.point_types import POINTS
 
 STEP_DIRECTION, QUADRATURE, UP_DOWN = "step and direction", "quadrature", "up and down"
 
@@ -45,15 +45,14 @@ class Points(NamedTuple):
     live_zero: int = 3200
 
 
-def _points(product: str, like: Points) -> Points:
-    """The points of a product in `points.csv`: the types that each takes, and its set-up from the factory."""
-    table = {int(row["point"]): row for row in rows(__file__, "points.csv") if row["product"] == product}
-
-    def types(column: str) -> Types:
-        return {n: frozenset(map(int, row[column].split())) for n, row in table.items() if row[column]}
-
-    fresh = {n: tuple(map(int, row["fresh"].split())) for n, row in table.items()}
-    return like._replace(input_types=types("inputs"), output_types=types("outputs"), fresh=fresh)
+def _points(group: str, like: Points) -> Points:
+    """The points of a group of products: the types that each takes, and its set-up from the factory."""
+    table = POINTS[group]
+    return like._replace(
+        input_types={n: each.inputs for n, each in table.items() if each.inputs},
+        output_types={n: each.outputs | each.hmt for n, each in table.items() if each.outputs},
+        fresh={n: each.fresh for n, each in table.items()},
+    )
 
 
 _CLOCKS = {13: STEP_DIRECTION, 14: QUADRATURE, 15: UP_DOWN}

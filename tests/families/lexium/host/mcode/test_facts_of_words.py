@@ -25,6 +25,7 @@ from multidrop.families.lexium.manual.mnemonic import (
     Prints,
 )
 from multidrop.families.lexium.manual.table import MDRIVE, MNEMONICS, record, whole_row
+from multidrop.families.lexium.manual.value_forms import FORMS
 from tests.support.cases import for_each
 from tests.support.paths import ROOT
 
@@ -166,3 +167,12 @@ def test_every_instruction_with_which_the_motor_turns_is_shown_as_one() -> None:
 def test_a_missing_place_is_reported_as_a_label_wherever_a_word_takes_one(line: str, label: str) -> None:
     found = [each for each in program_checker.check(f"PG 1\nLB G1\n{line}\nE\nPG\n") if not each.warning]
     assert [(each.what, each.hint) for each in found] == [(f"no label {label}", f"LB {label} is missing")]
+
+
+@for_each("each", groups.ROWS)
+def test_the_form_of_every_value_has_a_class_that_checks_it(each: Mnemonic) -> None:
+    assert (each.setup.form in FORMS) == each.valued
+    assert (each.setup.form in (Form.FIELDS, Form.LIST, Form.TRIP)) == bool(each.setup.numbers)
+    if each.setup.form is Form.FIELDS and len(each.setup.numbers) > 1:
+        assert len(each.setup.numbers) == 1 + each.setup.numbers[0]
+    assert (each.setup.repeated or each.setup.removable) <= (each.setup.form is Form.TRIP)

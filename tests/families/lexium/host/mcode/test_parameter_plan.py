@@ -163,6 +163,8 @@ def test_jog_inputs_are_restored_where_jogging_is_off():
         ({"TI": (1.5, "G1")}, "takes TI="),
         ({"TR": (0, "G1")}, "takes TR="),
         ({"TR": (5, "G1", 70000)}, "takes TR="),
+        ({"TR": (5, "G1", "G1")}, "takes TR="),
+        ({"TR": (5,)}, "takes TR="),
         ({"TC": (1, "G1")}, "takes TC="),
         ({"F1": "1\rMR 5"}, "F1 = 1"),
     ],

@@ -7,7 +7,7 @@ import pytest
 from multidrop.dialects.values import IO, VARIABLES, Permission
 from multidrop.families.lexium.host.mcode.family import MCodeFamily
 from multidrop.families.lexium.manual import parameters as manual
-from multidrop.families.lexium.manual.parameter_plan import types
+from multidrop.families.lexium.manual.point_types import types
 from multidrop.families.lexium.simulator.state.models import MODELS
 from multidrop.simulator.cell.spec import Faults
 from tests.support.direct_drive import DirectDrive
